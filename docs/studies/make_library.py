@@ -20,7 +20,7 @@ from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
-from posefit.motion.asf import read_asf
+from posefit.motion.asf import parse_asf
 from posefit.motion.recorded import FPS, STEP
 
 ORIGIN = (
@@ -64,7 +64,7 @@ def main(root: Path) -> None:
     skeletons: list[dict[str, Any]] = []
     names, owners, counts, gaps, numbers = [], [], [], [], []
     for path in files:
-        skeleton = read_asf(root / "asf" / f"{path.stem}.asf")
+        skeleton = parse_asf(root / "asf" / f"{path.stem}.asf").skeleton
         skeletons.append(
             {
                 "name": path.stem,

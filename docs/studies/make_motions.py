@@ -22,7 +22,7 @@ from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip
-from posefit.motion.asf import read_asf
+from posefit.motion.asf import parse_asf
 from posefit.motion.built_in import activity_of
 
 PHASES = 48  # of a cycle, at which the arms are drawn
@@ -251,7 +251,7 @@ def main(root: Path) -> None:
     for name in needed:
         if not (root / name).is_file():
             raise InputError(f"CMU_DIR must hold {name}, got {root} without it")
-    bones = average([read_asf(root / subject / f"{subject}.asf") for subject in SUBJECTS])
+    bones = average([parse_asf(root / subject / f"{subject}.asf").skeleton for subject in SUBJECTS])
     skeleton = Skeleton(
         "average",
         np.array(bones["offsets"]),

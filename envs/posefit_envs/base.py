@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.fitting.check import one_of, whole
-from posefit.fitting.exchange import exchanged
+from posefit.fitting.dlpack import as_numpy
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted, suggestion
@@ -184,7 +184,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         Raises gymnasium.error.InvalidAction where they have another shape, or are not finite numbers.
         """
         try:
-            values = np.array(exchanged("actions", actions)[0], dtype=np.float64)
+            values = np.array(as_numpy("actions", actions)[0], dtype=np.float64)
         except (TypeError, ValueError) as mistake:
             raise error.InvalidAction(f"an action must be {shape[-1]} numbers, got {actions!r}") from mistake
         if values.shape != shape:

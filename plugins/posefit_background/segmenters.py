@@ -6,8 +6,8 @@ from posefit.silhouette.foreground import (
     HISTORY,
     SAMPLES,
     THRESHOLD,
-    Drawn,
     Film,
+    GivenMasks,
     Mixture,
     Still,
     mean_background,
@@ -50,6 +50,6 @@ def given_mean(film: Film, *, background: str) -> Still:
     return mean_background([film.picture(background)])
 
 
-def given_masks(_film: Film) -> Drawn:
+def given_masks(_film: Film) -> GivenMasks:
     """The frames are masks already: what is bright is the person."""
-    return Drawn()
+    return GivenMasks()

@@ -13,7 +13,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry import rotation
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, turns_of
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angles_of
 
 # hips, knees, shoulders, elbows, neck
 BONES = ("lfemur", "ltibia", "rfemur", "rtibia", "lhumerus", "lradius", "rhumerus", "rradius", "lowerneck")
@@ -21,7 +21,7 @@ TURNS = 1 + len(BONES)  # quaternions of a state: the whole body's, and each bon
 STATE, ERROR = 3 + 4 * TURNS, 3 + 3 * TURNS
 FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and the whole body's rotation vector
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
-HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[joint] for joint in INNER if joint not in HELD])
+HELD_ANGLES, OTHER_ANGLES = angles_of(BONES), angles_of([JOINTS[joint] for joint in INNER if joint not in HELD])
 DIFFERENCE = 1e-4  # metres and radians to either side, from which functions of a state are differentiated
 
 _W, _X, _Y, _Z = np.eye(4)

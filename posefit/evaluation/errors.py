@@ -23,13 +23,12 @@ from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, reliability
 from posefit.uncertainty.intervals import joint_intervals
 from posefit.uncertainty.modes import likeliest_is_right, nearer_mirrored, unknown_sides
 
-MAX_FULL_SIZE_POSES = 8_000  # training poses, more than which are not all drawn at full size in every frame
-SMALL_STRIDE = 4  # of so many poses each is drawn in a small picture
-FULL_SIZE_CANDIDATES = 200  # of these are drawn at full size, with their neighbours in the clip
+# `nearest` draws more training poses than these in two rounds: every fourth in a small picture, then the best and
+# their neighbours in the clip at full size
+MAX_FULL_SIZE_POSES, SMALL_STRIDE, FULL_SIZE_CANDIDATES = 8_000, 4, 200
 MIN_SMALL_SIDE, MAX_SMALL_FACTOR = 60, 4  # pixels of a small picture's side, and by how much it is smaller
-LOST = 0.5  # the probability of a frame to be lost from which on it is called so
+LOST = 0.5  # a frame is called lost from this probability on
 MAX_TRACE_POINTS = 64
-
 
 FRAME = {
     measure.name: measure
@@ -58,7 +57,7 @@ Table = dict[str, Array]  # (T,) a column, by the names of `FRAME`; NaN where a 
 
 
 def unseen(table: Table) -> set[int]:
-    """Return the frames that were held or are called lost, whose places no file has: their numbers as filmed."""
+    """Return the numbers, as filmed, of frames that were held or are called lost; files leave their places blank."""
     return set(table["frame"][(table["usable"] == 0.0) | (table["lost"] >= LOST)].tolist())
 
 
@@ -69,8 +68,8 @@ def evaluated(
 
     Baselines have the true root and translation, which a tracker has not: `mean_pose`, the mean of the training poses
     (n, 63), which only the errors against a truth need; `persistence`, the true pose of the first frame; `nearest`, the
-    training pose of least cost in each frame. `prior_floor` is the truth's own projection into the prior, which is no
-    floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took.
+    training pose of least cost in each frame. `prior_floor_degrees` is the error of the truth projected into the prior,
+    which is no floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took.
     """
     cost, held = np.array([frame.cost for frame in frames]), np.zeros(len(frames), dtype=bool)
     iou = np.empty(len(frames))  # the mean over the cameras that saw something

@@ -30,6 +30,22 @@ from posefit.uncertainty.modes import poses_apart
 SMOOTH_SECONDS = 0.5  # before and after a frame, to which a smooth path is fitted
 MIN_SMOOTH_FRAMES = 5  # of such a fit
 SCATTER_QUANTILE = 0.9  # of frames that lie nearer to that path
+TRAINING_SECONDS = 1.0 / 15.0  # between poses of a motion that others are compared with
+CLOTHES = 0.05  # of the person's longer side: motion as near as that to the body is its own clothes' and hair's
+MIN_MOVED = 0.02  # of the body's area: fewer pixels that moved are noise
+USELESS_TOGETHER = 3  # signs that make a track doubtful make it useless together
+MIN_FRAMES = 12  # fewer are too few to judge depth, feet and motion by
+SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
+FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a person is seen from the front or the back
+MAX_STATIONARY_METRES = 1.0  # along the ground's axes: who stays within walks nowhere
+
+# why a sign is unknown
+ONE_CAMERA = "one camera cannot tell a small person from a distant one"
+SEVERAL = "several cameras see the depth"
+NOT_REPORTED = "the method does not say"
+MASKS_ALONE, STILL, MOVES = "there are masks alone", "nothing moves enough", "the camera moves"
+TOO_FEW = "too few frames show the person"
+IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
 
 
 def longer_side(mask: Mask) -> int:
@@ -76,9 +92,6 @@ def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
     return float(np.std(heights)) if len(heights) > 1 else None
 
 
-TRAINING_SECONDS = 1.0 / 15.0  # between poses of a motion that others are compared with
-
-
 def training_distances(skeleton: Skeleton, poses: Array, training: Sequence[Motion]) -> Array:
     """Return how far poses (n, 66) are from the nearest of some motions (n,): metres, the mean over joints.
 
@@ -91,10 +104,6 @@ def training_distances(skeleton: Skeleton, poses: Array, training: Sequence[Moti
         others[:, 0] = 0.0
         np.minimum(nearest, poses_apart(skeleton, both, others).min(axis=1), out=nearest)
     return np.asarray(nearest.reshape(2, -1).min(axis=0))
-
-
-CLOTHES = 0.05  # of the person's longer side: motion as near as that to the body is its own clothes' and hair's
-MIN_MOVED = 0.02  # of the body's area: fewer pixels that moved are noise
 
 
 def explained_share(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:
@@ -132,8 +141,6 @@ def covered_pixels(image: Image, then: Image, body: Mask, observed: Mask, reach:
 
 Grade = Literal["good", "doubtful", "useless"]
 _BEGINNING: dict[Grade, str] = {"good": "good. ", "doubtful": "doubtful: ", "useless": "do not use: "}
-USELESS_TOGETHER = 3  # signs that make a track doubtful make it useless together
-MIN_FRAMES = 12  # fewer are too few to judge depth, feet and motion by
 
 
 @dataclass(frozen=True)
@@ -262,17 +269,6 @@ def _listed(figures: Mapping[str, Any]) -> str:
     return ", ".join(filter(None, known))
 
 
-SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
-FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a person is seen from the front or the back
-ONE_CAMERA = "one camera cannot tell a small person from a distant one"
-SEVERAL = "several cameras see the depth"
-NOT_REPORTED = "the method does not say"
-MASKS_ALONE, STILL, MOVES = "there are masks alone", "nothing moves enough", "the camera moves"
-TOO_FEW = "too few frames show the person"
-IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
-MAX_STATIONARY_METRES = 1.0  # along the ground's axes: who stays within walks nowhere
-
-
 def trust_of(
     scene: Scene,
     tracked: Sequence[Frame],
@@ -286,46 +282,12 @@ def trust_of(
     `tracked` are the tracker's frames, and `frames` these in the end, smoothed; `iou` is their overlap with
     the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
     """
-    usable = table["usable"] == 1.0
-    cut, cropped = np.array([_borders(each) for each in scene.observations]).T
-    few, several, fps = usable.sum() < MIN_FRAMES, len(scene.cameras) > 1, scene.fps
-    joints, camera, stature = scene.motion(frames).joints, scene.cameras[0], scene.body.stature
-    stands = standing(joints, fps) & usable[:, None]
-    in_place = few or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= MAX_STATIONARY_METRES
-    depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
-    turns = np.array([frame.pose[0] - facing(camera, frame.translation) for frame in frames])
-    lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
-    signs: dict[str, float | str] = {  # a text is why it is unknown
-        "size_ratio": _or({ONE_CAMERA: not several}, lambda: _size(scene, frames, usable), TOO_FEW),
-        "depth_scatter": _or({TOO_FEW: few}, lambda: depth_scatter(depths, usable, fps), TOO_FEW),
-        "foot_share": _or({TOO_FEW: few, IN_PLACE: in_place}, lambda: float(stands.any(axis=1)[usable].mean())),
-        "stance_spread_m": _or({TOO_FEW: few}, lambda: stance_spread(joints, stands), "no foot stands twice"),
-        "explained": _or(
-            {MASKS_ALONE: scene.pictures is None, MOVES: scene.camera_moves},
-            lambda: explained_share(scene, frames, usable),
-            STILL,
-        ),
-        "interval_mm": _or({}, lambda: mean_known(radii), NOT_REPORTED),
-        "training_mm": _or(
-            {SEVERAL: several, TOO_FEW: few},
-            lambda: _training_mm(scene, frames, usable, training),
-            "no motion was learned from",
-        ),
-        "lost": _or({}, lambda: mean_known(np.where(np.isnan(lost), lost, lost >= LOST)), NOT_REPORTED),
-        "unknown": _or({}, lambda: mean_known(unknown), NOT_REPORTED),
-        "held": held_share(usable, cut),
-        "cropped": _or({TOO_FEW: few}, lambda: float(cropped[usable].mean())),
-        "frontal": _or(
-            {SEVERAL: several}, lambda: mean_known(1.0 * (np.abs(np.sin(turns)) < FRONTAL)[usable]), TOO_FEW
-        ),
-        "iou": iou,
-        "acceleration": _or({TOO_FEW: few}, lambda: mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
-    }
+    signs = _signs(scene, tracked, frames, table, iou, training)
     reasons = {name: value for name, value in signs.items() if isinstance(value, str)}
     figures: dict[str, Any] = {**signs, **dict.fromkeys(reasons)}
-    ratio = figures["size_ratio"]
+    ratio, stature = figures["size_ratio"], scene.body.stature
     figures |= {
-        "frames": int(usable.sum()),
+        "frames": int((table["usable"] == 1.0).sum()),
         "height_m": stature,
         "size_m": None if ratio is None else ratio * stature,
     }
@@ -339,14 +301,60 @@ def trust_of(
     )
 
 
+def _signs(
+    scene: Scene,
+    tracked: Sequence[Frame],
+    frames: Sequence[Frame],
+    table: Table,
+    iou: float,
+    training: Sequence[Motion],
+) -> dict[str, float | str]:
+    """Return the figure of each of `SIGNS`, or a text: why it is unknown."""
+    usable = table["usable"] == 1.0
+    cut, cropped = np.array([_borders(each) for each in scene.observations]).T
+    few, several, fps = usable.sum() < MIN_FRAMES, len(scene.cameras) > 1, scene.fps
+    joints, camera = scene.motion(frames).joints, scene.cameras[0]
+    stands = standing(joints, fps) & usable[:, None]
+    in_place = few or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= MAX_STATIONARY_METRES
+    depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
+    turns = np.array([frame.pose[0] - facing(camera, frame.translation) for frame in frames])
+    lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
+    return {
+        "size_ratio": _figure({ONE_CAMERA: not several}, lambda: _size(scene, frames, usable), TOO_FEW),
+        "depth_scatter": _figure({TOO_FEW: few}, lambda: depth_scatter(depths, usable, fps), TOO_FEW),
+        "foot_share": _figure({TOO_FEW: few, IN_PLACE: in_place}, lambda: float(stands.any(axis=1)[usable].mean())),
+        "stance_spread_m": _figure({TOO_FEW: few}, lambda: stance_spread(joints, stands), "no foot stands twice"),
+        "explained": _figure(
+            {MASKS_ALONE: scene.pictures is None, MOVES: scene.camera_moves},
+            lambda: explained_share(scene, frames, usable),
+            STILL,
+        ),
+        "interval_mm": _figure({}, lambda: mean_known(radii), NOT_REPORTED),
+        "training_mm": _figure(
+            {SEVERAL: several, TOO_FEW: few},
+            lambda: _training_mm(scene, frames, usable, training),
+            "no motion was learned from",
+        ),
+        "lost": _figure({}, lambda: mean_known(np.where(np.isnan(lost), lost, lost >= LOST)), NOT_REPORTED),
+        "unknown": _figure({}, lambda: mean_known(unknown), NOT_REPORTED),
+        "held": held_share(usable, cut),
+        "cropped": _figure({TOO_FEW: few}, lambda: float(cropped[usable].mean())),
+        "frontal": _figure(
+            {SEVERAL: several}, lambda: mean_known(1.0 * (np.abs(np.sin(turns)) < FRONTAL)[usable]), TOO_FEW
+        ),
+        "iou": iou,
+        "acceleration": _figure({TOO_FEW: few}, lambda: mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
+    }
+
+
 def _borders(observation: Observation) -> tuple[bool, bool]:
     """Return whether the picture's border cuts the person in some view, and whether above and below in all."""
     masks = [silhouette.mask for silhouette in observation.silhouettes]
     return any(map(touches_border, masks)), all(mask[0].any() and mask[-1].any() for mask in masks)
 
 
-def _or(reasons: Mapping[str, bool], compute: Callable[[], float | None], otherwise: str = "") -> float | str:
-    """Return the first of the reasons that holds, or the value, or for None what is the reason otherwise."""
+def _figure(reasons: Mapping[str, bool], compute: Callable[[], float | None], otherwise: str = "") -> float | str:
+    """Return a figure, or why it is unknown: the first of the reasons that holds, or `otherwise` where it is None."""
     for reason, holds in reasons.items():
         if holds:
             return reason

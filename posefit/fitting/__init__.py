@@ -4,7 +4,7 @@
 |---|---|
 | the box [-1, 1]^d that every optimiser searches, and where a search starts in it | box.py |
 | proposals as poses: root angles, translation, a prior's coordinates | space.py |
-| where a search starts that knows which poses a frame may show | start.py |
+| where a search starts when poses are guessed for its frame | start.py |
 | what a prior is: poses as fewer numbers, and which of them are feasible; the tilt of the root with them | prior.py |
 | where a body stands; the cost of proposals for one observation, and at smaller sizes. SAPSO (5) | problem.py |
 | what an optimiser is, the base of adapters of other libraries, the loop that drives one | optimiser.py |
@@ -18,5 +18,5 @@
 | one frame fitted to the contours of its masks | contours.py, contour_kernels.py |
 | CMA-ES | cma.py |
 | aligning and decoding, compiled | kernels.py |
-| checks of settings; arrays of other libraries | check.py, exchange.py |
+| checks of settings; arrays of other libraries | check.py, dlpack.py |
 """

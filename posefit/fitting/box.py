@@ -78,7 +78,7 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
     itself: the coordinates of (6) are independent and the box is a product, so that this has the distribution of
     redrawing the whole proposal. One still out of the box is then folded back into it. An infeasible proposal is
     redrawn as a whole, and then becomes the start's mean, or the copy of a feasible one. Where nothing around the
-    start is feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is, and where the
+    start is feasible, the population is drawn from anywhere. Raises InputError where nothing at all is, and where the
     count is no whole number above 0.
     """
     count = whole("count", count, 1)

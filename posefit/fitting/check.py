@@ -12,13 +12,13 @@ MAX_BITS = 1_024  # of a whole number, so that it can be written down
 
 
 def at_least(name: str, value: float, least: float) -> None:
-    """Raise ValueError where a number is below the least it may be, or is not finite."""
+    """Raise InputError where a number is below the least it may be, or is not finite."""
     if not (math.isfinite(value) and value >= least):
         raise InputError(f"{name} must be at least {least:g}, got {value}")
 
 
 def between(name: str, value: float, low: float, high: float, *, ends: bool = True) -> None:
-    """Raise ValueError where a number is not in low to high, with or without the ends."""
+    """Raise InputError where a number is not in low to high, with or without the ends."""
     inside = low <= value <= high if ends else low < value < high
     if not inside:
         way = f"lie in {low:g} to {high:g}" if ends else f"lie between {low:g} and {high:g}"
@@ -26,13 +26,13 @@ def between(name: str, value: float, low: float, high: float, *, ends: bool = Tr
 
 
 def positive(name: str, value: float) -> None:
-    """Raise ValueError where a number is not finite and above 0."""
+    """Raise InputError where a number is not finite and above 0."""
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(f"{name} must be above 0, got {value}")
 
 
 def whole(name: str, value: object, least: int) -> int:
-    """Return a whole number as an int. Raises ValueError where it is none, or below the least it may be."""
+    """Return a whole number as an int. Raises InputError where it is none, or below the least it may be."""
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value).bit_length() > MAX_BITS:
         raise InputError(f"{name} must be a whole number of at least {least}, got {quoted(value)}")
     if value < least:
@@ -41,7 +41,7 @@ def whole(name: str, value: object, least: int) -> int:
 
 
 def finite_number(name: str, value: object) -> float:
-    """Return a finite number as a float. Raises ValueError where it is none."""
+    """Return a finite number as a float. Raises InputError where it is none."""
     try:
         number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:  # a whole number of any size
@@ -52,7 +52,7 @@ def finite_number(name: str, value: object) -> float:
 
 
 def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
-    """Return two values. Raises ValueError where it is anything else; `what` says what was expected."""
+    """Return two values. Raises InputError where it is anything else; `what` says what was expected."""
     values = value.tolist() if hasattr(value, "tolist") else value  # an array
     if not isinstance(values, tuple | list) or len(values) != 2:
         raise InputError(f"{name} must be {what}, got {quoted(value)}")
@@ -60,7 +60,7 @@ def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
 
 
 def one_of(name: str, value: object, known: Iterable[object]) -> None:
-    """Raise ValueError listing the choices where a value is none of them."""
+    """Raise InputError listing the choices where a value is none of them."""
     known = tuple(known)
     if value not in known:
         hint = suggestion(value, map(str, known)) if isinstance(value, str) else ""
@@ -68,7 +68,7 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
 
 
 def choices(settings: object, values: Mapping[str, object]) -> None:
-    """Raise ValueError where a value is none of those that its annotation, a `Literal`, lists.
+    """Raise InputError where a value is none of those that its annotation, a `Literal`, lists.
 
     `settings` is a function with such parameters, or a class with such attributes; `values` may hold others too.
     """

@@ -55,9 +55,9 @@ class Growth(NamedTuple):
 
 
 class BoneSquares(NamedTuple):
-    """Half the second derivatives of each joint's bone, or of T frames', and forces, over twists."""
+    """Half the Hessians of each joint's bone, or of T frames', and forces, over twists."""
 
-    curves: Array  # (27, 6, 6), or (T, 27, 6, 6)
+    hessians: Array  # (27, 6, 6), or (T, 27, 6, 6)
     forces: Array  # (27, 6, 1 + F), or (T, 27, 6, 1 + F): half the gradient, and half the derivatives by F factors
 
 
@@ -94,12 +94,12 @@ def cone_distance(x, y, cone):
 
 
 @inlined
-def _add(block, slope, share, across, down, radius_change, off, weight):
+def _add(block, gradient, share, across, down, radius_change, off, weight):
     """Add the square of one distance, which moves by (across, down) with its axis and by `radius_change`."""
     rest = 1.0 - share
     values = (across * rest, down * rest, across * share, down * share, radius_change * rest, radius_change * share)
     for i in range(6):
-        slope[i] += weight * off * values[i]
+        gradient[i] += weight * off * values[i]
         for j in range(6):
             block[i, j] += weight * values[i] * values[j]
 
@@ -142,7 +142,7 @@ def _covered(x, y, neighbours, cones, discs):
 
 
 @jit
-def add_pulls(parents, centres, radii, contour, scale, blocks, slopes):
+def add_pulls(parents, centres, radii, contour, scale, blocks, gradients):
     """Add the squares of the distances of the mask's border from the body's, and of the body's from the mask's.
 
     Those of a bone go to its half of a second derivative, 6 x 6, and half of a gradient: by the column and row of its
@@ -150,17 +150,17 @@ def add_pulls(parents, centres, radii, contour, scale, blocks, slopes):
     """
     cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
     write_cones(parents, centres, radii, cones, discs)
-    _add_mask_border(contour, scale, cones, discs, blocks, slopes)
+    _add_mask_border(contour, scale, cones, discs, blocks, gradients)
     neighbours = np.empty(parents.size, np.int64)
     for b in range(parents.size):
         if cones[b, 6] > abs(cones[b, 5]) + TINY:  # else one of its discs covers the other
             others = neighbours[: _write_neighbours(b, discs, neighbours)]
             start, end = centres[parents[b]], centres[b + 1]
-            _add_bone_border(start, end, radii[b], contour, scale, (others, cones, discs), (blocks[b], slopes[b]))
+            _add_bone_border(start, end, radii[b], contour, scale, (others, cones, discs), (blocks[b], gradients[b]))
 
 
 @inlined
-def _add_mask_border(contour, scale, cones, discs, blocks, slopes):
+def _add_mask_border(contour, scale, cones, discs, blocks, gradients):
     """Add the squares of the distances of the mask's border from the nearest bones."""
     bone = 0
     for i in range(contour.points.shape[0]):
@@ -168,14 +168,14 @@ def _add_mask_border(contour, scale, cones, discs, blocks, slopes):
         bone = _nearest_bone(x, y, bone, cones, discs)
         off, share, nx, ny = cone_distance(x, y, cones[bone])
         weight = contour.step / (1.0 + (off / scale) ** 2)
-        _add(blocks[bone], slopes[bone], share, -nx, -ny, -1.0, off, weight)
+        _add(blocks[bone], gradients[bone], share, -nx, -ny, -1.0, off, weight)
 
 
 @inlined
 def _add_bone_border(start, end, ends, contour, scale, others, square):
     """Add the squares of the distances of a bone's visible border, both sides and both ends, from the mask's."""
     neighbours, cones, discs = others
-    block, slope = square
+    block, gradient = square
     dx, dy = end[0] - start[0], end[1] - start[1]
     r0, r1 = ends[0], ends[1]
     length = math.sqrt(dx * dx + dy * dy)
@@ -204,7 +204,7 @@ def _add_bone_border(start, end, ends, contour, scale, others, square):
         known, off, across, down = _mask_distance(x, y, contour)
         if known and not _covered(x, y, neighbours, cones, discs):
             weight = stands / (1.0 + (off / scale) ** 2)
-            _add(block, slope, share, across, down, across * nx + down * ny, off, weight)
+            _add(block, gradient, share, across, down, across * nx + down * ny, off, weight)
 
 
 @inlined
@@ -231,7 +231,7 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     A distance counts less beyond `reach` metres.
     """
     rotation, translation, focal, centre = camera
-    curves, forces = sums
+    hessians, forces = sums
     bones = parents.size
     centres, depth, wide = np.empty((bones + 1, 2)), np.empty(bones + 1), np.empty((bones, 2))
     moves = np.empty((bones + 1, 3, 3))  # of each joint: how its pixel and its size change with its place
@@ -249,8 +249,8 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     metres = depth[0]  # pixels of one, where the root is
     for b in range(bones):
         wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
-    blocks, slopes = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
-    add_pulls(parents, centres, wide, contour, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes)
+    blocks, gradients = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
+    add_pulls(parents, centres, wide, contour, max(reach * metres, MIN_ROBUST_SCALE), blocks, gradients)
     deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
     worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
     rows, turned = np.empty((6, 6)), np.empty((6, 6))
@@ -274,21 +274,21 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
         for i in range(6):
             total = 0.0
             for k in range(6):
-                total += rows[k, i] * slopes[b, k]
+                total += rows[k, i] * gradients[b, k]
             forces[b + 1, i, 0] += worth * total
             for j in range(6):
                 total = 0.0
                 for k in range(6):
                     total += rows[k, i] * turned[k, j]
-                curves[b + 1, i, j] += worth * total
+                hessians[b + 1, i, j] += worth * total
         if len(grown.joints):
-            _add_growth(b, p, rows, depth, (blocks[b], slopes[b]), worth, grown, forces[b + 1])
+            _add_growth(b, p, rows, depth, (blocks[b], gradients[b]), worth, grown, forces[b + 1])
 
 
 @jit
 def _add_growth(b, p, rows, depth, square, worth, grown, forces):
     """Add what bone b, from joint p, has to do with factors of the build, see `add_view`."""
-    block, slope = square
+    block, gradient = square
     factors = len(grown.joints)
     changes, changed = np.zeros((6, 1 + factors)), np.zeros((6, 1 + factors))
     for k in range(6):
@@ -299,7 +299,7 @@ def _add_growth(b, p, rows, depth, square, worth, grown, forces):
             if k > 3:
                 changes[k, 1 + f] += depth[j] * grown.radii[f, b, k - 4]
     for k in range(6):
-        changed[k, 0] = worth * slope[k]
+        changed[k, 0] = worth * gradient[k]
         for i in range(6):
             for f in range(factors):
                 changed[k, 1 + f] += worth * block[k, i] * changes[i, 1 + f]
@@ -347,21 +347,21 @@ def _screw(screw, axis, pivot):
 
 
 @jit
-def add_bones(chain, screws, curves, forces, matrix, slopes):
+def add_bones(chain, screws, hessians, forces, matrix, gradients):
     """Write the second derivatives (69, 69), their lower half, and the gradient and those by factors (69, 1 + F).
 
-    They are by a place and a pose, whose twists are `screws` (69, 6), 0 for what stays as it is. `curves` and `forces`
-    of bones are summed up.
+    They are by a place and a pose, whose twists are `screws` (69, 6), 0 for what stays as it is. The `hessians` and
+    `forces` of bones are summed up.
     """
     parents = chain.parents
     for b in range(parents.size - 1, -1, -1):
         p = parents[b]
         for i in range(6):
             for j in range(6):
-                curves[p, i, j] += curves[b + 1, i, j]
-            for f in range(slopes.shape[1]):
+                hessians[p, i, j] += hessians[b + 1, i, j]
+            for f in range(gradients.shape[1]):
                 forces[p, i, f] += forces[b + 1, i, f]
-    matrix[:], slopes[:] = 0.0, 0.0
+    matrix[:], gradients[:] = 0.0, 0.0
     force = np.empty(6)
     for joint in range(parents.size + 1):
         first, count = _numbers(chain, joint)
@@ -371,10 +371,10 @@ def add_bones(chain, screws, curves, forces, matrix, slopes):
             for i in range(6):
                 total = 0.0
                 for j in range(6):
-                    total += curves[joint, i, j] * screws[a, j]
+                    total += hessians[joint, i, j] * screws[a, j]
                 force[i] = total
-                for f in range(slopes.shape[1]):
-                    slopes[a, f] += screws[a, i] * forces[joint, i, f]
+                for f in range(gradients.shape[1]):
+                    gradients[a, f] += screws[a, i] * forces[joint, i, f]
             other = joint
             while True:
                 start, many = _numbers(chain, other)
@@ -407,7 +407,7 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
             points = contours.points[starts[k] : starts[k + 1]]
             contour = Contour(contours.fields[k], contours.corners[k], contours.sizes[k], points, contours.step)
             grows = Growth(grown.joints[i], grown.radii, grown.squares)
-            bones = BoneSquares(sums.curves[i], sums.forces[i])
+            bones = BoneSquares(sums.hessians[i], sums.forces[i])
             add_view(parents, radii, camera, frames[i], contour, reach, grows, bones)
 
 
@@ -415,20 +415,20 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
 def add_all_bones(chain, placed, bones, free, out):
     """Write what `add_bones` sums up in T frames, of those numbers of a frame, `free` (m,), that may change.
 
-    `placed` are frames, sines and cosines of `place_frames`, and `bones` curves and forces. `out` are second
+    `placed` are frames, sines and cosines of `place_frames`, and `bones` Hessians and forces. `out` are second
     derivatives (T, m, m) and gradients with derivatives by factors (T, m, 1 + F).
     """
     frames, sines, cosines = placed
-    curves, forces = bones
-    matrices, slopes = out
+    hessians, forces = bones
+    matrices, gradients = out
     all_screws, screws = np.empty((NUMBERS, 6)), np.zeros((NUMBERS, 6))
-    matrix, slope = np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, slopes.shape[2]))
+    matrix, gradient = np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, gradients.shape[2]))
     for k in range(len(frames)):
         write_screws(chain, frames[k], sines[k], cosines[k], all_screws)
         for a in free:
             screws[a] = all_screws[a]
-        add_bones(chain, screws, curves[k], forces[k], matrix, slope)
+        add_bones(chain, screws, hessians[k], forces[k], matrix, gradient)
         for i in range(len(free)):
-            slopes[k, i] = slope[free[i]]
+            gradients[k, i] = gradient[free[i]]
             for j in range(i + 1):
                 matrices[k, i, j] = matrices[k, j, i] = matrix[free[i], free[j]]

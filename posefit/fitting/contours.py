@@ -100,16 +100,16 @@ def _between(mask: Mask, around: Mask) -> Array:
 
 
 class ContourSquares(NamedTuple):
-    """Half the second derivatives and half the gradients of the squared distances between borders.
+    """Half the Hessians and half the gradients of the squared distances between borders.
 
     They are by n numbers of each frame, the root's place and the free angles, and by F factors of the build.
     """
 
-    curves: Array  # (T, n, n)
-    slopes: Array  # (T, n)
+    hessians: Array  # (T, n, n)
+    gradients: Array  # (T, n)
     mixed: Array  # (T, n, F) second derivatives by numbers and factors
-    factor_curve: Array  # (F, F) over all frames
-    factor_slope: Array  # (F,)
+    factor_hessian: Array  # (F, F) over all frames
+    factor_gradient: Array  # (F,)
 
 
 def contour_squares(
@@ -135,9 +135,9 @@ def contour_squares(
     for view in views:
         view.add(body, placed[0], scale, kernels.Growth(wider, larger, squares), sums)
     free = np.flatnonzero(np.append([True] * 3, skeleton.free))
-    curves, slopes = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))
-    kernels.add_all_bones(skeleton.chain, placed, sums, free, (curves, slopes))
-    return ContourSquares(curves, slopes[..., 0], slopes[..., 1:], squares[1:, 1:], squares[1:, 0])
+    hessians, gradients = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))
+    kernels.add_all_bones(skeleton.chain, placed, sums, free, (hessians, gradients))
+    return ContourSquares(hessians, gradients[..., 0], gradients[..., 1:], squares[1:, 1:], squares[1:, 0])
 
 
 # metres, step by step: what is farther off counts less, as it may be another person's, or a bag's
@@ -163,10 +163,10 @@ def fitted(
     angles = np.flatnonzero(body.skeleton.free)
     poses, places, weights = start[0].copy(), start[1].copy(), precisions[np.append([0, 1, 2], 3 + angles)]
     for scale in scales:
-        curves, slopes, *_ = contour_squares(body, views, poses, places, scale)
+        hessians, gradients, *_ = contour_squares(body, views, poses, places, scale)
         off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
-        np.einsum("nii->ni", curves)[:] += weights  # on the diagonals
-        steps = np.linalg.solve(curves, (slopes + weights * off)[..., None])[..., 0]
+        np.einsum("nii->ni", hessians)[:] += weights  # on the diagonals
+        steps = np.linalg.solve(hessians, (gradients + weights * off)[..., None])[..., 0]
         places -= steps[:, :3]
         poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
     return poses, places
@@ -183,7 +183,7 @@ def contour_fit(
     """Return a pose (66,) and a place (3,) moved until the body's contours are those of the masks, and what it costs.
 
     `start` is the pose and the place to begin with, which angles and place are off by about `deviations`, radians and
-    metres. Up to twelve steps of Gauss and Newton are made, each of which costs as much as 27 evaluations.
+    metres. Up to twelve Gauss-Newton steps are made, each of which costs as much as 27 evaluations.
     """
     pose, place = (np.array(part, dtype=np.float64)[None] for part in start)
     scales = ROBUST_SCALES[: max(int(evaluations // STEP_EVALUATIONS), 0)]

@@ -85,8 +85,8 @@ def drive(
         ahead = task.evaluations * len(reader.waiting)
         counted = math.ceil(drawn.poses / len(task.cameras)) - evaluations - ahead
         leeway = UNCOUNTED_POSES * (yielded + 1 + len(reader.waiting))
-        frame = _counted(frame, yielded, counted, leeway, task.evaluations, audit)
-        frame = _computed(frame, yielded, task, observation, audit)
+        frame = _with_counted_evaluations(frame, yielded, counted, leeway, task.evaluations, audit)
+        frame = _with_true_cost(frame, yielded, task, observation, audit)
         yielded, evaluations = yielded + 1, evaluations + frame.evaluations
         yield replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
     if reader.waiting or next(reader, None) is not None:
@@ -137,7 +137,8 @@ def _check(frame: Frame, audit: Audit) -> None:
         raise audit.broken(f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}")
 
 
-def _counted(frame: Frame, number: int, counted: int, leeway: int, budget: int, audit: Audit) -> Frame:
+def _with_counted_evaluations(frame: Frame, number: int, counted: int, leeway: int, budget: int, audit: Audit) -> Frame:
+    """Return the frame with the poses that were drawn for it; note where it reports fewer, or exceeds the budget."""
     if counted > frame.evaluations + leeway:
         audit.note("evaluations", number, f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
         frame = with_evaluations(frame, counted)
@@ -146,7 +147,7 @@ def _counted(frame: Frame, number: int, counted: int, leeway: int, budget: int, 
     return frame
 
 
-def _computed(frame: Frame, number: int, task: Task, observation: Observation, audit: Audit) -> Frame:
+def _with_true_cost(frame: Frame, number: int, task: Task, observation: Observation, audit: Audit) -> Frame:
     """Return the frame with the areas and the cost of its pose, and note where it reports others."""
     pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
     observed = [replace(silhouette) for silhouette in observation.silhouettes]  # without bits that it may change

@@ -11,9 +11,13 @@ NEAREST = 1e-3  # metres; a joint that is nearer, or behind the camera, counts a
 
 @jit
 def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders, translations):
-    """Move translations (n, 3) to where joints (n, 27, 3) fill the borders (views, 4): left, top, right, bottom."""
+    """Move translations (n, 3) to where joints (n, 27, 3) fill the borders (views, 4): left, top, right, bottom.
+
+    Each known border is one linear equation, r . t = gap. The least squares over all of them solve A t = b, where A,
+    here xx to zz, is the sum of r r' and b that of gap r; the damping pulls t towards where it was.
+    """
     views, count = borders.shape[0], joints.shape[1]
-    relative = np.empty((views, count, 3))  # in the camera's frame, as if the root were at the world's origin
+    relative = np.empty((views, count, 3))  # joints in the camera's axes, from the root
     reach, outermost = np.empty(4), np.empty(4, np.int64)
     for i in range(joints.shape[0]):
         for v in range(views):

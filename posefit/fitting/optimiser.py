@@ -93,7 +93,7 @@ class Adapter(ABC):
         return repair(self._space, self._asked, self._home)
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Let the library learn the costs (n,). Raises ValueError where they are not those of what was asked for."""
+        """Let the library learn the costs (n,). Raises InputError where they are not those of what was asked for."""
         check_tell(0 if self._asked is None else len(self._asked), proposals, costs)
         self.learn(np.asarray(proposals), finite_costs(costs))
         self._asked = None
@@ -143,7 +143,7 @@ def minimise(
     `evaluate` returns the costs (n,) of proposals (n, d). A population beyond `evaluations` is not
     evaluated. A cost that is nan never counts as best. A warning is given where an optimiser ends its search before
     half of the budget is used, unless it was built with the budget, `budget_known`: the schedules of some follow it.
-    Raises BudgetError where the budget does not hold one population, and ValueError where every cost is nan.
+    Raises BudgetError where the budget does not hold one population, and InputError where every cost is nan.
     """
     best = minimum_of(populations(optimiser, evaluate, evaluations))
     if not budget_known and 2 * best.evaluations < evaluations:
@@ -158,7 +158,7 @@ def minimise(
 def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
     """Return the best of the proposals (n, d) of one population or more, each with its costs (n,).
 
-    A cost that is nan never counts as best. Raises ValueError where every cost is nan.
+    A cost that is nan never counts as best. Raises InputError where every cost is nan.
     """
     best, cost, used, trace = None, np.inf, 0, list[tuple[int, float]]()
     for proposals, costs in searched:

@@ -10,7 +10,7 @@ import numpy as np
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, between
-from posefit.fitting.exchange import exchanged
+from posefit.fitting.dlpack import as_numpy
 from posefit.fitting.kernels import move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
@@ -84,12 +84,12 @@ class PoseProblem:
 
         Arrays may be of any library that has DLPack; the costs come as an array of the same one.
         """
-        values, back = exchanged("proposals", proposals)
+        values, back = as_numpy("proposals", proposals)
         return back(self._evaluated(writeable(values)))
 
     def _evaluated(self, proposals: Array) -> Array:
         if proposals.shape[1:] != (self.space.dimensions,):
-            self.space.decode(proposals)  # raises
+            self.space.decode(proposals)  # raises InputError with this shape, not that of one thread's part
         if self.on_device:
             return self.cost_and_areas(*self.decode(proposals))[0]
         parts = parts_of(len(proposals), self.threads)

@@ -97,7 +97,7 @@ class SearchSpace:
         """Return the poses (n, 66) and translations (n, 3) of proposals (n, d).
 
         An aligned translation is only its anchor here; the problem, which has the silhouette, aligns it.
-        Raises ValueError where the shape does not fit or a proposal is not finite.
+        Raises InputError where the shape does not fit or a proposal is not finite.
         """
         proposals = writeable(proposals)
         d, m = len(self.centre), len(self.prior.low)

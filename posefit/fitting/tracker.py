@@ -188,7 +188,7 @@ class Predictor:
     """
 
     def __init__(self, task: Task, prior: Prior, prediction: Prediction, tilt: Tilt | None = None) -> None:
-        self._task, self._prior, self._how = task, prior, prediction
+        self._task, self._prior, self._prediction = task, prior, prediction
         self._tilt = tilt or prediction.tilted(prior, task.training)
         reach = np.radians(prediction.root_range_degrees)
         if task.yaw is None:
@@ -210,38 +210,44 @@ class Predictor:
 
     def space(self, observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
-        anchor, latest, space = observation.translation, self._latest, self._space
-        if not latest:
-            if anchor is not None:
-                space = space.around(space.centre, anchor=anchor)
-            if modes := self._task.modes or guessed_modes(self._task, observation):
-                views = self._task.cameras, observation.silhouettes
-                problem = PoseProblem(self._task.body, *views, space, beta=self._how.beta, blank=True)
-                space = replace(space, start=start_in(problem, modes))
-            elif self._task.first_pose is not None:
-                space = replace(space, start=self._start_at_known_pose(space, self._task.first_pose))
-            self._space = space
-            return space
+        self._space = self._next_space(observation.translation) if self._latest else self._first_space(observation)
+        return self._space
+
+    def commit(self, proposal: Array) -> None:
+        """Take the best proposal (d,) of the latest space."""
+        self._latest = [*self._latest, self._space.coordinates(proposal)][-HISTORY_FRAMES:]
+
+    def _first_space(self, observation: Observation) -> SearchSpace:
+        """Return the box of the first frame: it starts around guessed modes, a known pose, or anywhere."""
+        task, space = self._task, self._space
+        if observation.translation is not None:
+            space = space.around(space.centre, anchor=observation.translation)
+        if modes := task.modes or guessed_modes(task, observation):
+            beta = self._prediction.beta
+            problem = PoseProblem(task.body, task.cameras, observation.silhouettes, space, beta=beta, blank=True)
+            return replace(space, start=start_in(problem, modes))
+        if task.first_pose is not None:
+            return replace(space, start=self._start_at_known_pose(space, task.first_pose))
+        return space
+
+    def _next_space(self, anchor: Array | None) -> SearchSpace:
+        """Return the box around the last result, whose start is spread as wide as the last step."""
+        latest, space = self._latest, self._space
         if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
-            reach = np.radians(self._how.root_range_degrees)
+            reach = np.radians(self._prediction.root_range_degrees)
             if self._tilt is not None:
                 reach[1:] = self._tilt.around(space.root_centre[1:], reach[1:])[1]
             space = replace(space, root_range=reach)
         space = space.around(latest[-1], anchor=anchor)
         # Interpretation S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
-        back = 2 if self._how.variant == "paper" else 1
+        back = 2 if self._prediction.variant == "paper" else 1
         step = np.zeros(space.dimensions)
         if len(latest) > back:
             half = np.where(space.half > 0.0, space.half, 1.0)  # as in proposals: 0 where nothing is searched
             step = displacement(space, latest[-back - 1] / half, latest[-back] / half)
         mean = space.proposals(latest[-1])
-        spread = np.maximum(self._how.spread * np.abs(step), self._how.floor)  # Interpretation S5
-        self._space = space.around(latest[-1], Start(mean, spread, step), anchor)
-        return self._space
-
-    def commit(self, proposal: Array) -> None:
-        """Take the best proposal (d,) of the space that was given last."""
-        self._latest = [*self._latest, self._space.coordinates(proposal)][-HISTORY_FRAMES:]
+        spread = np.maximum(self._prediction.spread * np.abs(step), self._prediction.floor)  # Interpretation S5
+        return space.around(latest[-1], Start(mean, spread, step), anchor)
 
     def _start_at_known_pose(self, space: SearchSpace, angles: Array) -> Start:
         """Return the start of a first frame whose joint angles are about known; its root need not be."""
@@ -250,7 +256,7 @@ class Predictor:
         root = space.centre[:first].copy()
         root[1:3] = 0.0  # upright, or tilted as the pose predicts
         away = space.proposals(np.concatenate([root, latents]))
-        spread = np.full(space.dimensions, self._how.floor)
+        spread = np.full(space.dimensions, self._prediction.floor)
         if self._task.yaw is None:
             spread[0] = 1.0
         return Start(away, spread, np.zeros(space.dimensions))

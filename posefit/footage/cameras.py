@@ -78,10 +78,10 @@ def combined(
     if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
         miss, tall = apparent
         if unit_is_open and np.median(tall) > 0.0:
-            word = unit_of_heights(float(np.median(tall)) / metres / body.stature)
-            if METRES[word] != metres:
-                of_cameras["unit"] = f"the calibration is in {UNIT_NAMES[word]}"
-            factor = METRES[word] / metres
+            likely_unit = unit_of_heights(float(np.median(tall)) / metres / body.stature)
+            if METRES[likely_unit] != metres:
+                of_cameras["unit"] = f"the calibration is in {UNIT_NAMES[likely_unit]}"
+            factor = METRES[likely_unit] / metres
             cameras = [replace(camera, translation=factor * camera.translation) for camera in cameras]
             miss, tall = factor * miss, factor * tall
         if wrong := disagreement(miss, tall, body.stature):
@@ -92,20 +92,20 @@ def combined(
         to_camera = -cameras[0].rotation[2]
         yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
     return Scene(
-        name,
-        body,
-        cameras,
-        rate,
-        len(observations),
-        yaw,
-        place_of(first.silhouettes, cameras, body.stature),
-        None,
-        observations,
-        "given" if known else "guessed",
-        [warning for view in views for warning in view.warnings] + _unequal(views),
-        [*guesses, *of_cameras.values()],
-        views[0].pictures,
-        views[0].masks.first,
+        name=name,
+        body=body,
+        cameras=cameras,
+        fps=rate,
+        count=len(observations),
+        yaw=yaw,
+        anchor=place_of(first.silhouettes, cameras, body.stature),
+        truth=None,
+        observations=observations,
+        placing="given" if known else "guessed",
+        warnings=[warning for view in views for warning in view.warnings] + _unequal(views),
+        guesses=[*guesses, *of_cameras.values()],
+        pictures=views[0].pictures,
+        first=views[0].masks.first,
         camera_moves=views[0].moves,
     )
 

@@ -7,11 +7,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import PackedMasks, empty_planes
 from posefit.footage.people import Choice, People, planes_of
 from posefit.motion.clips import FPS
-from posefit.silhouette.foreground import HOLE, NEAR, PIECE, without_holes
+from posefit.silhouette.foreground import MAX_HOLE_AREA, MIN_PIECE_AREA, PIECE_REACH, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
 
 INVERSION_FRAMES = 40  # masks by which it is decided whether they are inverted
@@ -24,7 +25,7 @@ CUT_SHOWN = 0.5  # of the person's area: where the picture's edge leaves less of
 def cleaned(
     masks: PackedMasks, name: object, holes: float | None = None, choice: Choice | None = None
 ) -> tuple[PackedMasks, list[str]]:
-    """Return the masks of one person, and warnings; the bits of `masks` are overwritten.
+    """Return the masks of one person, and warnings, in the memory of `masks`, which are overwritten.
 
     Of several people `choice` is followed, see `People.chosen`; the pixels of the others are unknown. Frames that show
     no person before a background are not usable, nor are those in which the picture's edge leaves only a little of the
@@ -53,10 +54,11 @@ def cleaned(
     parts, words = people.chosen(choice, lambda frame: Path(masks.names[frame]).name)
     if words:
         warnings.append(f"{name}: {words}")
-        known = empty_planes(len(masks), masks.size) if masks.valid is None else masks.valid
-        known[:] = 255 if masks.valid is None else known
-        masks = replace(masks, valid=known)
-    others = [one for person in people.persons() for one in person if one not in parts]
+        if masks.valid is None:
+            known = empty_planes(len(masks), masks.size)
+            known[:] = 255
+            masks = replace(masks, valid=known)
+    others = people.others(parts)
     areas, cut = np.zeros(len(masks)), np.zeros(len(masks), dtype=bool)
     for k in range(len(masks)):
         silhouette = silhouette_of(k)
@@ -65,15 +67,20 @@ def cleaned(
             mask = people_in(silhouette)[0]
             if words:
                 mask, valid = planes_of(parts, others, k, silhouette.valid)
-            mask = without_holes(mask, HOLE if holes is None else holes) & valid
+            mask = without_holes(mask, MAX_HOLE_AREA if holes is None else holes) & valid
             usable[k], areas[k], cut[k] = mask.any(), mask.sum(), touches_border(mask)
         masks.masks[k] = np.packbits(mask)
         if words and masks.valid is not None:
             masks.valid[k] = np.packbits(valid)
-    whole = np.flatnonzero(usable & ~cut)
+    return replace(masks, usable=usable & _shows_enough(usable, areas, cut)), warnings
+
+
+def _shows_enough(usable: NDArray[np.bool_], areas: Array, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which frames (T,) have most of the person's area in the nearest usable frame that is not cut."""
+    enough, whole = np.ones(len(areas), dtype=bool), np.flatnonzero(usable & ~cut)
     for frame in np.flatnonzero(usable & cut) if len(whole) else ():
-        usable[frame] = areas[frame] >= CUT_SHOWN * areas[whole[np.abs(whole - frame).argmin()]]
-    return replace(masks, usable=usable), warnings
+        enough[frame] = areas[frame] >= CUT_SHOWN * areas[whole[np.abs(whole - frame).argmin()]]
+    return enough
 
 
 def _is_inverted(masks: PackedMasks) -> bool:
@@ -98,7 +105,7 @@ def people_in(silhouette: Silhouette) -> list[Mask]:
     mask = silhouette.mask
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA]
-    large = [k for k in range(1, count) if areas[k] >= PIECE * areas[1:].max()]
+    large = [k for k in range(1, count) if areas[k] >= MIN_PIECE_AREA * areas[1:].max()]
     if len(large) < 2:
         return [mask]
     through = cv2.connectedComponents((mask | ~silhouette.valid).astype(np.uint8), connectivity=8)[1]
@@ -120,7 +127,7 @@ def people_in(silhouette: Silhouette) -> list[Mask]:
 
 def _is_one_person(first: NDArray[np.int32], second: NDArray[np.int32], distance: float, joined: bool) -> bool:
     left, top, wide, tall = (np.array([piece[k] for piece in (first, second)]) for k in range(4))
-    if joined or distance <= NEAR * tall.max():
+    if joined or distance <= PIECE_REACH * tall.max():
         return True
     across = (left + wide).min() - left.max()
     between = top.max() - (top + tall).min()

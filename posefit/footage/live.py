@@ -36,7 +36,7 @@ MASK_LEVEL = 127  # a pixel of a grey frame that is brighter belongs to the pers
 class LiveImage:
     """A frame of a stream: a picture (height, width, 3), or a mask in grey levels (height, width)."""
 
-    number: int  # in the stream, those counted that were skipped
+    number: int  # in the stream, skipped frames counted
     arrived: float  # seconds of `time.perf_counter`
     image: Image = field(repr=False)
 

@@ -40,10 +40,8 @@ class PackedMasks:
 
     def silhouette(self, k: int) -> Silhouette:
         """Return the silhouette of frame k."""
-        return Silhouette.of(self._plane(self.masks, k), None if self.valid is None else self._plane(self.valid, k))
-
-    def _plane(self, planes: Planes, k: int) -> NDArray[np.bool_]:
-        return unpacked(planes[k], self.size)
+        valid = None if self.valid is None else unpacked(self.valid[k], self.size)
+        return Silhouette.of(unpacked(self.masks[k], self.size), valid)
 
 
 def unpacked(bits: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -101,7 +99,7 @@ class Views(Sequence[Observation]):
         landmarks = None
         if any(masks.landmarks is not None for masks in self.masks):
             unknown = np.zeros((len(JOINTS), 3))
-            landmarks = np.array([unknown if one.landmarks is None else one.landmarks[k] for one in self.masks])
+            landmarks = np.array([unknown if view.landmarks is None else view.landmarks[k] for view in self.masks])
         yaw = float(self.yaws[k]) if known else None
         return Observation(silhouettes, usable=usable, yaw=yaw, landmarks=landmarks)
 

@@ -69,9 +69,12 @@ class Tracklet:
         self.detections: dict[int, tuple[Cut, Cut | None]] = {}  # by frame: their mask, and what is unknown of a blob
         self.rows: dict[int, dict[str, Any]] = {}  # by frame, of `FrameQuality`
         self.quality: Any = None
-        self.first, self.height = (frame, *blob.place.tolist()), blob.height
-        self._usable, self.alone, self.last, self._step, self.latest = 0, 0, frame, np.zeros(2), blob
-        self.area, self.colours, self._large = blob.area, blob.colours, False
+        self.first = (frame, *blob.place.tolist())  # where they are visible first: frame, across and down
+        self.latest, self.last = blob, frame  # the latest blob that shows them alone, and its frame
+        self.alone = 0  # frames that show them alone
+        self.height, self.area, self.colours = blob.height, blob.area, blob.colours  # smoothed over these
+        self._step = np.zeros(2)  # pixels a frame
+        self._usable, self._large = 0, False
 
     def expected(self, frame: int) -> Array:
         """Return where (2,) their middle is expected."""
@@ -110,6 +113,10 @@ class Tracklet:
         """Take the row of `FrameQuality` of a frame."""
         self.rows[frame], self._usable = row, self._usable + row["usable"]
 
+    def forget_pictures(self) -> None:
+        """Free what only the next frame would need, so that memory does not grow with noise."""
+        self.latest.mask, self.quality = np.empty((0, 0), dtype=bool), None
+
     @property
     def score(self) -> float:
         """How long and steadily they are visible, times their height: 0 where they are never usable."""
@@ -126,20 +133,15 @@ class People:
 
     def add(self, masks: Sequence[Mask], image: Image | None = None) -> list[Tracklet]:
         """Return who is in the next frame, of which the blobs (height, width) are the largest first."""
-        from scipy.optimize import linear_sum_assignment  # takes a tenth of a second to import
-
         self._frame += 1
         frame, blobs = self._frame, [_Blob(mask, image) for mask in masks]
+        active = []
         for tracklet in self.active:
-            if frame - max(tracklet.detections) > self._patience:  # memory does not grow with noise
-                tracklet.latest.mask, tracklet.quality = np.empty((0, 0), dtype=bool), None
-        active = [tracklet for tracklet in self.active if tracklet.latest.mask.size]
-        distances = np.array([[tracklet.distance(blob, frame) for blob in blobs] for tracklet in active])
-        owners: dict[int, Tracklet] = {}
-        if distances.size:
-            for row, column in zip(*linear_sum_assignment(np.minimum(distances, 1e6)), strict=True):
-                if np.isfinite(distances[row, column]):
-                    owners[int(column)] = active[row]
+            if frame - max(tracklet.detections) <= self._patience:
+                active.append(tracklet)
+            else:
+                tracklet.forget_pictures()
+        owners = _owners(active, blobs, frame)
         confirmed = [tracklet for tracklet in active if tracklet.confirmed() and tracklet not in owners.values()]
         outlines = [tracklet.outline(frame) for tracklet in confirmed] if blobs else []
         present = []
@@ -187,6 +189,10 @@ class People:
             return [[part for person in persons for part in person]] if persons else []
         return [persons[k] for k in sorted(confirmed, key=lambda k: -scores[k])]
 
+    def others(self, parts: Sequence[Tracklet]) -> list[Tracklet]:
+        """Return the parts of all people but those of one."""
+        return [part for person in self.persons() for part in person if part not in parts]
+
     def chosen(
         self, choice: Choice | None, name: Callable[[int], str], scale: float = 1.0
     ) -> tuple[list[Tracklet], str]:
@@ -211,6 +217,18 @@ class People:
         listed = "; ".join(f"{k} at {spot}" for k, spot in enumerate(spots, 1))
         words = f"{len(persons)} people, first visible: {listed}; person {number} is followed, --person N another"
         return persons[number - 1], words
+
+
+def _owners(tracklets: Sequence[Tracklet], blobs: Sequence[_Blob], frame: int) -> dict[int, Tracklet]:
+    """Return whose each blob is, by its number, so that all are as near as possible to where they are expected."""
+    from scipy.optimize import linear_sum_assignment  # takes a tenth of a second to import
+
+    distances = np.array([[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets])
+    if not distances.size:
+        return {}
+    rows, columns = linear_sum_assignment(np.minimum(distances, 1e6))
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    return {column: tracklets[row] for row, column in pairs if np.isfinite(distances[row, column])}
 
 
 def _distance(tracklet: Tracklet, other: Tracklet) -> float:

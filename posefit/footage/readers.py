@@ -1,6 +1,6 @@
 """Masks from images, an array, or an .npz or .npy file: which pixels are the person's by the values of all of them.
 
-| arrow | |
+| step | where |
 |---|---|
 | files to frames | `numbered`: a frame a page; numbers that are missing are frames in which nothing is known |
 | frames to values | `images.read_marks`, `archive.archived` |
@@ -193,7 +193,9 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
     if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
         raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
-    return PackedMasks(names, size, masks, valid, usable[start:stop], fps, landmarks, start, guesses)
+    return PackedMasks(
+        names, size, masks, valid, usable[start:stop], fps=fps, landmarks=landmarks, first=start, guesses=guesses
+    )
 
 
 NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture

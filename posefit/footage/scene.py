@@ -77,18 +77,18 @@ def synthetic(
         if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
             raise InputError(f"camera must see the person, got an empty mask in frame {k}")
     return Scene(
-        motion.name,
-        body,
-        cameras,
-        motion.fps,
-        len(motion),
-        float(motion.poses[0, 0]),
-        motion.translations[0],
-        motion,
-        observations,
-        placing,
-        motion.notes,
-        guesses,
+        name=motion.name,
+        body=body,
+        cameras=cameras,
+        fps=motion.fps,
+        count=len(motion),
+        yaw=float(motion.poses[0, 0]),
+        anchor=motion.translations[0],
+        truth=motion,
+        observations=observations,
+        placing=placing,
+        warnings=motion.notes,
+        guesses=guesses,
         first=motion.first,
     )
 
@@ -125,7 +125,6 @@ def on_device(scene: Scene, device: str) -> Scene:
     check_device(device)
     if device == "cpu":
         return scene
-
     return replace(scene, observations=LazyObservations(scene.count, partial(_moved, scene.observations, device)))
 
 

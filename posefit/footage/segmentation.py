@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
-from posefit.footage.masks import PackedMasks, Range, empty_planes, span, unpacked
+from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span, unpacked
 from posefit.footage.people import Choice, People, Tracklet, part_at, planes_of
 from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
@@ -232,6 +232,19 @@ class Segmented(NamedTuple):
     camera_moves: bool  # whether the camera seems to
 
 
+class _Scan(NamedTuple):
+    """What the frames of a video show, whoever is followed."""
+
+    masks: Planes  # of the largest blob
+    valid: Planes
+    people: People
+    largest: list[dict[str, Any]]  # rows of quality.csv for the largest blobs: the person, where there is one only
+    blanks: list[dict[str, Any]]  # rows for empty masks
+    facings: list[float]
+    landmarks: Array  # (T, 27, 3)
+    camera_moves: bool
+
+
 class Segmentation:
     """A pass through a video. Raises InputError where the extraction or the frames do not fit it."""
 
@@ -245,13 +258,58 @@ class Segmentation:
 
         Raises InputError where no frame shows a person.
         """
-        video, segmenter, room = self.video, self._segmenter, self.stop - self.start
-        people, camera, facings, landmarks = People(video.fps), CameraMotion(self.size), list[float](), list[Array]()
-        # rows of empty masks, and of the largest blobs, which are the person where there is one only
-        quality, largest_quality = segmenter.quality(), segmenter.quality()
+        video, scan = self.video, self._scan(progress)
+        count, learned = len(scan.blanks), self._segmenter.learned
+        several, rows = self._follow_person(scan)
+        missing, damage = max(0, video.claimed - video.count()), ""
+        if missing:
+            damage = f"the file says that it has {missing} frames more than can be read: it seems to be damaged"
+        if not any(row["area"] for row in rows):
+            none = "expected a person who moves before a still background, got none in any frame"
+            reason = f"; {damage}" if damage else advice(self.how.name, learned=learned)
+            raise InputError(f"{video.path}: {none}{reason}")
+        doubt = verdict(rows, self.how.name, learned=learned)
+        warnings = [
+            doubt and doubt.text,
+            damage if missing > MISSING * count else "",
+            several,
+            scan.camera_moves and "the camera seems to move, and silhouettes need a still one; expect poor masks",
+        ]
+        packed = PackedMasks(
+            names=[f"{video.path}, frame {self.start + k}" for k in range(count)],
+            size=self.size,
+            masks=scan.masks,
+            valid=scan.valid,
+            usable=np.array([row["usable"] for row in rows], dtype=bool),
+            fps=video.fps,
+            landmarks=scan.landmarks if scan.landmarks[..., 2].any() else None,
+            first=self.start,
+            guesses=video.guesses,
+        )
+        columns = [np.flatnonzero(packed.silhouette(k).mask) % self.size[0] for k in range(count)]
+        middles = [float(each.mean()) if len(each) else math.nan for each in columns]
+        return Segmented(
+            packed,
+            rows,
+            doubt and replace(doubt, text=f"{video.path}: {doubt.text}"),
+            [*video.warnings, *(f"{video.path}: {text}" for text in warnings if text)],
+            facings_on_the_spot(scan.facings, middles, [row["longer_side"] for row in rows], video.fps),
+            scan.camera_moves,
+        )
+
+    def _scan(self, progress: Progress | None) -> _Scan:
+        """Return what each frame shows: the largest blob, and the people with the quality of their masks."""
+        segmenter, room = self._segmenter, self.stop - self.start
+        people, camera, facings, landmarks = (
+            People(self.video.fps),
+            CameraMotion(self.size),
+            list[float](),
+            list[Array](),
+        )
+        blank_quality, largest_quality = segmenter.quality(), segmenter.quality()
         blanks, largest = list[dict[str, Any]](), list[dict[str, Any]]()
         masks, valid = (empty_planes(room, self.size) for _ in range(2))
-        images = video.frames(self.start, self.stop, self.size)
+        images = self.video.frames(self.start, self.stop, self.size)
         for k, image in enumerate(progress(images, room) if progress else images):
             camera.add(k, image)
             blobs, facing, points = segmenter.frame(image)
@@ -262,56 +320,33 @@ class Segmentation:
             present = people.add([blob.mask for blob in blobs if blob.area], image)
             empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
             for tracklet in people.active:
-                tracklet.quality = tracklet.quality or deepcopy(quality)
+                tracklet.quality = tracklet.quality or deepcopy(blank_quality)
                 person = _alone(tracklet, present, blobs, k) if tracklet in present else empty
                 tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
-            blanks.append(self._row(quality, image, empty, k))
+            blanks.append(self._row(blank_quality, image, empty, k))
             largest.append(self._row(largest_quality, image, blobs[0], k))
-        count, rows = len(blanks), largest
-        masks, valid = masks[:count], valid[:count]
-        parts, several = people.chosen(self.how.person, lambda k: f"frame {self.start + k}", 1.0 / segmenter.scale)
-        if several:
-            rows = [blank if (part := part_at(parts, k)) is None else part.rows[k] for k, blank in enumerate(blanks)]
-            others = [part for person in people.persons() for part in person if part not in parts]
-            for k in range(count):
-                planes = planes_of(parts, others, k, unpacked(valid[k], self.size))
-                masks[k], valid[k] = (np.packbits(plane) for plane in planes)
-        missing, damage = max(0, video.claimed - video.count()), ""
-        if missing:
-            damage = f"the file says that it has {missing} frames more than can be read: it seems to be damaged"
-        if not any(row["area"] for row in rows):
-            none = "expected a person who moves before a still background, got none in any frame"
-            reason = f"; {damage}" if damage else advice(self.how.name, learned=segmenter.learned)
-            raise InputError(f"{video.path}: {none}{reason}")
-        doubt = verdict(rows, self.how.name, learned=segmenter.learned)
-        warnings = [
-            doubt and doubt.text,
-            damage if missing > MISSING * count else "",
-            several,
-            camera.moves and "the camera seems to move, and silhouettes need a still one; expect poor masks",
+        count = len(blanks)  # the file may break off
+        return _Scan(masks[:count], valid[:count], people, largest, blanks, facings, np.array(landmarks), camera.moves)
+
+    def _follow_person(self, scan: _Scan) -> tuple[str, list[dict[str, Any]]]:
+        """Return what there is to say of several people, and the rows of the one who is followed.
+
+        Of several, the scan's masks become those of this one, and the pixels of the others are unknown.
+        """
+        scale = 1.0 / self._segmenter.scale
+        parts, several = scan.people.chosen(self.how.person, lambda k: f"frame {self.start + k}", scale)
+        if not several:
+            return several, scan.largest
+        others = scan.people.others(parts)
+        for k in range(len(scan.blanks)):
+            planes = planes_of(parts, others, k, unpacked(scan.valid[k], self.size))
+            scan.masks[k], scan.valid[k] = (np.packbits(plane) for plane in planes)
+        shown = [part_at(parts, k) for k in range(len(scan.blanks))]
+        rows = [
+            blank if part is None else part.rows[k]
+            for k, (part, blank) in enumerate(zip(shown, scan.blanks, strict=True))
         ]
-        points, usable = np.array(landmarks), np.array([row["usable"] for row in rows], dtype=bool)
-        packed = PackedMasks(
-            [f"{video.path}, frame {self.start + k}" for k in range(count)],
-            self.size,
-            masks,
-            valid,
-            usable,
-            video.fps,
-            points if points[..., 2].any() else None,
-            self.start,
-            video.guesses,
-        )
-        columns = [np.flatnonzero(packed.silhouette(k).mask) % self.size[0] for k in range(count)]
-        middles = [float(each.mean()) if len(each) else math.nan for each in columns]
-        return Segmented(
-            packed,
-            rows,
-            doubt and replace(doubt, text=f"{video.path}: {doubt.text}"),
-            [*video.warnings, *(f"{video.path}: {text}" for text in warnings if text)],
-            facings_on_the_spot(facings, middles, [row["longer_side"] for row in rows], video.fps),
-            camera.moves,
-        )
+        return several, rows
 
     def _row(self, quality: FrameQuality, image: Image, person: Person, k: int) -> dict[str, Any]:
         row = self._segmenter.row(quality, image, person, self.start + k)

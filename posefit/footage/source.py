@@ -94,21 +94,17 @@ def scene_of(
     kinds = {kind_of(source) for source in sources}
     if len(kinds) > 1:
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
-    kind = next(iter(kinds))
+    (kind,) = kinds
     if person is not None and len(sources) > 1:
         raise InputError(f"person must be given for one camera only, got {len(sources)}")
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
-        known = listed(camera)
-        world, metres, guesses = world_of(known, up, unit)
-        cameras = [
-            each if isinstance(each, Camera) else each.in_metres(metres).camera(each.size or size or SIZE, world)
-            for each in known
-        ]
-        stated = FileOptions(asf, None if known else unit, None if known else up, rate)
+        # `up` and `unit` are those of the calibrations, where there are any, and else of the motion's file
+        cameras, guesses = _placed(listed(camera), size or SIZE, up, unit)
+        stated = FileOptions(asf, None if cameras else unit, None if cameras else up, rate)
         motion = load_motion(cast(Source, sources[0]), fps or FPS, stated)
-        return logged(synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()]), progress)
+        return logged(synthetic(motion, view_degrees, size or SIZE, cameras, frames, guesses), progress)
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
     body, notes, of_height = body_of(asf, height, None if camera else unit)
@@ -131,6 +127,18 @@ def scene_of(
         result = scene([CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)])
     result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
     return logged(result, progress)
+
+
+def _placed(
+    known: Sequence[Camera | Calibration], size: tuple[int, int], up: Up | None, unit: Unit | None
+) -> tuple[list[Camera], list[str]]:
+    """Return the cameras around a known motion, of a `size` where a file states none, and what was guessed of them."""
+    world, metres, guesses = world_of(known, up, unit)
+    cameras = [
+        camera if isinstance(camera, Camera) else camera.in_metres(metres).camera(camera.size or size, world)
+        for camera in known
+    ]
+    return cameras, [*guesses.values()]
 
 
 def logged(scene: Scene, progress: Progress) -> Scene:

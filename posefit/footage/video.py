@@ -118,11 +118,11 @@ class Video:
         """
         wanted = Counter(self._order[start:stop:step].tolist())  # a frame may stand for several moments
         decoded = (_picture(self.pictures[k]) for k in wanted) if self.pictures else self._decoded(list(wanted))
-        for (number, times), filmed in zip(wanted.items(), decoded, strict=False):
-            if (filmed.shape[1], filmed.shape[0]) != self.size:
-                came = f"{filmed.shape[1]}x{filmed.shape[0]} in frame {number}"
+        for (number, times), image in zip(wanted.items(), decoded, strict=False):
+            if (image.shape[1], image.shape[0]) != self.size:
+                came = f"{image.shape[1]}x{image.shape[0]} in frame {number}"
                 raise InputError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
-            yield from repeat(scaled(filmed, size), times)
+            yield from repeat(scaled(image, size), times)
 
     def _decoded(self, numbers: Sequence[int]) -> Iterator[Image]:
         """Yield the frames of these numbers of a video file, as far as it can be read."""
@@ -131,11 +131,11 @@ class Video:
             for number in numbers:
                 while k < number - 1 and capture.grab():
                     k += 1
-                read, filmed = capture.read()
+                read, image = capture.read()
                 if not read:
                     return
                 k += 1
-                yield np.asarray(filmed, dtype=np.uint8)
+                yield np.asarray(image, dtype=np.uint8)
         finally:
             capture.release()
 
@@ -159,7 +159,7 @@ def _picture(source: tuple[Path, int] | Image) -> Image:
 
 
 def _check_no_text(path: Path) -> None:
-    """Return nothing. Raises InputError for a text, such as a playlist, by which FFmpeg would open other files."""
+    """Raise InputError for a text, such as a playlist, by which FFmpeg would open other files."""
     with path.open("rb") as file:
         head = file.read(HEAD)
     is_text = head and not head.startswith(b"YUV4MPEG2") and all(byte >= 32 or byte in b"\t\n\r\f" for byte in head)
@@ -168,9 +168,9 @@ def _check_no_text(path: Path) -> None:
 
 
 def _check_written(path: Path, first: Any, capture: Any) -> None:
-    """Return nothing. Raises InputError where all frames are the same.
+    """Raise InputError where all frames are the same.
 
-    OpenCV 4.13 to 5.0 do not convert interlaced frames, and return what the memory held before.
+    OpenCV 4.13 to 5.0 do not convert interlaced frames, and return what was in memory before.
     """
     more, image = capture.read()
     if not more:

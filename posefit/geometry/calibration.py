@@ -13,10 +13,10 @@ A file holds one camera or several; `cameras.toml:left` is one of them by its na
 OpenCV's frame; which way is up in their world differs, and is turned to +y here: the axis that the images of all
 cameras see pointing up, unless `up` names one. Lengths are in the file's own unit, see `footage/cameras.py`.
 
-Each file but Qualisys' and our own becomes texts, numbers, lists and dictionaries, without OpenCV, whose reader trusts
-the file: nothing is expanded, and a matrix is as large as the numbers that are there. One reader looks for cameras in
-that and in its tables, whatever the format. A key that seems to describe a lens in a way that is not known here is an
-error, not a straight lens.
+Each file but Qualisys' and our own becomes texts, numbers, lists and dictionaries. OpenCV's own reader is not used, as
+it trusts the file: here nothing is expanded, and a matrix is as large as the numbers that are there. One reader looks
+for cameras in these values and in their tables, whatever the format. A key that seems to describe a lens in an unknown
+way is an error, not a straight lens. Messages of errors in here complete `expected a calibration of ..., got ...`.
 """
 
 import math
@@ -66,6 +66,7 @@ _POLYNOMIALS = (
     *("opencv", "fullopencv", "polynomial", "rationalpolynomial", "radtan", "radialtangential", "standard"),
 )
 _OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
+# keys that seem to describe a lens, such as radial_distortion, kappa1, k7 or xi; not distance, lens_mm or lens_serial
 _OF_LENS = re.compile(
     r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|(k|kappa)[0-9]*|xi"
 )
@@ -116,27 +117,27 @@ class Calibration:
             middle = self.matrix[:2, 2] / size
             fits = ((middle > 0.25) & (middle < 0.75)).all() and is_focal(np.diag(self.matrix)[:2], size)
             return replace(self, size=size) if fits else None
-        for mine, other in zip(self.size, size, strict=True):
-            if mine != other and (abs(mine - other) >= BLOCK or max(mine, other) % BLOCK):
+        for side, other in zip(self.size, size, strict=True):
+            if side != other and (abs(side - other) >= BLOCK or max(side, other) % BLOCK):
                 return None
         return replace(self, size=size)
 
     def maps(self, size: tuple[int, int]) -> tuple[Any, Any]:
         """Return the two maps with which cv2.remap undoes the distortion of pictures scaled to `size`."""
-        matrix = self._matrix(size)
+        matrix = self._scaled_matrix(size)
         if self.fisheye:
             return cv2.fisheye.initUndistortRectifyMap(
                 matrix, self.distortion[:4], np.eye(3), matrix, size, cv2.CV_32FC1
             )
         return cv2.initUndistortRectifyMap(matrix, self.distortion, np.eye(3), matrix, size, cv2.CV_32FC1)
 
-    def _matrix(self, size: tuple[int, int]) -> Array:
+    def _scaled_matrix(self, size: tuple[int, int]) -> Array:
         camera = self.camera(size, np.eye(3))
         return _pinhole(camera.focal, camera.centre - HALF)
 
     def straightened(self, points: Array, size: tuple[int, int]) -> Array:
         """Return points (..., 3), columns and rows of pictures scaled to `size` and a third number, undistorted."""
-        matrix = self._matrix(size)
+        matrix = self._scaled_matrix(size)
         bent = points[..., :2].reshape(-1, 1, 2).astype(np.float64) - HALF
         undistort = cv2.fisheye.undistortPoints if self.fisheye else cv2.undistortPoints
         straight = undistort(bent, matrix, self.distortion[: 4 if self.fisheye else None], P=matrix) + HALF
@@ -147,7 +148,7 @@ def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
     It is `up`, or else +y where the file states it; otherwise the axis, in either direction, that points up in the
-    images most. Raises ValueError where `up` is none.
+    images most. Raises InputError where `up` is none.
     """
     if up is not None and up not in TURNS:
         raise InputError(f"up must be one of x, y, z, got {quoted(up)}")
@@ -186,7 +187,7 @@ def _axis(direction: Array) -> Up:
 def read_calibrations(path: str | Path) -> list[Calibration]:
     """Return the cameras of a calibration file, in its order; of `FILE:NAME` that of this name.
 
-    Raises ValueError naming the file and what is wrong.
+    Raises InputError naming the file and what is wrong.
     """
     path, chosen = Path(path), ""
     file, colon, name = str(path).rpartition(":")
@@ -300,10 +301,12 @@ def _plain(key: object) -> str:
 
 
 def _first(known: Mapping[str, Any], names: Sequence[str]) -> Any:
+    """Return the value of the first name that is known; None where none is."""
     return next((known[name] for name in names if name in known), None)
 
 
 def _counts(value: Any) -> bool:
+    """Return whether a value is a number, or numbers, that are not all 0."""
     try:
         return bool(_matrix_of(value).any())
     except (ValueError, TypeError, KeyError):
@@ -311,7 +314,7 @@ def _counts(value: Any) -> bool:
 
 
 def _is_fisheye(known: Mapping[str, Any]) -> bool:
-    """Return whether the lens is OpenCV's fisheye. Raises ValueError for a model that OpenCV has not."""
+    """Return whether the lens is OpenCV's fisheye. Raises InputError for a model that OpenCV has not."""
     for key in (name for name in MODEL if name in known):
         model = _plain(known[key])
         if model in _FISHEYES:
@@ -323,8 +326,8 @@ def _is_fisheye(known: Mapping[str, Any]) -> bool:
 
 def _easymocap(path: Path, values: dict[str, Any]) -> list[Calibration]:
     """Return the cameras of EasyMocap's intri.yml and extri.yml; either is the file, the other stands beside it."""
-    for here, there in (("intri", "extri"), ("extri", "intri")):
-        other = path.with_name(path.name.replace(here, there, 1))
+    for kind, other_kind in (("intri", "extri"), ("extri", "intri")):
+        other = path.with_name(path.name.replace(kind, other_kind, 1))
         if other != path and other.is_file():
             values = {**_stored_values(other, "%", read_text(other, LARGEST_FILE)), **values}
     keys = {"K": "K", "dist": "dist", "R": "Rot", "rvec": "R", "T": "T", "width": "W", "height": "H"}
@@ -423,7 +426,7 @@ def _orthonormal(rotation: Array) -> Array:
 
 
 def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
-    """Return the values of a file by name. Raises ValueError where it is none of the four formats."""
+    """Return the values of a file by name. Raises InputError where it is none of the four formats."""
     if path.suffix.lower() == ".toml":
         return parsed_toml(text)
     if not (start.startswith(("<", "{", "%")) or path.suffix.lower() in (".yml", ".yaml")):
@@ -435,7 +438,7 @@ def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
 
 
 def _matrix_of(value: Any) -> Array:
-    """Return a matrix, or numbers in one row. Raises ValueError where there are none, too many, or another number."""
+    """Return a matrix, or numbers in one row. Raises InputError where there are none, too many, or another number."""
     stated = value if isinstance(value, dict) and "data" in value else {"data": value}
     cells = np.array(stated["data"].split() if isinstance(stated["data"], str) else stated["data"], dtype=object)
     numbers = np.array([_number_of(cell) for cell in cells.flat], dtype=np.float64)
@@ -454,7 +457,7 @@ def _matrix_of(value: Any) -> Array:
 
 
 def _number_of(value: Any) -> float:
-    """Return a number, which may be text. Raises ValueError where it is none."""
+    """Return a number, which may be text. Raises InputError where it is none."""
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):
@@ -478,11 +481,14 @@ def _xml(text: str) -> dict[str, Any]:
     root = _xml_of(text)
     if root.tag != "opencv_storage":
         raise InputError(f"XML of {quoted(root.tag)}")
-    return {one.tag: {part.tag: (part.text or "").strip() for part in one} or (one.text or "").strip() for one in root}
+    return {
+        entry.tag: {part.tag: (part.text or "").strip() for part in entry} or (entry.text or "").strip()
+        for entry in root
+    }
 
 
 def _xml_of(text: str) -> Any:
-    """Return the root of an XML text. Raises ValueError where it is broken or has a document type, which may expand."""
+    """Return the root of an XML text. Raises InputError where it is broken or has a document type, which may expand."""
     from xml.etree.ElementTree import ParseError
 
     from defusedxml import DefusedXmlException

@@ -119,7 +119,7 @@ class Camera:
 
     @classmethod
     def from_json(cls, path: str | Path) -> "Camera":
-        """Return the camera of what `to_json` wrote: a file or the text. Raises ValueError naming the key."""
+        """Return the camera of what `to_json` wrote: a file or the text. Raises InputError naming the key."""
         text = path if isinstance(path, str) and path.lstrip().startswith("{") else ""
         path = "camera" if text else path
         expected = f"{path}: expected a JSON object with {', '.join(_KEYS)}"

@@ -1,8 +1,8 @@
 """Forward kinematics in numba: plain functions over arrays, shapes checked by the callers.
 
 LANES poses are moved at a time, side by side in vector registers. All numbers of them are in one flat array, LANES of a
-kind after those of another: offsets known to the compiler are what lets it see that loops over lanes may run in
-registers. Of rows whose places it does not know it compares the places first, and only for loops of 16 and more.
+kind after those of another. As the compiler knows these offsets, it sees that rows do not overlap and keeps loops over
+lanes in registers; of rows at unknown offsets it would compare the places first, and only for loops of 16 and more.
 """
 
 from typing import NamedTuple
@@ -45,8 +45,8 @@ def chain(parents: NDArray[np.int64], angles: NDArray[np.int64], axes: Array, of
     before = np.concatenate([np.eye(3)[None], axes])[parents]
     turns = np.swapaxes(before, 1, 2) @ axes
     turns[np.abs(turns - np.eye(3)).max(axis=(1, 2)) <= 1e-12] = np.eye(3)
-    own = np.einsum("bji,bj->bi", axes, offsets)
-    return Chain(parents.astype(np.int64), angles.astype(np.int64), turns, own)
+    in_own_frames = np.einsum("bji,bj->bi", axes, offsets)
+    return Chain(parents.astype(np.int64), angles.astype(np.int64), turns, in_own_frames)
 
 
 @inlined
@@ -102,8 +102,8 @@ def set_view(lanes, first, stop, rotation, translation, focal, centre):
     """Place the joints of some lanes in a camera's picture: x and y in pixels, times the depth, and the depth."""
     for i in range(translation.size):
         for j in range(translation.size + 1):
-            own, depth = (rotation[i, j], rotation[2, j]) if j < 3 else (translation[i], translation[2])
-            value = focal[i] * own + centre[i] * depth if i < 2 else depth
+            coordinate, depth = (rotation[i, j], rotation[2, j]) if j < 3 else (translation[i], translation[2])
+            value = focal[i] * coordinate + centre[i] * depth if i < 2 else depth
             for lane in range(first, stop):
                 lanes[_VIEW + LANES * (4 * i + j) + lane] = value
 
@@ -142,7 +142,7 @@ def place_bones(chain, lanes):
     parents, angles, turns, _ = chain
     for b in range(parents.size):
         a = angles[b] if angles[b] >= 0 else _ANGLES
-        # by themselves: for all that the compiler knows, writing a row of lanes could change them
+        # read before the loop: for all that the compiler knows, writing a row of lanes could change them
         xx, xy, xz = turns[b, 0, 0], turns[b, 0, 1], turns[b, 0, 2]
         yx, yy, yz = turns[b, 1, 0], turns[b, 1, 1], turns[b, 1, 2]
         zx, zy, zz = turns[b, 2, 0], turns[b, 2, 1], turns[b, 2, 2]

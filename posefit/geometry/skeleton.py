@@ -41,7 +41,7 @@ ANGLES = 3 + 3 * len(INNER)  # M = 66
 
 Channels = tuple[tuple[str, tuple[str, ...]], ...]
 Side = Literal["left", "right", "middle"]
-_OTHER = {"l": "r", "r": "l"}  # a name starts with the letter of its side where another one starts with the other
+_OTHER = {"l": "r", "r": "l"}  # first letters of names that come in pairs, such as lfemur and rfemur
 
 
 def mirrored(bone: str) -> str:
@@ -77,18 +77,18 @@ def angle_index(joint: int) -> int:
 
 
 def channel_angles(bone: str, channels: Sequence[str]) -> list[int]:
-    """Return where in a pose (66,) the angles of a bone stand, such as `rx` and `rz`; none for one without angles."""
+    """Return the places in a pose (66,) of some angles of a bone, such as `rx` and `rz`; none for an end bone."""
     start = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
     return [start + "xyz".index(channel[1]) for channel in channels] if start > 0 else []
 
 
-def turns_of(bones: Sequence[str]) -> NDArray[np.intp]:
-    """Return where in a pose (66,) the angles stand that turn bones."""
+def angles_of(bones: Sequence[str]) -> NDArray[np.intp]:
+    """Return the places in a pose (66,) of all angles that turn some bones."""
     return np.array([angle for bone in bones for angle in channel_angles(bone, ("rx", "ry", "rz"))], dtype=np.intp)
 
 
-# (26,) of each bone: the joint it starts from, and where its angles are in a pose
-_STARTS, _TURNING = np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))])
+# (26,) of each bone: the joint it starts from, and the place in a pose of its first angle, -1 for an end bone
+_STARTS, _FIRST_ANGLES = np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))])
 
 
 def root_centred(joints: Array) -> Array:
@@ -136,7 +136,7 @@ class Skeleton:
     @cached_property
     def chain(self) -> kernels.Chain:
         """The constant arrays that the kinematics kernel wants."""
-        return kernels.chain(_STARTS, _TURNING, self.axes, self.offsets)
+        return kernels.chain(_STARTS, _FIRST_ANGLES, self.axes, self.offsets)
 
     def turns(self, poses: Array) -> Array:
         """Return how each bone, named by the joint it ends in, turns (27, T, 3, 3) from rest in poses (T, 66).
@@ -164,7 +164,7 @@ class Skeleton:
         """Return joint positions (..., 27, 3) in metres, world frame, of poses (..., 66).
 
         `translations` (..., 3) places the root joint; without it the root is at the origin.
-        Raises ValueError where a shape does not fit.
+        Raises InputError where a shape does not fit.
         """
         poses = np.asarray(poses, dtype=np.float64)
         if poses.ndim < 1 or poses.shape[-1] != ANGLES:

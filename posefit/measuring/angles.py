@@ -87,7 +87,7 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
             name.removeprefix(f"{side}_"): _ACROSS @ rotation @ _ACROSS if side == "left" else rotation
             for name, rotation in segments.items()
         }
-        by_joint = {joint: joint_angles(joint, *(axes[one] for one in pair)) for joint, pair in BETWEEN.items()}
+        by_joint = {joint: joint_angles(joint, *(axes[segment] for segment in pair)) for joint, pair in BETWEEN.items()}
         for joint, values in by_joint.items():
             level = np.sin(values[:, 1]) if joint == "shoulder" else np.cos(values[:, 1])
             values[level < np.sin(np.radians(NEAR_POLE))] *= [np.nan, 1.0, np.nan]

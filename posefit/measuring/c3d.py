@@ -33,7 +33,7 @@ def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gai
     points = np.concatenate([joints, np.zeros((*joints.shape[:2], 1))], axis=2).astype("<f4")
     points[[number - motion.first for number in blank]] = (0.0, 0.0, 0.0, -1.0)
     parameters, start = b"", 0
-    while start != 2 + len(parameters) // BLOCK:  # where the points start is a parameter itself
+    while start != 2 + len(parameters) // BLOCK:  # once more, as the parameters state the block that comes after them
         start = 2 + len(parameters) // BLOCK
         parameters = _section(_parameters(motion, start, gait))
     first, last = (min(number, MAX_FRAMES) for number in (motion.first + 1, motion.first + len(motion)))
@@ -90,6 +90,7 @@ def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:
 
 
 def _section(groups: dict[str, dict[str, Any]]) -> bytes:
+    """Return the parameter section, in whole blocks, of parameters by group and name."""
     records = b""
     for number, (group, parameters) in enumerate(groups.items(), 1):
         records += struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0)
@@ -101,7 +102,7 @@ def _section(groups: dict[str, dict[str, Any]]) -> bytes:
 
 
 def _encoded(value: Any) -> bytes:
-    """Return a parameter's type, its sizes, the one that runs fastest first, and its content."""
+    """Return a parameter's type, its dimensions, the fastest first, and its content."""
     array = np.asarray(value)
     if array.dtype.kind == "U":
         words = array.astype("S").reshape(-1)

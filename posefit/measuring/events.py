@@ -16,11 +16,11 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.segments import FORWARDS, SIDES
 from posefit.motion.motion import Motion
 
-CUTOFF_HZ = 6.0  # of a walk nothing to speak of is faster. Winter, Biomechanics and motor control, 2009
-MIN_FPS = 2.0 * CUTOFF_HZ  # frames a second, the fewest that show it
+CUTOFF_HZ = 6.0  # above it there is next to nothing of a walk. Winter, Biomechanics and motor control, 2009
+MIN_FPS = 2.0 * CUTOFF_HZ  # frames a second: the Nyquist rate
 SWAY_HZ = 0.3  # the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
-MIN_FOOT_SWING = 0.1  # metres that a foot moves to and fro at least, against the pelvis, for an event
-MIN_SWING_SHARE = 0.2  # of the whole range of that, which it moves at least
+MIN_FOOT_SWING = 0.1  # metres that a foot moves to and fro at least, relative to the pelvis, for an event
+MIN_SWING_SHARE = 0.2  # and at least this share of the range of all its swings
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +37,11 @@ class GaitEvents:
 def gait_events(motion: Motion) -> GaitEvents:
     """Return when the feet of a motion strike and lift off; no event at all where they do not move to and fro.
 
-    Raises ValueError where there are too few frames a second.
+    Raises InputError where there are too few frames a second.
     """
     if motion.fps < MIN_FPS:
         raise InputError(f"fps must be at least {MIN_FPS:g} to find the events of gait, got {motion.fps:g}")
-    joints = motion.joints[:, :, ::2]
-    joints = low_pass(joints, CUTOFF_HZ, motion.fps)
+    joints = low_pass(motion.joints[:, :, ::2], CUTOFF_HZ, motion.fps)  # over the ground: x and z
     facing = rotation_from_root_angles(motion.poses[:, :3]) @ FORWARDS
     heading = low_pass(facing[:, ::2], SWAY_HZ, motion.fps)
     heading /= np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-9)

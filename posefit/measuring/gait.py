@@ -138,16 +138,18 @@ def _steps(events: GaitEvents, fps: float, first: int, unknown: set[int], in_pla
     least = -np.inf if in_place else MIN_SPEED
     strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
     for k, (time, foot) in enumerate(strikes):
-        (other,), measures = (side for side in SIDES if side != foot), dict[str, float | None]()
+        other = "right" if foot == "left" else "left"
+        measures: dict[str, float | None] = {}
         again = next((later for later, side in strikes[k + 1 :] if side == foot), np.inf)
         off = next((off for off in _known(events.offs[foot], unknown) if time < off < again), None)
         if off is not None:
             measures["toe_off_seconds"] = (first + off) / fps
-        before = strikes[k - 1] if k else (time, foot)
-        if before[1] == other and _walked(events, fps, before[0], time, unknown, least):
-            measures |= _step(events, fps, foot, other, before[0], time)
-        times = [time, *(later for later, _ in strikes[k + 1 : k + 3])]
-        in_turn = [side for _, side in strikes[k + 1 : k + 3]] == [other, foot]
+        before, foot_before = strikes[k - 1] if k else (time, foot)
+        if foot_before == other and _walked(events, fps, before, time, unknown, least):
+            measures |= _step(events, fps, foot, other, before, time)
+        following = strikes[k + 1 : k + 3]
+        times = [time, *(later for later, _ in following)]
+        in_turn = [side for _, side in following] == [other, foot]
         if in_turn and all(_walked(events, fps, *pair, unknown, least) for pair in pairwise(times)):
             measures |= _stride(events, fps, foot, time, times[-1], off)
         if in_place:
@@ -159,7 +161,7 @@ def _step(events: GaitEvents, fps: float, foot: str, other: str, start: float, e
     """Return the measures of a step of a foot, from the strike of the other one to its own."""
     struck = at_frames(events.ankles[foot], end)
     x, z = at_frames(events.heading, end)
-    # at one moment: between two, whatever is wrong with a person's depth would count
+    # both ankles at one moment: between two moments an error of the person's depth would count
     beside = struck - at_frames(events.ankles[other], end)
     return {
         "step_seconds": (end - start) / fps,

@@ -42,7 +42,7 @@ def read_clip(
 ) -> Motion:
     """Return the motion of an .amc file over the skeleton of its .asf file, in that file's length unit or in `unit`.
 
-    `up` is the axis of the world that points up, by default y. Raises ValueError with file and line where one of them
+    `up` is the axis of the world that points up, by default y. Raises InputError with file and line where one of them
     is not what it should be.
     """
     acclaim = parse_asf(asf, unit)
@@ -58,7 +58,7 @@ def read_amc(
     The rate is `fps`, or else the one that posefit's own files state, or else CMU's, which is noted.
     `metres_per_unit` scales the root's translation; `read_clip` takes it from the .asf file. Angles of end bones and
     of bones outside the 27 joints are read and left out. All angles are unwrapped along time. Every frame must give
-    all channels of `skeleton`, in any order. Raises ValueError with file and line.
+    all channels of `skeleton`, in any order. Raises InputError with file and line.
     """
     path = Path(path)
     check_size(path, SIZE_LIMIT)
@@ -157,7 +157,7 @@ def _rate(line: Line, word: str) -> float:
 def write_amc(path: str | Path, motion: Motion) -> None:
     """Write an .amc file in the CMU database's unit that reads back as the same motion, up to whole turns.
 
-    A comment states its rate. Channels that a pose does not hold, such as fingers, are written as 0. Raises ValueError
+    A comment states its rate. Channels that a pose does not hold, such as fingers, are written as 0. Raises InputError
     where the motion turns a joint about an axis that its skeleton has no channel for, as the file could not hold that.
     """
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)

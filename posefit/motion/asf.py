@@ -37,19 +37,12 @@ class Acclaim(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def read_asf(path: str | Path, unit: Unit | None = None) -> Skeleton:
-    """Return the skeleton of an .asf file, named after it, in metres; see `parse_asf`.
-
-    Only the 26 bones of `posefit.geometry.skeleton.BONES` are chosen; other bones may be there and keep their place
-    in `channels`. Raises ValueError with file and line where the file is not an Acclaim skeleton of this tree.
-    """
-    return parse_asf(path, unit).skeleton
-
-
 def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
     """Return what an .asf file holds. Its unit is `unit`, or else the one that it states.
 
     Where no person has the stature that it states, and a known unit gives a person's, the unit is that one, and noted.
+    Bones beside the 26 of `posefit.geometry.skeleton.BONES` keep their place in `channels` alone. Raises InputError
+    with file and line where the file is not an Acclaim skeleton of this tree.
     """
     path = Path(path)
     check_size(path, SIZE_LIMIT)

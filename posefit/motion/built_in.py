@@ -28,6 +28,7 @@ from posefit.reading import quoted, suggestion
 
 @lru_cache(maxsize=1)
 def _stored() -> dict[str, Any]:
+    """Return what built_in.json holds: the average skeleton, and the models by style."""
     stored: dict[str, Any] = json.loads((files("posefit.motion") / "built_in.json").read_text(encoding="utf-8"))
     return stored
 
@@ -72,7 +73,7 @@ def motion(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0
 
     `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
     lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe; a mean of styles may be 2 cm
-    off. Raises ValueError for an unknown name, and where a number is not what it should be.
+    off. Raises InputError for an unknown name, and where a number is not what it should be.
     """
     angles, series, period, pace = _model(name)
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 1:
@@ -99,8 +100,7 @@ def _model(name: str) -> tuple[list[int], Array, float, float]:
     _check(name)
     styles = [name] if name in _stored()["motions"] else other_styles(name)
     models = [_stored()["motions"][style] for style in styles]
-    means = (np.mean([model[key] for model in models], axis=0) for key in ("series", "period", "speed"))
-    series, period, pace = means
+    series, period, pace = (np.mean([model[key] for model in models], axis=0) for key in ("series", "period", "speed"))
     return models[0]["angles"], series, float(period), float(pace)
 
 

@@ -241,45 +241,40 @@ def _rig(content: _Content) -> Rig:
     joints = joints_of(names, parents)
     if isinstance(joints, list):
         raise InputError(f"a person's joints, got one without {cut(', '.join(joints), 200)}")
-    wanted: set[int] = set()
-    for start in (joints.hips, joints.chest, *joints.limbs.values(), *joints.spine, *joints.neck, joints.head or 0):
-        while start >= 0 and start not in wanted:
-            wanted.add(start)
-            start = parents[start]
-    rest = np.zeros((len(nodes), 3))
-    turned: dict[int, Array] = {}
-    placed: dict[int, Array] = {}
-    for number, node in enumerate(nodes):
-        assert node.offset is not None
-        rest[number] = node.offset + (rest[node.parent] if node.parent >= 0 else 0.0)
-        if number not in wanted:
-            continue
-        local, moved = np.eye(3)[None], np.tile(node.offset, (len(values), 1))
-        positions = []
-        for column, (turning, axis) in enumerate(node.channels, node.column):
-            if turning:
-                local = local @ rotation_about(axis, np.radians(values[:, column]))
-            else:
-                moved[:, axis] = values[:, column]
-                positions.append(axis)
-        if positions and node.parent >= 0:
-            own = node.offset[positions]
-            shifts = moved[:, positions]
-            if np.abs(shifts).mean() < np.abs(shifts - own).mean():  # some programs write what is added to the offset
-                moved[:, positions] += own
-        local = np.broadcast_to(local, (len(values), 3, 3))
-        above = turned.get(node.parent)
-        if above is None:
-            turned[number], placed[number] = local, moved
-        else:
-            turned[number] = above @ local
-            placed[number] = placed[node.parent] + np.einsum("tij,tj->ti", above, moved)
+    wanted: set[int] = set()  # the joints of the person, and all above them
+    for number in (joints.hips, joints.chest, *joints.limbs.values(), *joints.spine, *joints.neck, joints.head or 0):
+        while number >= 0 and number not in wanted:
+            wanted.add(number)
+            number = parents[number]
     shape = (len(nodes), len(values), 3)
-    turns, places = np.zeros((*shape, 3)), np.zeros(shape)
-    for number in turned:
-        turns[number], places[number] = turned[number], placed[number]
+    rest, turns, places = np.zeros((len(nodes), 3)), np.zeros((*shape, 3)), np.zeros(shape)
+    for number, (node, above) in enumerate(zip(nodes, parents, strict=True)):
+        assert node.offset is not None
+        rest[number] = node.offset + (rest[above] if above >= 0 else 0.0)
+        if number in wanted:
+            turn, offset = _movement(node, values)
+            turns[number] = turn if above < 0 else turns[above] @ turn
+            places[number] = offset if above < 0 else places[above] + np.einsum("tij,tj->ti", turns[above], offset)
     at_rest = np.tile(np.eye(3), (len(nodes), 1, 1))
     return Rig(names, parents, joints, (at_rest, rest), (turns, places))
+
+
+def _movement(node: _Node, values: Array) -> tuple[Array, Array]:
+    """Return how a node turns (T or 1, 3, 3) and where it is (T, 3), in the frame of the node above it."""
+    assert node.offset is not None
+    turn, offset = np.eye(3)[None], np.tile(node.offset, (len(values), 1))
+    positions = []
+    for column, (turning, axis) in enumerate(node.channels, node.column):
+        if turning:
+            turn = turn @ rotation_about(axis, np.radians(values[:, column]))
+        else:
+            offset[:, axis] = values[:, column]
+            positions.append(axis)
+    if positions and node.parent >= 0:
+        at_rest, stated = node.offset[positions], offset[:, positions]
+        if np.abs(stated).mean() < np.abs(stated - at_rest).mean():  # some programs write what is added to the offset
+            offset[:, positions] += at_rest
+    return turn, offset
 
 
 def write_bvh(path: str | Path, motion: Motion) -> None:

@@ -163,7 +163,7 @@ def _stem(source: Source | None) -> str | None:
     return source.name if isinstance(source, Motion) else None if source is None else Path(source).stem
 
 
-def _same(one: Source, other: Source | None) -> bool:
-    if isinstance(one, Motion) or isinstance(other, Motion) or other is None:
-        return one is other
-    return str(one) == str(other) or (Path(one).exists() and Path(one).resolve() == Path(other).resolve())
+def _same(source: Source, other: Source | None) -> bool:
+    if isinstance(source, Motion) or isinstance(other, Motion) or other is None:
+        return source is other
+    return str(source) == str(other) or (Path(source).exists() and Path(source).resolve() == Path(other).resolve())

@@ -100,14 +100,7 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
             ends = [child for child, parent in enumerate(parents) if parent == last and not names[child]]
             if ends and (side, end) not in limbs:
                 limbs[side, end] = ends[0]
-    missing = [f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs]
-    for side in ("left", "right"):
-        for chain in (LEGS, ARMS):
-            for above, below in pairwise(chain):
-                first, second = limbs.get((side, above)), limbs.get((side, below))
-                if first is not None and second is not None and first not in paths[second][:-1]:
-                    missing.append(f"{side} {below} ({names[second]!r}) under {side} {above} ({names[first]!r})")
-    if missing:
+    if missing := _missing(limbs, names, paths):
         return missing
     legs = [limbs[side, "thigh"] for side in ("left", "right")]
     arms = [limbs[side, "arm"] for side in ("left", "right")]
@@ -152,6 +145,17 @@ def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> 
         if not nodes[absent] and len(two) > 1 and two[0] in paths[two[1]]:
             nodes[above], nodes[below] = two[:1], two[1:]
     return {joint: named[0] for joint, named in nodes.items() if named}
+
+
+def _missing(limbs: Mapping[tuple[str, str], int], names: Sequence[str], paths: Sequence[Sequence[int]]) -> list[str]:
+    """Return what limbs lack: joints, and that each joint of a leg or an arm hangs from the one before it."""
+    missing = [f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs]
+    for side in ("left", "right"):
+        for above, below in (*pairwise(LEGS), *pairwise(ARMS)):
+            first, second = limbs.get((side, above)), limbs.get((side, below))
+            if first is not None and second is not None and first not in paths[second][:-1]:
+                missing.append(f"{side} {below} ({names[second]!r}) under {side} {above} ({names[first]!r})")
+    return missing
 
 
 def _common(paths: Sequence[Sequence[int]], nodes: Sequence[int]) -> int | None:

@@ -52,7 +52,7 @@ class Motion:
         return self.skeleton.joints(self.poses, self.translations)
 
     def frames(self, start: int, stop: int) -> "Motion":
-        """Return frames start to stop - 1 as a motion. Raises ValueError where that leaves the clip or is empty."""
+        """Return frames start to stop - 1 as a motion. Raises InputError where that leaves the clip or is empty."""
         if not 0 <= start < stop <= len(self):
             raise InputError(f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}")
         poses, translations = self.poses[start:stop], self.translations[start:stop]

@@ -105,7 +105,7 @@ def is_recorded(name: object) -> bool:
 
 
 def clip(name: str) -> RecordedClip:
-    """Return the clip of a name such as 16_15. Raises ValueError where there is none."""
+    """Return the clip of a name such as 16_15. Raises InputError where there is none."""
     if not is_recorded(name):
         raise InputError(f"a recorded motion must be one that posefit motions lists, got {quoted(name)}")
     return _stored()[name]
@@ -114,7 +114,7 @@ def clip(name: str) -> RecordedClip:
 def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[RecordedClip]:
     """Return the clips of some people, or of all, but not of those `without`.
 
-    Raises ValueError where one of them is not in the library, or where no one is left.
+    Raises InputError where one of them is not in the library, or where no one is left.
     """
     only, without = tuple(only), tuple(without)
     for subject in (*only, *without):
@@ -136,7 +136,7 @@ def is_library(name: object) -> bool:
 def named(name: str) -> Sequence[RecordedClip]:
     """Return the clips of `library`, of some people as in `library:02,16`, or of all but some as in `library:-16`.
 
-    Raises ValueError where one of them is not in the library, or where no one is left.
+    Raises InputError where one of them is not in the library, or where no one is left.
     """
     _, colon, listed = name.partition(":")
     people = [person.strip() for person in listed.split(",")] if colon else []

@@ -6,7 +6,7 @@ apart, arms out, palms down: how a node is turned there is read off the rig's ow
 off the frame that is most like it, each bone turned the shortest way from the one before.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import NamedTuple, Self
@@ -263,46 +263,59 @@ def _beyond(joint: int, poses: Array, average: Skeleton) -> bool:
 
 def _bones(rig: Rig, scale: float) -> list[_Bone]:
     """Return for each of posefit's bones (26) the node that carries its end."""
-    joints, limbs = rig.joints, rig.joints.limbs
     average = dict(zip(BONES, scale * average_skeleton().lengths, strict=True))
-    bones: dict[str, _Bone] = {}
+    chest = _chest(rig)
+    bones = _spine(rig, chest) | _neck_and_head(rig, chest, average)
+    for side in ("left", "right"):
+        bones |= {f"{side[0]}{bone}": carrier for bone, carrier in _limbs(rig, side, average).items()}
+    return [bones[name] for name in BONES]
+
+
+def _chest(rig: Rig) -> _Bone:
+    """Return the bone that ends where the neck begins, or else in the middle between the shoulders."""
+    joints, limbs = rig.joints, rig.joints.limbs
     if joints.neck:
-        chest = rig.of(joints.neck[0])
-    else:  # the middle between the shoulders
-        starts = ("clavicle" if (side, "clavicle") in limbs else "arm" for side in ("left", "right"))
-        shoulders = [rig.of(limbs[side, start]) for side, start in zip(("left", "right"), starts, strict=True)]
-        chest = _Bone.between(joints.chest, shoulders[0], shoulders[1], 0.5)
-    bones.update(_spine(rig, chest))
+        return rig.of(joints.neck[0])
+    starts = [(side, "clavicle" if (side, "clavicle") in limbs else "arm") for side in ("left", "right")]
+    left, right = (rig.of(limbs[start]) for start in starts)
+    return _Bone.between(joints.chest, left, right, 0.5)
+
+
+def _neck_and_head(rig: Rig, chest: _Bone, average: Mapping[str, float]) -> dict[str, _Bone]:
+    """Return the two bones of the neck and the head's; `average` has the lengths of an average person's bones."""
+    joints = rig.joints
     necks = [rig.of(node) for node in (*joints.neck[1:], joints.head) if node is not None]
     last = (joints.chest, *joints.neck)[-1] if joints.head is None else joints.head
     tip = rig.tip(last, 0.3 * (average["upperneck"] + average["head"])) if joints.neck or necks else None
-    bones["head"] = crown = rig.ending(last, tip)
+    crown = rig.ending(last, tip)
     if len(necks) > 1:
-        bones |= {"lowerneck": necks[0], "upperneck": necks[-1]}
+        lower, upper = necks[0], necks[-1]
     elif necks:  # the skull is two of posefit's bones, and turns as the head does
-        bones |= {"lowerneck": necks[0], "upperneck": _Bone.between(last, necks[0], crown, 0.5)}
+        lower, upper = necks[0], _Bone.between(last, necks[0], crown, 0.5)
     else:
-        bones |= {"lowerneck": _Bone.between(last, chest, crown, 1 / 3)}
-        bones |= {"upperneck": _Bone.between(last, chest, crown, 2 / 3)}
-    for side in ("left", "right"):
-        letter = side[0]
-        foot, hand = limbs[side, "foot"], limbs[side, "hand"]
-        bones |= {f"{letter}{bone}": rig.of(limbs[side, end]) for bone, end in _ENDS_OF.items()}
-        foot_length, toe_length = average["lfoot"], average["ltoes"]
-        toe = limbs.get((side, "toe"))
-        if toe is not None:
-            bones |= {f"{letter}foot": rig.of(toe), f"{letter}toes": rig.ending(toe, rig.tip(toe, 0.2 * toe_length))}
-        else:
-            tip, share = rig.tip(foot, 0.5 * foot_length), foot_length / (foot_length + toe_length)
-            bones |= {f"{letter}foot": rig.ending(foot, tip, share), f"{letter}toes": rig.ending(foot, tip)}
-        palm = limbs.get((side, "palm"))
-        if palm is not None and hand == rig.parents[palm]:
-            bones |= {f"{letter}wrist": rig.of(palm), f"{letter}hand": rig.ending(palm, rig.tip(palm, 0.0))}
-        else:
-            tip = rig.tip(hand, 0.3 * average["lwrist"])
-            share = average["lwrist"] / (average["lwrist"] + average["lhand"])
-            bones |= {f"{letter}wrist": rig.ending(hand, tip, share), f"{letter}hand": rig.ending(hand, tip)}
-    return [bones[name] for name in BONES]
+        lower, upper = (_Bone.between(last, chest, crown, share) for share in (1 / 3, 2 / 3))
+    return {"lowerneck": lower, "upperneck": upper, "head": crown}
+
+
+def _limbs(rig: Rig, side: str, average: Mapping[str, float]) -> dict[str, _Bone]:
+    """Return the bones of a side's leg and arm by their kind, such as `femur`."""
+    limbs = rig.joints.limbs
+    bones = {bone: rig.of(limbs[side, end]) for bone, end in _ENDS_OF.items()}
+    foot, hand = limbs[side, "foot"], limbs[side, "hand"]
+    toe, palm = limbs.get((side, "toe")), limbs.get((side, "palm"))
+    if toe is not None:
+        bones |= {"foot": rig.of(toe), "toes": rig.ending(toe, rig.tip(toe, 0.2 * average["ltoes"]))}
+    else:
+        share = average["lfoot"] / (average["lfoot"] + average["ltoes"])
+        tip = rig.tip(foot, 0.5 * average["lfoot"])
+        bones |= {"foot": rig.ending(foot, tip, share), "toes": rig.ending(foot, tip)}
+    if palm is not None and hand == rig.parents[palm]:
+        bones |= {"wrist": rig.of(palm), "hand": rig.ending(palm, rig.tip(palm, 0.0))}
+    else:
+        share = average["lwrist"] / (average["lwrist"] + average["lhand"])
+        tip = rig.tip(hand, 0.3 * average["lwrist"])
+        bones |= {"wrist": rig.ending(hand, tip, share), "hand": rig.ending(hand, tip)}
+    return bones
 
 
 def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:

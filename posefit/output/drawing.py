@@ -1,6 +1,6 @@
 """What pictures of a track are made of: colours, words, a body, and the thin bones of another mode.
 
-Colours are blue, green, red, as OpenCV has them. What is unsure is faint.
+Colours are blue, green, red, as OpenCV has them. What is uncertain is faint.
 """
 
 import math
@@ -26,7 +26,10 @@ LINES = (70, 66, 64)  # of a chart
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 SIDE_VIEW_DISTANCE = 6.0  # metres
-SURE_RADIUS, UNSURE_RADIUS = 0.05, 0.3  # metres of a joint's 80 % interval: where bones are solid, and where faintest
+SOLID_RADIUS, FAINTEST_RADIUS = (
+    0.05,
+    0.3,
+)  # metres of a joint's 80 % interval: where bones are solid, and where faintest
 FAINTEST = 0.2  # how much of a faintest limb's colour is left
 _STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
 SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
@@ -69,9 +72,9 @@ def hexadecimal(colour: tuple[int, int, int]) -> str:
 def opacities(radii: Array) -> Array:
     """Return how solid each bone (26,) is drawn, 0 to 1, given how far its joints (27,) may be off in metres.
 
-    A bone is as sure as the less sure of its two ends. Where that is unknown, NaN, it is solid.
+    A bone is as solid as the fainter of its two ends. Where that is unknown, NaN, it is solid.
     """
-    solid = np.clip((UNSURE_RADIUS - np.nan_to_num(radii)) / (UNSURE_RADIUS - SURE_RADIUS), FAINTEST, 1.0)
+    solid = np.clip((FAINTEST_RADIUS - np.nan_to_num(radii)) / (FAINTEST_RADIUS - SOLID_RADIUS), FAINTEST, 1.0)
     return np.asarray(np.minimum(solid[_STARTS], solid[1:]))
 
 

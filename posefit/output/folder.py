@@ -18,9 +18,9 @@ from posefit.output.identity import Digest, difference
 from posefit.output.record import append_frame, read_frames
 from posefit.reading import cut, parsed_json, read_text
 
-_RECORD = "frames.jsonl"
+RECORD = "frames.jsonl"
 SUMMARY, MAX_SUMMARY_BYTES = "summary.json", 10_000_000
-_MINE = (*FILES, _RECORD)  # what a track writes to its folder
+_WRITTEN = (*FILES, RECORD)  # the names of what a track writes to its folder
 
 
 class Recorder:
@@ -44,7 +44,7 @@ class Recorder:
 
 
 class OutputFolder(Recorder):
-    """Writes beside the target and renames at the end. Raises ValueError where the target may not be written.
+    """Writes beside the target and renames at the end. Raises InputError where the target may not be written.
 
     `spec` is what a track has to have in common with the one that it resumes.
     """
@@ -55,62 +55,62 @@ class OutputFolder(Recorder):
         force: bool,
         resume: bool,
         spec: Mapping[str, Digest],
-        say: Callable[[str], None],
+        log: Callable[[str], None],
     ) -> None:
-        self.path, self._spec, self._say = Path(path), dict(spec), say
+        self.path, self._spec, self._log = Path(path), dict(spec), log
         self._recorded, self._force = 0, force
         _check_target(self.path, force)
-        self._place = _interrupted(self.path, self._spec) if resume else None
+        self._unfinished = _interrupted(self.path, self._spec) if resume else None
 
     def __enter__(self) -> Self:
         try:
-            if self._place is None:
+            if self._unfinished is None:
                 for earlier in Unfinished.interrupted(self.path):
-                    earlier.remove(_MINE)
-                self._place = Unfinished.begin(self.path, self._spec)
-            self.building = self._place.path
+                    earlier.remove(_WRITTEN)
+                self._unfinished = Unfinished.begin(self.path, self._spec)
+            self.building = self._unfinished.path
         except OSError as error:
             raise InputError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
-        assert self._place is not None
+        assert self._unfinished is not None
         if kind is None:
             try:
-                self._place.finish(_MINE, self._force)
+                self._unfinished.finish(_WRITTEN, self._force)
             except OSError as failure:
-                self._place.close()
+                self._unfinished.close()
                 where = f"{failure.strerror}; the results are in {self.building}"
                 raise InputError(f"{self.path}: expected its name to be free, got {where}") from None
-            (self.path / _RECORD).unlink(missing_ok=True)
+            (self.path / RECORD).unlink(missing_ok=True)
             return
         notice = ""
         if self._recorded:
             for name in FILES:
                 (self.building / name).unlink(missing_ok=True)
             notice = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
-            self._place.close()
+            self._unfinished.close()
         else:
-            self._place.remove(_MINE)
+            self._unfinished.remove(_WRITTEN)
         if isinstance(error, OSError):
             came = f"{error.strerror or error}{notice}"
             raise InputError(f"{self.path}: expected room to write to, got {came}") from error
         if notice and isinstance(error, InputError):
             raise InputError(f"{error}{notice}") from error
         if notice:
-            self._say(notice[2:])
+            self._log(notice[2:])
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames that were recorded before, and the state of the random generator after them."""
-        frames, state, damage = read_frames(self.building / _RECORD)
+        frames, state, damage = read_frames(self.building / RECORD)
         if damage:
-            self._say(f"warning: {damage}; tracked again from there")
+            self._log(f"warning: {damage}; tracked again from there")
         self._recorded = len(frames)
         return frames, state
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
-        append_frame(self.building / _RECORD, frame, state)
+        append_frame(self.building / RECORD, frame, state)
         self._recorded += 1
 
     def finish(self, content: Content) -> None:
@@ -128,7 +128,7 @@ def _check_target(path: Path, force: bool) -> None:
         raise InputError(f"{path}: expected a folder to write to, got {came}")
     if not force:
         raise InputError(f"{path}: expected a new folder, got one that exists; --force replaces it")
-    if others := other_entries(path, _MINE) or _unmarked(path):
+    if others := other_entries(path, _WRITTEN) or _unmarked(path):
         came = f"one with {cut(others[0])}, which is none of posefit's"
         raise InputError(f"{path}: expected a folder of earlier results to replace, got {came}")
 

@@ -1,6 +1,6 @@
 """Pictures of a track: the observed silhouette with the fitted body on it, beside a view of the body from its side.
 
-Where a method says how sure it is, limbs that are unsure are faint, another mode is drawn as thin bones, and lost
+Where a method reports its uncertainty, uncertain limbs are faint, another mode is drawn as thin bones, and lost
 frames have a border.
 """
 
@@ -75,38 +75,24 @@ class Painter:
 
         `radii` (levels, 27) are those of its joints' intervals, where it has a posterior.
         """
-        body, camera, pose, place = self._scene.body, self._scene.cameras[0], frame.pose, frame.translation
+        skeleton = self._scene.body.skeleton
         solid = None if radii is None else opacities(radii[MAIN_LEVEL])
-        other = other_mode(body.skeleton, frame.modes, pose, MIN_OTHER_WEIGHT)
-        left = self.overlay(frame, observation, filmed, solid, other)
-        width = left.shape[1]
-        from_side = side_camera(body, camera, pose, place, PANEL)
-        side = blank(PANEL, PANEL)
-        draw_body(side, body, from_side, pose, place, solid)
-        if other is not None:
-            draw_bones(side, body, from_side, other.pose, other.translation, OTHER)
-        image = np.hstack([left, side])
+        other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
+        image = self._panels(frame, observation, filmed, solid, other)
         if self._count in self._wanted:
             self._stills.append(self._still(image, row))
         if self._scene.count == 1:
-            for mode in other_modes(body.skeleton, frame.modes, pose, MIN_WEIGHT)[:ALTERNATIVES]:
+            for mode in other_modes(skeleton, frame.modes, frame.pose, MIN_WEIGHT)[:ALTERNATIVES]:
                 alternative = replace(frame, pose=mode.pose, translation=mode.translation)
-                side = blank(PANEL, PANEL)
-                draw_body(
-                    side,
-                    body,
-                    side_camera(body, camera, mode.pose, mode.translation, PANEL),
-                    mode.pose,
-                    mode.translation,
-                )
-                image_of_it = np.hstack([self.overlay(alternative, observation, filmed), side])
-                self._stills.append(_labelled(image_of_it, f"or this, {100.0 * mode.weight:.0f} %"))
+                still = self._panels(alternative, observation, filmed)
+                self._stills.append(_labelled(still, f"or this, {100.0 * mode.weight:.0f} %"))
         label = [f"frame {self._scene.first + self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
         label += [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
         label += [] if observation.usable else ["pose held"]
         image[:LABEL_HEIGHT] //= 4  # so that the label stands out from a bright sky
         write(image, "   ".join(label), (12, 26))
-        write(image, "from the camera's right", (width + 12, 26))
+        side_column = image.shape[1] - PANEL + 12
+        write(image, "from the camera's right", (side_column, 26))
         if filmed is None or len(self._scene.cameras) > 1:
             _write_legend(image, PANEL - 14)
         lost = row["lost"] >= LOST
@@ -114,11 +100,28 @@ class Painter:
         notes += [("left and right unknown", OTHER)] if row["unknown_sides"] == 1.0 else []
         notes += [(f"thin: may be this, {100.0 * other.weight:.0f} %", OTHER)] if other is not None else []
         for k, (words, colour) in enumerate(reversed(notes)):
-            write(image, words, (width + 12, PANEL - 14 - LINE_HEIGHT * k), colour)
+            write(image, words, (side_column, PANEL - 14 - LINE_HEIGHT * k), colour)
         if lost:
             _draw_border(image, BORDER)
         self._count += 1
         return image
+
+    def _panels(
+        self,
+        frame: Frame,
+        observation: Observation,
+        filmed: Image | None,
+        solid: Array | None = None,
+        other: Mode | None = None,
+    ) -> Image:
+        """Return the `overlay` of a frame, and to its right the body viewed from its side."""
+        body, pose, place = self._scene.body, frame.pose, frame.translation
+        camera = side_camera(body, self._scene.cameras[0], pose, place, PANEL)
+        side = blank(PANEL, PANEL)
+        draw_body(side, body, camera, pose, place, solid)
+        if other is not None:
+            draw_bones(side, body, camera, other.pose, other.translation, OTHER)
+        return np.hstack([self.overlay(frame, observation, filmed, solid, other), side])
 
     def _still(self, image: Image, row: Row) -> Image:
         """Return a small picture whose words are large enough to be read in a page."""
@@ -160,8 +163,8 @@ class Painter:
             if other is not None:
                 draw_bones(panel, body, zoomed, other.pose, other.translation, OTHER)
             panels.append(panel)
-        wide = max(panel.shape[1] for panel in panels)
-        panels = [np.pad(panel, ((0, 0), (0, wide - panel.shape[1]), (0, 0))) for panel in panels]
+        widest = max(panel.shape[1] for panel in panels)
+        panels = [np.pad(panel, ((0, 0), (0, widest - panel.shape[1]), (0, 0))) for panel in panels]
         return _grid(panels, columns, 0)
 
     def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:

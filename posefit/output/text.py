@@ -42,28 +42,10 @@ def table(track: Content) -> str:
         f"{setup.motion}: {counted(setup.frames, 'frame')}, {setup.method}, seed {setup.seed}, "
         f"translation {setup.translation}, trained on {training}"
     )
-    if measures.error_degrees is not None:
-        lines.append(f"{'':{WIDTH}} {'error deg':>9} {'skill':>7}")
-        lines.append(f"{setup.method:{WIDTH}} {measures.error_degrees.mean:9.2f}")
-        for name, baseline in (measures.baselines_degrees or {}).items():
-            skill = MEASURES["skill"].number((measures.skill or {})[name])  # a dash where a baseline has no error
-            lines.append(f"{BASELINES[name]:{WIDTH}} {baseline:9.2f} {skill:>7}")
-        if measures.prior_floor_degrees is not None:  # a tracker of its own may have no prior
-            floor = MEASURES["prior_floor_degrees"]
-            lines.append(f"{floor.label:{WIDTH}} {floor.number(measures.prior_floor_degrees):>9}")
-        shown = (_shown(measures, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
-        lines.append(f"{', '.join(shown)} of frames")
+    lines += _error_lines(setup.method, measures)
     lines += filter(None, [held_frames(track), undetermined(track)])
     lines += [gait_line(track.gait.as_dict())] if setup.frames > 1 else []
-    if (build := log.build) is not None:
-        parts = [
-            f"{name} {factor:.2f} +- {build['spread'][name]:.2f}"
-            for name, factor in build["factors"].items()
-            if abs(factor - 1.0) >= MIN_BUILD_CHANGE
-        ]
-        lines.append(
-            f"build: {build['stature_m']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
-        )
+    lines += [] if log.build is None else [_build_line(log.build)]
     if setup.camera == "guessed":
         lines.append(
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
@@ -76,6 +58,33 @@ def table(track: Content) -> str:
     speed = MEASURES["evaluations_per_second"].number(measures.evaluations_per_second)
     lines.append(f"{_effort(track)}, {speed} poses a second")
     return "\n".join(map(printable, lines))  # the names of files are among them
+
+
+def _error_lines(method: str, measures: Measures) -> list[str]:
+    """Return the errors of a method beside those of the baselines; none where the truth is unknown."""
+    if measures.error_degrees is None:
+        return []
+    lines = [
+        f"{'':{WIDTH}} {'error deg':>9} {'skill':>7}",
+        f"{method:{WIDTH}} {measures.error_degrees.mean:9.2f}",
+    ]
+    for name, baseline in (measures.baselines_degrees or {}).items():
+        skill = MEASURES["skill"].number((measures.skill or {})[name])  # a dash where a baseline has no error
+        lines.append(f"{BASELINES[name]:{WIDTH}} {baseline:9.2f} {skill:>7}")
+    if measures.prior_floor_degrees is not None:  # a tracker of its own may have no prior
+        floor = MEASURES["prior_floor_degrees"]
+        lines.append(f"{floor.label:{WIDTH}} {floor.number(measures.prior_floor_degrees):>9}")
+    shown = (_shown(measures, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
+    return [*lines, f"{', '.join(shown)} of frames"]
+
+
+def _build_line(build: Mapping[str, Any]) -> str:
+    parts = [
+        f"{name} {factor:.2f} +- {build['spread'][name]:.2f}"
+        for name, factor in build["factors"].items()
+        if abs(factor - 1.0) >= MIN_BUILD_CHANGE
+    ]
+    return f"build: {build['stature_m']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
 
 
 def held_frames(track: Content) -> str:

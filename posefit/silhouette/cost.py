@@ -30,9 +30,12 @@ def view_of(camera: Camera) -> View:
 
 
 def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
-    """Return what the kernel wants to know before the poses. Made once, it holds for any number of calls."""
-    observed = kernels.Observed(*silhouette.bits, silhouette.pixels)
-    return body.skeleton.chain, body.radii, view_of(camera), observed, _NO_IMAGES
+    """Return the arguments of `kernels.count_areas` before the poses. Made once, they hold for any number of calls."""
+    return _drawing(body, camera, kernels.Observed(*silhouette.bits, silhouette.pixels), _NO_IMAGES)
+
+
+def _drawing(body: Body, camera: Camera, observed: kernels.Observed, images: Bits) -> tuple[Any, ...]:
+    return body.skeleton.chain, body.radii, view_of(camera), observed, images
 
 
 def areas(
@@ -55,19 +58,19 @@ def areas(
     _check_finite("translations", translations)
     if silhouette.mask.shape != (camera.height, camera.width):
         raise InputError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
-    drawn.count_poses(len(poses), silhouette)
+    drawn.count_poses(n, silhouette)
     if silhouette.device == "cuda":
         from posefit.silhouette.cuda.areas import areas_on_device
 
         return areas_on_device(body, camera, silhouette, poses, translations)
-    out = np.empty((len(poses), 3), dtype=np.int64)
+    counted = np.empty((n, 3), dtype=np.int64)
     drawing = drawing_of(body, camera, silhouette)
 
     def count(part: slice) -> None:
-        kernels.count_areas(*drawing, poses[part], translations[part], out[part])
+        kernels.count_areas(*drawing, poses[part], translations[part], counted[part])
 
-    work_through(parts_of(len(poses), threads), threads, lambda _: (), count)
-    return out
+    work_through(parts_of(n, threads), threads, lambda _: (), count)
+    return counted
 
 
 def _check_finite(name: str, values: Array) -> None:
@@ -90,12 +93,8 @@ def pose_costs(
     """
     views = zip(cameras, silhouettes, strict=True)
     counts = [areas(body, *view, poses, translations, threads) for view in views]
-    return mean_cost(counts, silhouettes, beta), counts[0][None] if len(counts) == 1 else np.stack(counts)
-
-
-def mean_cost(counts: Areas | Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
-    """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; a view of which nothing is known is left out."""
-    return mean_over_views([mismatch(view, beta) for view in known_views(list(counts), silhouettes)])
+    costs = [mismatch(view, beta) for view in known_views(counts, silhouettes)]
+    return mean_over_views(costs), counts[0][None] if len(counts) == 1 else np.stack(counts)
 
 
 def mean_over_views(costs: Sequence[Array]) -> Array:
@@ -165,7 +164,7 @@ def masks_of(body: Body, camera: Camera, poses: Array, translations: Array) -> M
     _check_finite("translation", translations)
     nothing = np.zeros(strips_and_words(camera.width, camera.height), dtype=np.uint64)
     images = np.empty((len(poses), *nothing.shape), dtype=np.uint64)
-    drawing = body.skeleton.chain, body.radii, view_of(camera), kernels.Observed(nothing, nothing, 0), images
+    drawing = _drawing(body, camera, kernels.Observed(nothing, nothing, 0), images)
     uncounted = np.empty((len(poses), 3), dtype=np.int64)
     kernels.count_areas(*drawing, writeable(poses), writeable(translations), uncounted)
     return unpack(images, camera.width, camera.height)

@@ -23,11 +23,11 @@ TINT = 14.0  # and its colour, to within so many grey levels after scaling
 NOISE = 3  # pixels to a side, of which the majority decides
 SPECK = 0.004  # of the image's height: what an opening takes away
 GAP = 0.012  # of the image's height: what a closing joins
-NEAR = 0.06  # of the largest piece's height: pieces as near as that belong to the person
-PIECE = 0.05  # of the largest piece's area: a piece that is smaller is not counted
+PIECE_REACH = 0.06  # of the largest piece's height: pieces as near as that belong to the person
+MIN_PIECE_AREA = 0.05  # of the largest piece's area: smaller pieces are noise
 RIVAL_AREA = 0.25  # of the largest person's area: a smaller one is none
 BRIDGE = 0.15  # of the person's height: shadow between parts of the person that are no farther apart is clothing
-HOLE = 0.02  # of the person's area: a hole that is smaller is filled
+MAX_HOLE_AREA = 0.02  # of the person's area: a hole that is smaller is filled
 SAMPLES = 40  # frames that a median background looks at
 HISTORY = 500  # frames that a mixture remembers
 THRESHOLD = 25.0  # squared standard deviations from its nearest Gaussian, from which on a pixel is foreground
@@ -140,7 +140,7 @@ class Mixture:
         return np.asarray(label == 255), np.asarray(label == 127)
 
 
-class Drawn:
+class GivenMasks:
     """A segmenter of frames that are masks themselves: bright is the person."""
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
@@ -164,7 +164,7 @@ class Person:
 def people(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> list[Person]:
     """Return the people (height, width) of a foreground, the largest first, within `roi` x, y, width, height.
 
-    The first is there even where nobody is, and empty; others are at least a quarter as large.
+    There is always a first one, which is empty where nobody is; others are at least a quarter as large.
 
     Noise and specks go, gaps close, pieces near the largest one join it and small holes are filled. What looks like a
     shadow but lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
@@ -203,18 +203,18 @@ def _cleaned(mask: Mask, height: int) -> Mask:
 
 def _largest(mask: Mask) -> tuple[Mask, int, float]:
     """Return the largest piece with those near it, how many pieces count, and the share of the largest other."""
-    box, kept = padded_box(mask, 0), np.zeros_like(mask)
+    box, person = padded_box(mask, 0), np.zeros_like(mask)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask[box].astype(np.uint8), connectivity=8)
     if count < 2:
-        return kept, 0, 0.0
+        return person, 0, 0.0
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest = 1 + int(areas.argmax())
-    reach = _morphed(labels == largest, cv2.MORPH_DILATE, 2.0 * NEAR * stats[largest, cv2.CC_STAT_HEIGHT])
+    reach = _morphed(labels == largest, cv2.MORPH_DILATE, 2.0 * PIECE_REACH * stats[largest, cv2.CC_STAT_HEIGHT])
     belongs_to_person = np.zeros(count, dtype=bool)
     belongs_to_person[labels[reach & mask[box]]] = True
     rival = float(areas[~belongs_to_person[1:]].max(initial=0) / areas[belongs_to_person[1:]].sum())
-    kept[box] = belongs_to_person[labels]
-    return kept, int(np.count_nonzero(areas > PIECE * areas.max())), rival
+    person[box] = belongs_to_person[labels]
+    return person, int(np.count_nonzero(areas > MIN_PIECE_AREA * areas.max())), rival
 
 
 def _morphed(mask: Mask, operation: int, size: float) -> Mask:
@@ -225,7 +225,7 @@ def _morphed(mask: Mask, operation: int, size: float) -> Mask:
     return morphed
 
 
-def without_holes(mask: Mask, most: float = HOLE) -> Mask:
+def without_holes(mask: Mask, most: float = MAX_HOLE_AREA) -> Mask:
     """Return a mask whose holes are filled that have at most this share of its area."""
     box, filled = padded_box(mask, 1), mask.copy()
     count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask[box]).astype(np.uint8), connectivity=4)

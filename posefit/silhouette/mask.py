@@ -16,7 +16,7 @@ from posefit.silhouette.spans import STRIP_PIXELS
 
 Mask = NDArray[np.bool_]  # (height, width)
 
-PIECE = 0.06  # of the largest piece's pixels, ours: a smaller one is left out of the person's borders
+MIN_PIECE_PIXELS = 0.06  # of the largest piece's pixels, ours: a smaller one is left out of the person's borders
 
 
 def pack(mask: Mask) -> Bits:
@@ -48,7 +48,7 @@ def touches_border(mask: Mask) -> bool:
 
 
 def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
-    """Return the rows and columns of a mask's pixels, and so many about them; the first pixel where it has none."""
+    """Return the rows and columns of a mask's box with a margin in pixels; the first pixel where it is empty."""
     left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))
     if not wide:
         return slice(1), slice(1)
@@ -57,14 +57,14 @@ def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
 
 def without_small_pieces(mask: Mask) -> Mask:
     """Return a mask without its small pieces, which are not the person."""
-    box = padded_box(mask, 0)  # where it takes less time to tell pieces apart
+    box = padded_box(mask, 0)  # in less time than in the whole mask
     count, numbers, pieces, _ = cv2.connectedComponentsWithStats(mask[box].astype(np.uint8), connectivity=8)
     if count <= 2:
         return mask
     sizes, cleaned = pieces[:, cv2.CC_STAT_AREA], np.zeros_like(mask)
-    kept = sizes >= PIECE * sizes[1:].max()
-    kept[0] = False
-    cleaned[box] = kept[numbers]
+    large = sizes >= MIN_PIECE_PIXELS * sizes[1:].max()
+    large[0] = False  # the background
+    cleaned[box] = large[numbers]
     return cleaned
 
 
@@ -83,7 +83,7 @@ class Silhouette:
         """Return the silhouette of a mask (height, width), any value but 0 being the person.
 
         Pixels where `valid` is 0 are unknown and count for nothing. Both arrays are read-only: what a method writes
-        into them would falsify its own audit. Raises ValueError where shapes differ.
+        into them would falsify its own audit. Raises InputError where shapes differ.
         """
         values = np.asarray(mask)
         if values.ndim != 2 or 0 in values.shape:
@@ -141,7 +141,7 @@ def coarser_camera(camera: Camera, factor: int) -> Camera:
     """Return the camera whose pixels are every `factor`th of every `factor`th row: their centres see the same rays.
 
     So a body drawn by it is the same body drawn at full size and looked at there, pixel for pixel. The first one is
-    number `factor // 2`. Raises ValueError where that is no pixel.
+    number `factor // 2`. Raises InputError where that is no pixel.
     """
     first = _first(factor, (camera.width, camera.height))
     width, height = (len(range(first, side, factor)) for side in (camera.width, camera.height))

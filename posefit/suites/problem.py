@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population
 from posefit.fitting.check import one_of, whole
-from posefit.fitting.exchange import exchanged
+from posefit.fitting.dlpack import as_numpy
 from posefit.geometry.camera import Camera
 from posefit.reading import quoted
 from posefit.silhouette.mask import Mask
@@ -110,14 +110,14 @@ class Problem:
         Arrays may be of any library that has DLPack; the costs come as an array of the same one. Raises ValueError
         where the shape is another or a number is not finite, and BudgetSpentError.
         """
-        values, back = exchanged("proposals", proposals)
+        values, back = as_numpy("proposals", proposals)
         checked = self._checked(values)
         costs = self._counted(checked.reshape(-1, self.dimension))
         return float(costs[0]) if checked.ndim == 1 else back(costs)
 
     def evaluate(self, proposals: Any) -> Any:
         """Return the costs (n,) of proposals (n, d), as `posefit.minimise` asks for them."""
-        values, back = exchanged("proposals", proposals)
+        values, back = as_numpy("proposals", proposals)
         return back(self._counted(self._checked(values).reshape(-1, self.dimension)))
 
     def noise_free(self, proposals: object) -> Array:

@@ -51,13 +51,13 @@ def evaluate(
     if scene.truth is None and (warning := backwards_warning(backwards)):
         warnings.append(warning)
     setup = _setup(scene, method, task, options)
-    none = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
+    none_right = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
     log = TrackingLog(
         hypotheses=tracked.hypotheses,
         build=None if shape is None else shape.as_dict(),
         trace=frames[0].trace.tolist() if len(frames) == 1 else None,
         modes=[round(mode.weight, 6) for mode in modes] or None,
-        none_of_modes=round(float(np.mean(none)), 6) if none else None,
+        none_of_modes=round(float(np.mean(none_right)), 6) if none_right else None,
         unknown_sides=_numbers(table, "unknown_sides", 1.0),
         lost_frames=_numbers(table, "lost", LOST),
         relocalised=[scene.first + k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
@@ -99,6 +99,6 @@ def _setup(scene: Scene, method: Method, task: Task, options: TrackOptions) -> S
 
 
 def _numbers(table: Table, name: str, least: float) -> list[int] | None:
-    """Return the frames that have so much or more in a column, by their numbers; None where all are unknown."""
+    """Return the numbers of the frames with at least so much in a column; None where all are unknown."""
     values = table[name]
     return None if np.isnan(values).all() else table["frame"][values >= least].tolist()

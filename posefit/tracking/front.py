@@ -62,7 +62,7 @@ def track(
         raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
     kind = kind_of(sources[0])
     check_used(kind, chosen.view)
-    _check_truth(chosen, kind == "motion", [*sources, *chosen.train])
+    _check_for_kind(chosen, kind == "motion", [*sources, *chosen.train])
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
     chosen = completed(chosen, followed if kind == "motion" else None)
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)  # before the work, as a name may be wrong
@@ -116,7 +116,8 @@ def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
     return [(Path(each),) if image else each for each, image in zip(sources, images, strict=True)]
 
 
-def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
+def _check_for_kind(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
+    """Raise InputError for an option of motions' files or of a known truth where there is no such thing."""
     captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
     folders = any(Path(motion).is_dir() for motion in options.train if isinstance(motion, str | Path))
     if options.rate is not None and not (captured or folders):

@@ -32,15 +32,15 @@ from posefit.tracking.pipeline import track_hypothesis, with_notes
 from posefit.tracking.restarts import SEARCHED, TRIAL_FRAMES, TRIAL_STRIDE
 from posefit.tracking.trajectory import Hypothesis
 
-METHOD = "sapso@pca"  # by default: `exemplars` takes longer than a frame lasts, and looks ahead
-LINES, ARRAYS = "frames.jsonl", "poses.npz"
+LIVE_METHOD = "sapso@pca"  # the default: `exemplars` takes longer than a frame lasts, and looks ahead
+FRAMES_FILE, POSES_FILE = "frames.jsonl", "poses.npz"
 
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
     """A tracked frame of a stream."""
 
-    number: int  # in the stream, those counted that were skipped
+    number: int  # in the stream, skipped frames counted
     seconds: float  # from the first frame to this one
     latency: float  # seconds from the frame to its pose
     usable: bool  # whether it shows enough of the person; else its pose is held
@@ -73,7 +73,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         if not declared(each).live and getattr(chosen, each.name) != each.default:
             raise InputError(f"{each.name} must be left out with live, got {getattr(chosen, each.name)}")
     if chosen.method is None or isinstance(chosen.method, str):
-        chosen = chosen.changed(method=str(method_names(chosen.method or METHOD)))
+        chosen = chosen.changed(method=str(method_names(chosen.method or LIVE_METHOD)))
     chosen = completed(chosen.changed(body_frames=0, smooth=False), None)
     clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
@@ -150,7 +150,7 @@ def write_live(
     if folder is not None:
         folder.mkdir()
     try:
-        with (Path(os.devnull) if folder is None else folder / LINES).open("w", encoding="utf-8") as lines:
+        with (Path(os.devnull) if folder is None else folder / FRAMES_FILE).open("w", encoding="utf-8") as lines:
             for live in frames:
                 latencies.append(live.latency)
                 last = live.number
@@ -161,9 +161,9 @@ def write_live(
         pass
     finally:
         if folder is not None:
-            rows = [json.loads(line) for line in (folder / LINES).read_text("utf-8").splitlines()]
+            rows = [json.loads(line) for line in (folder / FRAMES_FILE).read_text("utf-8").splitlines()]
             np.savez_compressed(
-                folder / ARRAYS,
+                folder / POSES_FILE,
                 frames=np.array([row["frame"] for row in rows], dtype=np.int64),
                 seconds=np.array([row["seconds"] for row in rows]),
                 poses=np.radians([row["pose_degrees"] for row in rows]).reshape(-1, 66),

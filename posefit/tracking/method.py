@@ -32,7 +32,8 @@ from posefit.tracking.options import TrackOptions
 
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR = "pca"
-DEFAULT_START, BLIND = "lookup", "blind"  # where it is installed; for none
+DEFAULT_START = "lookup"  # what guesses the first pose, where it is installed
+BLIND = "blind"  # the name of no such guess
 
 
 class MethodNames(NamedTuple):
@@ -81,11 +82,11 @@ class Method:
     """A method ready to track: its prior has learned, and `build` makes a tracker of a task."""
 
     name: str
-    prior: Prior | None  # of a tracker of its own, None
+    prior: Prior | None  # None for a tracker that is a plugin itself
     settings: dict[str, dict[str, Any]]
     looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
     relocalise_gap: int  # frames of a gap in footage after which it relocalises, 0 for never
-    audit: Audit  # of what its trackers report: grows while they do
+    audit: Audit  # what its trackers reported wrongly so far
     build: Callable[[Task], Tracker] = field(repr=False)
     start: InitialiserFactory | None = field(default=None, repr=False)  # guesses first poses; None for blind searches
 
@@ -94,7 +95,7 @@ class Method:
         return drive(self.build(task), task, observations, rng, self.audit)
 
     def dimensions(self, task: Task) -> int | None:
-        """Return how many coordinates a proposal has; None of a tracker of its own, which need not have any."""
+        """Return how many coordinates a proposal has; None for a tracker that is a plugin itself."""
         if self.prior is None:
             return None
         return 3 + 3 * (task.translation == "searched") + len(self.prior.low)
@@ -134,9 +135,16 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         return SynthesisTracker(task, learned, optimiser_of, optimiser.next_frame, prediction, tilt)
 
     label = f"{optimiser.name}@{name}"
-    audit = Audit(label, prediction.beta)
-    start = start_of(prediction.start)
-    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build, start)
+    return Method(
+        name=label,
+        prior=learned,
+        settings=plugin_settings,
+        looks_ahead=False,
+        relocalise_gap=prediction.relocalise_gap,
+        audit=Audit(label, prediction.beta),
+        build=build,
+        start=start_of(prediction.start),
+    )
 
 
 def start_of(name: str | None = None) -> InitialiserFactory | None:
@@ -165,15 +173,16 @@ def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequenc
     not among `offers` or a setting that it does not know, or where a value does not fit.
     """
     places = places_of(offers)
-    each: dict[str, dict[str, Any]] = {name: {} for name in places}
+    by_plugin: dict[str, dict[str, Any]] = {name: {} for name in places}
     stated = isinstance(values, Mapping)  # else texts, whose values are to be parsed
-    for key, value in values.items() if isinstance(values, Mapping) else map(_assignment, values):
+    items: Iterable[tuple[str, Any]] = values.items() if isinstance(values, Mapping) else map(_assignment, values)
+    for key, value in items:
         name, setting = _owner(key, places)
-        if setting in each[name]:
+        if setting in by_plugin[name]:
             raise InputError(f"a setting must be given once, got {quoted(key)} twice")
-        each[name][setting] = value
+        by_plugin[name][setting] = value
     checked = settings.check if stated else settings.parse
-    return {kind: checked(name, factory, each[name]) for name, (kind, factory) in places.items()}
+    return {kind: checked(name, factory, by_plugin[name]) for name, (kind, factory) in places.items()}
 
 
 def _assignment(text: str) -> tuple[str, str]:
@@ -209,9 +218,16 @@ def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> 
             tracker: Tracker = offer.factory(task, **plugin_settings)
         return tracker
 
-    gap = 0 if offer.looks_ahead else RELOCALISE_GAP
-    audit = Audit(offer.label, beta)
-    return Method(offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, audit, build, start_of())
+    return Method(
+        name=offer.name,
+        prior=None,
+        settings={"tracker": plugin_settings},
+        looks_ahead=offer.looks_ahead,
+        relocalise_gap=0 if offer.looks_ahead else RELOCALISE_GAP,
+        audit=Audit(offer.label, beta),
+        build=build,
+        start=start_of(),
+    )
 
 
 def _rules(offer: Offer) -> AbstractContextManager[None]:

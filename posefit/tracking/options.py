@@ -46,7 +46,7 @@ class Option(NamedTuple):
     repeated: bool = False  # whether the flag may be given several times
     identifies: bool = True  # whether a track that goes on must have the same value
     heading: str = ""  # in the help, of this option and those below it
-    live: bool = True  # whether it makes sense for frames that come one by one
+    live: bool = True  # whether `posefit track --live` takes it
 
 
 def option(default: Any, text: str, *more: Any, **others: Any) -> Any:
@@ -140,7 +140,7 @@ def _sources(name: str, value: Any) -> Sequence[Any]:
 
 
 def text_size(text: str) -> tuple[int, int]:
-    """Return the width and the height of a text WxH. Raises InputError where it is none."""
+    """Return the width and the height that a text WxH states. Raises InputError for any other text."""
     width, _, height = text.lower().partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise InputError(f"expected WIDTHxHEIGHT such as 320x240, got {quoted(text)}")
@@ -148,7 +148,7 @@ def text_size(text: str) -> tuple[int, int]:
 
 
 def text_range(text: str) -> tuple[int | None, int | None]:
-    """Return the ends of a text A:B, either of which may be left out. Raises InputError where it is none."""
+    """Return the ends that a text A:B states; either may be left out. Raises InputError for any other text."""
     start, colon, stop = text.partition(":")
     try:
         if colon:
@@ -159,7 +159,7 @@ def text_range(text: str) -> tuple[int | None, int | None]:
 
 
 def text_label(text: str) -> int:
-    """Return the number that a label is: 15, or 0x800000 for a colour. Raises InputError where it is none."""
+    """Return the number of a label such as 15, or 0x800000 for a colour. Raises InputError for any other text."""
     try:
         return int(text, 0)
     except ValueError:
@@ -167,7 +167,7 @@ def text_label(text: str) -> int:
 
 
 def text_person(text: str) -> "Choice":
-    """Return the number of a person of a text N, or the place of one of X,Y. Raises InputError where it is neither."""
+    """Return the number of a person, for a text N, or their place, for X,Y. Raises InputError for any other text."""
     parts = text.split(",")
     try:
         return int(text) if len(parts) == 1 else (float(parts[0]), float(parts[1]))
@@ -239,6 +239,7 @@ class TrackOptions:
         parse=text_person,
         live=False,
     )
+    # the options above say how a source is looked at, see `VIEW`
     method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(
         None,
         "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or annealed@pca "
@@ -328,4 +329,4 @@ class TrackOptions:
 
 
 _NAMES = [each.name for each in fields(TrackOptions)]
-VIEW = _NAMES[: _NAMES.index("method")]  # how a source is looked at: see `TrackOptions.view`
+VIEW = _NAMES[: _NAMES.index("method")]  # the options that `TrackOptions.view` holds

@@ -101,7 +101,7 @@ def best_restart(
     follow: Follow,
     restarts: int,
     seed: int | Sequence[int],
-    going_on: Task | None = None,
+    continuation: Task | None = None,
     log: Callable[[str], None] = lambda _message: None,
 ) -> tuple[Task, list[Frame]]:
     """Return the task with the best of several restarts as the frame before the first, and all frames of the trial.
@@ -110,8 +110,8 @@ def best_restart(
     guessed, anywhere, at all yaws where none is known. It then follows the person through a few more frames. The least
     mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution, and the first
     frame is then searched once more in the whole one, around the best. Where there is only one frame, it has the
-    posterior of where all searches ended. A task that is `going_on` is followed beside the restarts, and is returned
-    where none of them is better. `log` takes where they search.
+    posterior of where all searches ended. The `continuation` of a track is followed beside the restarts, and returned
+    where none of them is better. `log` gets a line that says where they search.
     """
     chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
@@ -123,10 +123,10 @@ def best_restart(
         ]
         compared = [replace(observation, silhouettes=small) for observation, small in zip(chosen, masks, strict=True)]
     prefix = [seed] if isinstance(seed, int) else [*seed]
-    best, least, tried = going_on or task, np.inf, list[Frame]()
-    if going_on is not None:
-        on = replace(going_on, fps=trial.fps, cameras=trial.cameras)
-        tried += follow(on, compared, np.random.default_rng([*prefix, restarts + 1]))
+    best, least, tried = continuation or task, np.inf, list[Frame]()
+    if continuation is not None:
+        compared_task = replace(continuation, fps=trial.fps, cameras=trial.cameras)
+        tried += follow(compared_task, compared, np.random.default_rng([*prefix, restarts + 1]))
         least = _trial_cost(tried)
     modes = [mode for weight, mode in guessed_modes(task, chosen[0])[:restarts] if weight >= MIN_WEIGHT]
     where = f"around {counted(len(modes), 'pose')} with such a silhouette" if modes else "anywhere"
@@ -137,7 +137,7 @@ def best_restart(
         if (cost := _trial_cost(frames)) < least:
             best, least = after(task, frames[0]), cost
     posterior = posterior_of(tried) if len(chosen) == 1 else None
-    if factor > 1 and best is not (going_on or task):
+    if factor > 1 and best is not (continuation or task):
         tried.append(next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts]))))
         best = after(task, tried[-1])
     if posterior is not None and best.before:
@@ -316,16 +316,16 @@ def retrack_spins(
     first, last = stay = best_ends(frames, *max(every, key=lambda run: run[1] - run[0]), task.fps)
     steady = replace(task, fastest_turn=MAX_TURN_RATE)
 
-    def again(number: int, steady: Task, rows: range) -> list[Frame]:
-        """Return the frames after the first of some rows, followed from there."""
+    def followed_from(number: int, steady: Task, rows: range) -> list[Frame]:
+        """Return the frames of some rows but the first, followed from that one."""
         if len(rows) == 1:
             return []
         start = replace(after(steady, frames[rows[0]]), before=())
-        followed = list(follow(start, (observations[k] for k in rows), stream(seed, "spin", number)))
-        return joined(task.body.skeleton, followed, frames[rows[0]])[1:]
+        tracked_again = list(follow(start, (observations[k] for k in rows), stream(seed, "spin", number)))
+        return joined(task.body.skeleton, tracked_again, frames[rows[0]])[1:]
 
-    ahead = again(0, steady, range(last, len(frames)))
-    behind = again(1, reversed_task(steady), range(first, -1, -1))
+    ahead = followed_from(0, steady, range(last, len(frames)))
+    behind = followed_from(1, reversed_task(steady), range(first, -1, -1))
     new = [*behind[::-1], *frames[first : last + 1], *ahead]
     cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
     better = cheap and spins(new) < before

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS, LIMBS, turns_of
+from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.geometry.symmetry import turned_poses
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
@@ -54,7 +54,7 @@ def test_what_steps_cost_by_hand() -> None:
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
     # nobody in the training clips walks with such arms
     walk, other = built_in.motion("walk-a", frames=12), built_in.motion("jump", frames=40)
-    arms = np.concatenate([turns_of(LIMBS["left arm"]), turns_of(LIMBS["right arm"])])
+    arms = np.concatenate([angles_of(LIMBS["left arm"]), angles_of(LIMBS["right arm"])])
     poses = walk.poses.copy()
     poses[:, arms] = other.poses[14:26, arms]
     scene = walk_of(replace(walk, name="both", poses=poses), (0.0, 70.0))

@@ -8,7 +8,7 @@ import posefit
 from posefit.fitting.box import Start, draw_population
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.fitting.start import APART, SPREAD, modes_apart, start_in
+from posefit.fitting.start import MODE_RADIUS, MODE_SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
 from posefit.testing.toy import Toy
@@ -46,7 +46,7 @@ def test_poses_near_each_other_are_one_mode_with_the_sum_of_their_weights() -> N
     modes = modes_apart(WALK.skeleton, both)
     assert sorted(weight for weight, _ in modes) == [0.5, 0.5]
     assert sorted(len(mode) for _, mode in modes) == [1, 2]
-    assert 0.1 < APART < 0.4  # a body that is turned by half a circle is farther from itself
+    assert 0.1 < MODE_RADIUS < 0.4  # a body that is turned by half a circle is farther from itself
 
 
 def problem_of(row: int, turn: float) -> PoseProblem:
@@ -69,7 +69,7 @@ def test_modes_are_projected_onto_the_latents_of_the_prior_and_weighed_by_their_
         np.testing.assert_allclose(np.cos(pose[0] - WALK.poses[row, 0] - turn), 1.0)
         projected = PRIOR.inverse_transform(PRIOR.transform(WALK.poses[row : row + 1, 3:]))[0]
         np.testing.assert_allclose(pose[3:], projected, atol=1e-9)
-        np.testing.assert_array_equal(mode.spread, np.full(SPACE.dimensions, SPREAD))
+        np.testing.assert_array_equal(mode.spread, np.full(SPACE.dimensions, MODE_SPREAD))
 
 
 def test_a_mode_is_around_its_pose_that_costs_least() -> None:

@@ -40,11 +40,11 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     from posefit.footage.video import Video
     from posefit.geometry.calibration import read_calibrations, upright
     from posefit.motion.amc import read_amc
-    from posefit.motion.asf import read_asf
+    from posefit.motion.asf import parse_asf
     from posefit.motion.bvh import read_bvh
     from posefit.sweep import plan
 
-    skeleton = read_asf(folder / "a.asf")
+    skeleton = parse_asf(folder / "a.asf").skeleton
     plan.MAX_CELLS = CELLS
 
     def masks(path: Path) -> object:
@@ -68,7 +68,7 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         return filmed.warnings, [image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)]
 
     return {
-        "asf": read_asf,
+        "asf": parse_asf,
         "amc": lambda path: read_amc(path, skeleton).resampled(30.0),
         "bvh": lambda path: read_bvh(path).resampled(30.0),
         "masks": masks,

@@ -20,10 +20,10 @@ from posefit.geometry.skeleton import (
     SIDES,
     Skeleton,
     angle_index,
+    angles_of,
     both,
     kind,
     side,
-    turns_of,
 )
 from posefit.motion.built_in import average_skeleton
 from tests.cases import each
@@ -115,7 +115,7 @@ def test_the_limbs_and_the_torso_are_all_bones_once() -> None:
 def test_a_limbs_angles_move_all_of_its_bones_and_no_other(name: str) -> None:
     skeleton = average_skeleton()
     pose = np.zeros(66)
-    pose[turns_of(LIMBS[name])] = 0.3
+    pose[angles_of(LIMBS[name])] = 0.3
     moved = np.abs(skeleton.joints(pose) - skeleton.joints(np.zeros(66))).max(axis=1) > 1e-9
     assert set(np.flatnonzero(moved[1:])) == {BONES.index(bone) for bone in LIMBS[name]}
 

@@ -16,7 +16,7 @@ from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Skel
 from posefit.geometry.units import CMU_UNIT
 from posefit.motion import recorded
 from posefit.motion.amc import read_amc, read_clip, write_amc
-from posefit.motion.asf import read_asf, write_asf
+from posefit.motion.asf import parse_asf, write_asf
 from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about, chained
@@ -60,7 +60,7 @@ def amc_text(*frames: str) -> str:
 def skeleton(tmp_path: Path) -> Skeleton:
     path = tmp_path / "small.asf"
     path.write_text(asf_text())
-    return read_asf(path)
+    return parse_asf(path).skeleton
 
 
 def amc_file(folder: Path, text: str) -> Path:
@@ -125,7 +125,7 @@ def test_a_skeleton_by_hand(skeleton: Skeleton, tmp_path: Path) -> None:
     np.testing.assert_allclose(skeleton.offsets[BONES.index("lfemur")], [0.0, -4 * 0.0254 / 0.45, 0.0], atol=1e-12)
     np.testing.assert_allclose(skeleton.axes[7], turn(0.0, 0.0, 20.0), atol=1e-12)
     (tmp_path / "rad.asf").write_text(asf_text(angle="rad", turn=repr(np.pi / 9)))
-    np.testing.assert_allclose(read_asf(tmp_path / "rad.asf").axes, skeleton.axes, atol=1e-12)
+    np.testing.assert_allclose(parse_asf(tmp_path / "rad.asf").skeleton.axes, skeleton.axes, atol=1e-12)
     names = [bone for bone, _ in skeleton.channels]  # in the file's order, those of bones outside the tree, too
     assert set(names) == set(DOF)
     assert names.index("lfemur") < names.index("ltibia") < names.index("ltoes")
@@ -151,7 +151,7 @@ def test_mistakes_in_a_skeleton_are_named(tmp_path: Path, before: str, after: st
     path = tmp_path / "small.asf"
     path.write_text(asf_text().replace(before, after, 1))
     with pytest.raises(ValueError, match="expected|needs") as caught:
-        read_asf(path)
+        parse_asf(path)
     assert str(tmp_path / "small.asf") in str(caught.value)
     assert message in str(caught.value)
 
@@ -176,7 +176,7 @@ def test_line_ends_blank_lines_and_comments_make_no_difference(skeleton: Skeleto
     for text in (amc_text().replace("\n", "\r\n"), amc_text().replace("\n", " \n\n# caf\u00e9\n"), amc_text().rstrip()):
         np.testing.assert_array_equal(read_amc(amc_file(tmp_path, text), skeleton).poses, plain.poses)
     (tmp_path / "crlf.asf").write_bytes(asf_text().replace("\n", "\r\n").encode())
-    np.testing.assert_array_equal(read_asf(tmp_path / "crlf.asf").offsets, skeleton.offsets)
+    np.testing.assert_array_equal(parse_asf(tmp_path / "crlf.asf").skeleton.offsets, skeleton.offsets)
 
 
 def test_angles_are_unwrapped_along_time(skeleton: Skeleton, tmp_path: Path) -> None:
@@ -230,7 +230,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5))
 def test_any_motion_survives_writing(workshop: Path, seed: int, frames: int) -> None:
-    rng, skeleton = np.random.default_rng(seed), read_asf(workshop / "small.asf")
+    rng, skeleton = np.random.default_rng(seed), parse_asf(workshop / "small.asf").skeleton
     poses = rng.uniform(-1.5, 1.5, (frames, ANGLES)) * skeleton.free
     motion = Motion("any", skeleton, poses, rng.normal(size=(frames, 3)), 120.0)
     write_amc(workshop / "any.amc", motion)
@@ -279,7 +279,9 @@ def test_a_unit_that_makes_no_person_is_recognised_and_said(tmp_path: Path, stat
     np.testing.assert_allclose(motion.joints, walk.joints, atol=1e-9)
     (note,) = motion.notes
     assert "the CMU database's unit (5.64 cm): 1.7" in note
-    assert Body.of(read_asf(tmp_path / "a.asf", "inch")).stature == pytest.approx(0.45 * Body.of(walk.skeleton).stature)
+    assert Body.of(parse_asf(tmp_path / "a.asf", "inch").skeleton).stature == pytest.approx(
+        0.45 * Body.of(walk.skeleton).stature
+    )
 
 
 def test_an_amc_may_have_another_axis_up(tmp_path: Path) -> None:

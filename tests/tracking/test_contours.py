@@ -116,7 +116,7 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     poses = estimate_of(motion).poses
     changes, places = growth(body, body.stature, replace(motion, poses=poses)), motion.translations
     views = [MaskContours.of(camera, k, scene.observations, places) for k, camera in enumerate(scene.cameras)]
-    curves, slopes, mixed, factor_curve, factor_slope = contour_squares(body, views, poses, places, 0.09, changes)
+    curves, slopes, mixed, factor_hessian, factor_gradient = contour_squares(body, views, poses, places, 0.09, changes)
     expected = np.zeros((3, 69 + len(NAMES), 69 + len(NAMES))), np.zeros((3, 69 + len(NAMES)))
     grown = [shaped(body, np.exp(STEP * row), body.stature) for row in np.eye(len(NAMES))]
     for k in range(3):
@@ -131,10 +131,10 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     scale = np.abs(expected[0]).max()
     np.testing.assert_allclose(curves, expected[0][:, :69, :69][:, free][:, :, free], atol=1e-3 * scale)
     np.testing.assert_allclose(mixed, expected[0][:, :69, 69:][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(factor_curve, expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(factor_hessian, expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
     scale = np.abs(expected[1]).max()
     np.testing.assert_allclose(slopes, expected[1][:, :69][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(factor_slope, expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(factor_gradient, expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
 
 
 def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:

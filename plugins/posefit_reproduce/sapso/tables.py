@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.evaluation.measures import BASELINES
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import turns_of
+from posefit.geometry.skeleton import angles_of
 from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
 from posefit_reproduce.experiment import Claim, Results, Table, bounded, claims_table, interval
@@ -19,7 +19,7 @@ from posefit_reproduce.sapso.motions import LABELS as MOTIONS
 from posefit_reproduce.sapso.motions import PaperMotion
 
 # LFemur, RFemur, LKnee, RKnee: an Acclaim knee has one angle, the other two are padding that cannot err
-ANGLES = turns_of(("lfemur", "rfemur", "ltibia", "rtibia"))
+ANGLES = angles_of(("lfemur", "rfemur", "ltibia", "rtibia"))
 # bounds that are ours, where the paper gives none
 HIGH_FRAMES, FEW_JOINTS = 0.9, 3  # the quantile from which a frame's error is high, and how many joints are a few
 SWAPPED = 0.01  # share of frames with left and right exchanged that still counts as none

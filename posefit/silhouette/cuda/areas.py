@@ -40,7 +40,7 @@ def areas_on_device(
 
     for k, first in enumerate(range(0, len(poses), PART)):
         part, stream = slice(first, first + PART), streams[k % 2]
-        there, where = (cuda.to_device(one[part], stream=stream) for one in (poses, translations))
+        there, where = (cuda.to_device(values[part], stream=stream) for values in (poses, translations))
         waiting.append((part, launched(drawing, there, where, stream), stream))
         if len(waiting) == len(streams):
             collect()
@@ -73,5 +73,5 @@ def drawing_on_device(body: Body, camera: Camera, silhouette: Silhouette) -> tup
 def _there(owner: Any, arrays: Callable[[], Sequence[Any]]) -> Sequence[Any]:
     """Return the arrays of an owner on the device, given to it at the first call."""
     if owner not in _held:
-        _held[owner] = tuple(cuda.to_device(np.array(one, order="C")) for one in arrays())
+        _held[owner] = tuple(cuda.to_device(np.array(array, order="C")) for array in arrays())
     return _held[owner]

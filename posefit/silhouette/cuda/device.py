@@ -34,7 +34,7 @@ def _missing() -> str | None:
 def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
     """Return the silhouette on a device, "cpu" or "cuda": poses that are compared with it are drawn and counted there.
 
-    Raises ValueError where there is no such device.
+    Raises InputError where there is no such device.
     """
     check_device(device)
     if device == silhouette.device:

@@ -22,6 +22,12 @@ from posefit.silhouette.cost import BETA, pose_costs
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
 
 FACTOR_DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
+ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
+ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
+CONTOUR_ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
+MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor
+BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
+CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
 def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Array]:
@@ -31,14 +37,6 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
     joints = [grown.skeleton.joints(motion.poses, motion.translations) - here for grown in bodies]
     radii = [grown.radii - body.radii for grown in bodies]
     return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(radii) / FACTOR_DIFFERENCE
-
-
-ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
-ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
-CONTOUR_ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
-MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor
-BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
-CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,32 +112,32 @@ def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], b
 
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
-    """Return a window after a step of Gauss and Newton to the borders of all views."""
+    """Return a window after a Gauss-Newton step to the borders of all views."""
     fitted, estimate, factors, spread = part.fitted, part.estimate, len(part.factors), part.spread
     angles = np.flatnonzero(fitted.skeleton.free).tolist()
     poses, places, numbers = fitted.poses, fitted.translations, 3 + len(angles)
     grown = growth(part.body, part.height, fitted) if factors else None
-    curves, slopes, mixed, curve, slope = contour_squares(part.body, borders, poses, places, scale, grown)
-    squares, some, changes = Squares(len(fitted), numbers), slice(3, numbers), np.zeros(factors)
-    squares.add(slice(None), curves, slopes)
+    hessians, gradients, mixed, hessian, gradient = contour_squares(part.body, borders, poses, places, scale, grown)
+    squares, of_angles, changes = Squares(len(fitted), numbers), slice(3, numbers), np.zeros(factors)
+    squares.add(slice(None), hessians, gradients)
     add_root(squares, estimate, part.visibility, CONTOUR_ROOT_DEVIATION, places - estimate.translations)
     change = wrapped(poses - estimate.poses)[:, angles]
-    squares.add(some, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
-    squares.add_bends(some, change, fitted.fps**2 / ANGLE_ACCELERATION)
+    squares.add(of_angles, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
+    squares.add_bends(of_angles, change, fitted.fps**2 / ANGLE_ACCELERATION)
     add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.viewpoints), angles)
     if not factors:
         steps = squares.least()
     else:
-        solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
+        solved = squares.steps_for(np.concatenate([squares.gradients[..., None], mixed], axis=2))
         steps, by_factor = solved[..., 0], solved[..., 1:]
         held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
         known = held * PRECISION
-        curve = curve + known - np.einsum("tni,tnj->ij", mixed, by_factor)
-        slope = slope + known @ part.factors - np.einsum("tni,tn->i", mixed, steps)
-        changes = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
+        hessian = hessian + known - np.einsum("tni,tnj->ij", mixed, by_factor)
+        gradient = gradient + known @ part.factors - np.einsum("tni,tn->i", mixed, steps)
+        changes = np.clip(np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
         changes = part.factors - np.clip(part.factors - changes, -REACH * SPREAD, REACH * SPREAD)
         steps = steps - by_factor @ changes
-        spread = np.sqrt(held * np.diag(np.linalg.inv(curve)))
+        spread = np.sqrt(held * np.diag(np.linalg.inv(hessian)))
     poses = poses.copy()
     poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
     body = shaped(part.body, np.exp(-changes), part.height) if factors else part.body

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import turns_of
+from posefit.geometry.skeleton import angles_of
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, low, runs
 from posefit.silhouette.cost import only_camera
@@ -23,28 +23,28 @@ SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
 
 
 class Squares:
-    """Half the second derivative and half the gradient of a sum of squares, in T frames of n numbers each."""
+    """Half the Hessian and half the gradient of a sum of squares, in T frames of n numbers each."""
 
     def __init__(self, frames: int, numbers: int) -> None:
         # a frame with itself, with the next one, and with the one after that
-        self.curves = np.zeros((BAND_REACH + 1, frames, numbers, numbers))
-        self.slopes = np.zeros((frames, numbers))
+        self.hessians = np.zeros((BAND_REACH + 1, frames, numbers, numbers))
+        self.gradients = np.zeros((frames, numbers))
 
-    def add(self, which: slice, precise: Array, slopes: Array) -> None:
+    def add(self, which: slice, precise: Array, gradients: Array) -> None:
         """Add squares of some numbers of each frame: their precision (m, m) or (T, m, m), and its product (T, m)."""
-        self.curves[0, :, which, which] += precise
-        self.slopes[:, which] += slopes
+        self.hessians[0, :, which, which] += precise
+        self.gradients[:, which] += gradients
 
     def add_bends(self, which: slice, series: Array, weight: float) -> None:
         """Add the squares of `weight` times the second differences of some numbers, which are now `series` (T, m)."""
         bends = weight**2 * np.diff(series, 2, axis=0)
-        count, some = len(series), np.arange(which.start, which.stop)
+        count, diagonal = len(series), np.arange(which.start, which.stop)
         for first in range(3):
             frames = slice(first, count - 2 + first)
-            self.slopes[frames, which] += SECOND_DIFFERENCE[first] * bends
+            self.gradients[frames, which] += SECOND_DIFFERENCE[first] * bends
             for second in range(first, 3):
                 square = weight**2 * SECOND_DIFFERENCE[first] * SECOND_DIFFERENCE[second]
-                self.curves[second - first, frames, some, some] += square
+                self.hessians[second - first, frames, diagonal, diagonal] += square
 
     def add_steps(self, frames: NDArray[np.int64], series: Array, derivatives: Array, weight: float) -> None:
         """Add the squares of `weight` times the changes of `series` (T, m) from some frames to the next ones.
@@ -55,21 +55,21 @@ class Squares:
             return
         steps = weight**2 * (series[frames + 1] - series[frames])
         here, there = derivatives[frames], derivatives[frames + 1]
-        self.slopes[frames] -= np.einsum("kmn,km->kn", here, steps)
-        self.slopes[frames + 1] += np.einsum("kmn,km->kn", there, steps)
-        self.curves[0, frames] += weight**2 * np.einsum("kmi,kmj->kij", here, here)
-        self.curves[0, frames + 1] += weight**2 * np.einsum("kmi,kmj->kij", there, there)
-        self.curves[1, frames] -= weight**2 * np.einsum("kmi,kmj->kij", here, there)
+        self.gradients[frames] -= np.einsum("kmn,km->kn", here, steps)
+        self.gradients[frames + 1] += np.einsum("kmn,km->kn", there, steps)
+        self.hessians[0, frames] += weight**2 * np.einsum("kmi,kmj->kij", here, here)
+        self.hessians[0, frames + 1] += weight**2 * np.einsum("kmi,kmj->kij", there, there)
+        self.hessians[1, frames] -= weight**2 * np.einsum("kmi,kmj->kij", here, there)
 
     def least(self) -> Array:
         """Return the step (T, n) to subtract from the numbers, so that the sum is least."""
-        return self.steps_for(self.slopes[..., None])[..., 0]
+        return self.steps_for(self.gradients[..., None])[..., 0]
 
-    def steps_for(self, slopes: Array) -> Array:
+    def steps_for(self, gradients: Array) -> Array:
         """Return the steps (T, n, m) for each of m other gradients (T, n, m)."""
         from scipy.linalg import solveh_banded
 
-        _, count, numbers, _ = self.curves.shape
+        _, count, numbers, _ = self.hessians.shape
         band = (BAND_REACH + 1) * numbers
         lines = np.zeros((band, count * numbers))  # scipy's upper form: lines[band - 1 + row - column, column]
         for apart in range(BAND_REACH + 1):
@@ -77,10 +77,10 @@ class Squares:
                 for column in range(numbers):
                     off = apart * numbers + column - row
                     if off >= 0:
-                        values = self.curves[apart, : count - apart, row, column]
+                        values = self.hessians[apart, : count - apart, row, column]
                         lines[band - 1 - off, apart * numbers + column :: numbers] = values
-        steps = solveh_banded(lines, slopes.reshape(count * numbers, -1), check_finite=False)
-        return np.asarray(steps).reshape(slopes.shape)
+        steps = solveh_banded(lines, gradients.reshape(count * numbers, -1), check_finite=False)
+        return np.asarray(steps).reshape(gradients.shape)
 
 
 STANDING_SPEED = 0.25  # metres a second that a standing foot may seem to move
@@ -135,12 +135,12 @@ LEG_DEVIATION = np.radians(3.0)  # that an angle of a leg may be off the estimat
 LEG_ACCELERATION = np.radians(400.0)  # a second squared, of that difference
 STANDING_SLIDE = 0.004  # metres that a foot which stands may move in a thirtieth of a second
 OUTLIER_DEVIATIONS = 4.0  # standard deviations from the estimate beyond which a place is weighted down
-GAUSS_NEWTON_STEPS = 4  # of Gauss and Newton
+GAUSS_NEWTON_STEPS = 4
 ANGLE_DIFFERENCE = 1e-4  # radians: of a difference quotient
 PATH_WINDOW, PATH_OVERLAP = 900, 60  # frames that are solved for at once, and those that two windows share
 
-# the angles of both
-LEGS = tuple(turns_of([side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]).tolist())
+# places in a pose of the angles of both legs
+LEGS = tuple(angles_of([side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]).tolist())
 
 
 @dataclass(frozen=True, eq=False)

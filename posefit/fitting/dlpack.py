@@ -10,16 +10,16 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.reading import quoted
 
-CPU = 1  # DLPack's number of it
+CPU = 1  # DLPack's number of this device
 
 
-def exchanged(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
-    """Return values as NumPy has them, and what turns results (n,) into an array of the library they came from.
+def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
+    """Return values as a NumPy array, and the function that turns results (n,) into an array of the values' library.
 
-    An array on the CPU is not copied. One on another device is copied from it, and results to it. Results have the
-    values' type where that is a floating one: float32 of JAX or PyTorch gives float32. What has no `__dlpack__`, and
-    NumPy's own, stays as it is, and so do its results. Raises InputError, beginning with the name, for an array without
-    numbers to read: one that is traced (`jit`, `vmap`) or needs a gradient.
+    An array on the CPU is not copied; one on another device is copied from there, and its results back to it. Results
+    have the values' type where that is a floating one: float32 of JAX or PyTorch gives float32. NumPy's arrays, and
+    whatever has no `__dlpack__`, are returned as they are, and so are their results. Raises InputError, beginning with
+    the name, for an array without numbers to read: one that is traced (`jit`, `vmap`) or needs a gradient.
     """
     if isinstance(values, np.ndarray | np.generic) or not hasattr(values, "__dlpack__"):
         return values, lambda results: results
@@ -36,6 +36,6 @@ def exchanged(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
     else:  # PyTorch
         library = sys.modules[type(values).__module__.partition(".")[0]]
     kind = array.dtype if array.dtype.kind == "f" else np.dtype(np.float64)
-    # CuPy takes its current device
+    # CuPy has no argument for the device: it uses the current one
     place = {} if here or library.__name__ == "cupy" else {"device": values.device}
     return array, lambda results: library.asarray(results.astype(kind, copy=False), **place)

@@ -11,7 +11,7 @@ import pytest
 import posefit
 import posefit_envs
 from posefit.errors import InputError
-from posefit.fitting.exchange import exchanged
+from posefit.fitting.dlpack import as_numpy
 from tests.cases import each
 
 DRAWN = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 9))
@@ -20,7 +20,7 @@ KINDS = [(name, kind) for name in LIBRARIES for kind in ("float32", "float64")]
 KINDS = [case for case in KINDS if case != ("jax.numpy", "float64")]  # JAX has it only where a process asks for it
 
 
-def as_numpy(library: Any, values: Any) -> np.ndarray:
+def in_numpy(library: Any, values: Any) -> np.ndarray:
     """Return an array of a library as NumPy's, by the library's own method where it has one."""
     return np.asarray(values.numpy() if library.__name__ == "torch" else np.from_dlpack(values))
 
@@ -34,7 +34,7 @@ def test_costs_come_back_in_the_callers_library_and_type_with_numpys_bits(name: 
         costs, expected = evaluate(problem)(array), evaluate(numpys)(DRAWN.astype(kind))
         assert type(costs) is type(array)
         assert costs.dtype == array.dtype
-        assert np.array_equal(as_numpy(library, costs), expected.astype(kind))
+        assert np.array_equal(in_numpy(library, costs), expected.astype(kind))
     assert problem(array[0, :]) == numpys(DRAWN[0].astype(kind))
     assert np.array_equal(problem.trace, numpys.trace)
 
@@ -42,7 +42,7 @@ def test_costs_come_back_in_the_callers_library_and_type_with_numpys_bits(name: 
 @each("name", ["array_api_strict", "torch"])
 def test_an_array_on_the_cpu_is_not_copied(name: str) -> None:
     array = pytest.importorskip(name).asarray(DRAWN.copy())
-    values, back = exchanged("proposals", array)
+    values, back = as_numpy("proposals", array)
     assert values.ctypes.data == np.from_dlpack(array).ctypes.data
     results = np.arange(3.0)
     assert np.from_dlpack(back(results)).ctypes.data == results.ctypes.data
