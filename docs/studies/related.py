@@ -81,7 +81,6 @@ def methods(rows: Sequence[Row]) -> Iterator[str]:
         for row in mine:
             _, cameras, _, clean = condition_of(row)
             split[cameras == 1, clean].append(row[WORSE])
-        angles = np.median([row["error_degrees"]["mean"] for row in mine])
         medians = [
             np.median([row[WORSE] for row in mine]),
             *(np.median(some) if some else None for some in split.values()),
@@ -89,9 +88,9 @@ def methods(rows: Sequence[Row]) -> Iterator[str]:
         lost = percent(float(np.mean([row["lost_rate"] for row in mine])))
         figures = [number(WORSE, None if median is None else float(median)) for median in medians]
         cpu = number(SLOWER, float(np.median([row[SLOWER] for row in mine])))
-        cells.append([f"`{name}`", number("error_degrees", float(angles)), figures[0], lost, *figures[1:], cpu])
-    cells.sort(key=lambda cell: float(cell[2].replace(",", "")))
-    heads = ["method", head_of("error_degrees"), head_of(WORSE), head_of("lost_rate"), *parts, head_of(SLOWER)]
+        cells.append([f"`{name}`", figures[0], lost, *figures[1:], cpu])
+    cells.sort(key=lambda cell: float(cell[1].replace(",", "")))
+    heads = ["method", head_of(WORSE), head_of("lost_rate"), *parts, head_of(SLOWER)]
     yield from markdown(heads, cells)
 
 
@@ -140,14 +139,15 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
     for sentence in SENTENCES:
         pairs = paired(rows, sentence.method, sentence.reference, sentence.figure)
         what = f"`{sentence.method}` less `{sentence.reference}`, {head_of(sentence.figure)}"
-        cells = ["", "", "open"]
+        cell = "open"
         if pairs:
             strata = [condition[0] for condition, _ in pairs]
             values = [MEASURES[sentence.figure].factor * value for value in pairs.values()]
-            cells = list(difference(values, strata, [condition for condition, _ in pairs]))
-        lines.append([sentence.says, what, str(len(pairs)), cells[2], *cells[:2]])
-    heads = ["the paper says", "compared, above 0 if so", "pairs", "verdict", "effect", "95 % interval"]
-    yield from markdown(heads, lines, words=3)
+            mean, interval, verdict = difference(values, strata, [condition for condition, _ in pairs])
+            cell = f"**{verdict}** {mean} ({interval})"
+        lines.append([sentence.says, what, str(len(pairs)), cell])
+    heads = ["the paper says", "compared, above 0 if so", "n", "verdict"]
+    yield from markdown(heads, lines, words=4)
 
 
 @click.command(cls=Command, help=__doc__)
