@@ -76,4 +76,6 @@ def test_colours_have_contrast_with_their_background_in_light_and_dark():
                     name,
                     colour,
                 )
-        assert len({colours[f"c{k}"] for k in range(report_page.COLOURS)}) == report_page.COLOURS == len(COLOURS)
+        assert (
+            len({colours[f"c{k}"] for k in range(report_page.COLOUR_COUNT)}) == report_page.COLOUR_COUNT == len(COLOURS)
+        )
