@@ -1,19 +1,22 @@
 """`python -m tests.fuzz --inputs 200000 --seed 1`: exit status 1 where anything but reading and refusing came."""
 
 import argparse
-import multiprocessing
-import signal
+import json
+import os
+import select
+import subprocess
 import sys
-import tempfile
+import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
 
-from pebble import ProcessExpired, ProcessPool
-
-from tests.fuzz import worker
-
-WAIT = 900.0  # seconds of the clock for an input: for what does not run at all
-MEGABYTES = 1_000  # of a process's memory, with everything that it has imported
+SECONDS = 10.0  # of CPU time for an input, as a busy machine gives a process little of it
+WAIT = 900.0  # seconds of the clock, for what does not run at all
+STARTING = 120.0  # seconds for a child to import everything and read the valid files
+MEGABYTES = 1_000  # of a child's memory, with everything that it has imported
 
 
 @dataclass
@@ -22,41 +25,68 @@ class Tally:
 
     counts: Counter[tuple[str, str]] = field(default_factory=Counter)  # of each reader, those read and those refused
     largest: int = 0  # MB
+    longest: float = 0.0  # seconds
     findings: list[str] = field(default_factory=list)
 
     def find(self, finding: str) -> None:
-        """Take what should not have come, and print it at once."""
+        """Take what should not have come, and say so at once."""
         self.findings.append(finding)
         print(finding, file=sys.stderr, flush=True)
 
-    def add(self, number: int, answer: worker.Answer) -> None:
-        """Take what came of an input."""
-        self.counts[answer.reader, answer.outcome] += 1
-        self.largest = max(self.largest, answer.megabytes)
-        if answer.outcome not in ("read", "refused"):
-            self.find(f"{number} {answer.outcome} {answer.reader}: {answer.what}")
-        if answer.megabytes > MEGABYTES:
-            self.find(f"{number} large {answer.reader}: {answer.megabytes} MB")
+    def add(self, number: int, answer: list[object], seconds: float) -> None:
+        """Take what a child says of an input."""
+        how, reader, megabytes, what = str(answer[0]), str(answer[1]), int(str(answer[2])), answer[3]
+        self.counts[reader, how] += 1
+        self.largest, self.longest = max(self.largest, megabytes), max(self.longest, seconds)
+        if how not in ("read", "refused"):
+            self.find(f"{number} {how} {reader}: {what}")
+        if megabytes > MEGABYTES:
+            self.find(f"{number} large {reader}: {megabytes} MB")
+        if seconds > SECONDS:
+            self.find(f"{number} hang {reader}: {seconds:.0f} s")
 
 
-def run(seed: int, numbers: range, workers: int, kinds: str = "") -> Tally:
-    """Return what came of inputs; a process that dies or hangs over one is replaced."""
-    tally, spawn = Tally(), multiprocessing.get_context("spawn")
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        ProcessPool(workers, context=spawn, initializer=worker.start, initargs=(seed, kinds, folder)) as pool,
-    ):
-        futures = {number: pool.schedule(worker.read, [number], timeout=WAIT) for number in numbers}
-        for number, future in futures.items():
-            try:
-                tally.add(number, future.result())
-            except TimeoutError:
-                tally.find(f"{number} hang: no answer for {WAIT:g} s")
-            except ProcessExpired as error:
-                hung = error.exitcode == -signal.SIGPROF
-                came = f"hang: more than {worker.SECONDS:g} s of CPU time" if hung else f"abort: {error}"
-                tally.find(f"{number} {came}")
-    return tally
+def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
+    """Have inputs read by child processes, one after the other where one of them dies or hangs."""
+    start = numbers.start
+    while start < numbers.stop:
+        command = [sys.executable, "-m", "tests.fuzz.worker", str(seed), str(start), str(numbers.stop), kinds]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0) as child:
+            assert child.stdout is not None
+            number, since, patience = start, 0.0, STARTING
+            while ready := _is_heard(child, since + patience):
+                line = child.stdout.readline().decode()
+                if not line:
+                    break
+                if line.endswith("begun\n"):
+                    number, since, patience = int(line.split()[0]), cpu_seconds(child.pid), SECONDS
+                else:
+                    tally.add(number, json.loads(line.partition(" ")[2]), cpu_seconds(child.pid) - since)
+            if not ready:
+                child.kill()
+                tally.find(f"{number} hang: more than {patience:g} s of CPU time, or {WAIT:g} s without an answer")
+            elif status := child.wait():
+                if patience == STARTING:
+                    raise RuntimeError("a child could not read the valid files")
+                tally.find(f"{number} abort: exit status {status}")
+            else:
+                return
+            start = number + 1
+
+
+def cpu_seconds(process: int) -> float:
+    """Return how much CPU time a process has taken."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _is_heard(child: "subprocess.Popen[bytes]", most: float) -> bool:
+    """Return whether a child says something before it has taken so much CPU time, or not run for `WAIT`."""
+    end = time.monotonic() + WAIT
+    while not select.select([child.stdout], [], [], 1.0)[0]:
+        if cpu_seconds(child.pid) > most or time.monotonic() > end:
+            return False
+    return True
 
 
 def main() -> int:
@@ -67,14 +97,23 @@ def main() -> int:
     parser.add_argument("--only", type=int, help="one input alone, by its number")
     parser.add_argument("--readers", default="", help="some alone, such as rows,frames")
     parser.add_argument("--workers", type=int, default=1)
-    options = parser.parse_args()
-    numbers = range(options.inputs) if options.only is None else range(options.only, options.only + 1)
-    tally = run(options.seed, numbers, options.workers, options.readers)
+    given = parser.parse_args()
+    numbers = range(given.inputs) if given.only is None else range(given.only, given.only + 1)
+    tally = run(given.seed, numbers, given.workers, given.readers)
     for reader in sorted({reader for reader, _ in tally.counts}):
-        read, refused = (tally.counts[reader, outcome] for outcome in ("read", "refused"))
+        read, refused = (tally.counts[reader, how] for how in ("read", "refused"))
         print(f"{reader:12} read {read:>7,}  refused {refused:>7,}")
-    print(f"{len(tally.findings)} findings, largest {tally.largest} MB")
+    print(f"{len(tally.findings)} findings, largest {tally.largest} MB, longest {tally.longest:.1f} s")
     return int(bool(tally.findings))
+
+
+def run(seed: int, numbers: range, workers: int, kinds: str = "") -> Tally:
+    """Return what came of inputs, of which each worker reads a part."""
+    tally = Tally()
+    cuts = [numbers.start + len(numbers) * k // workers for k in range(workers + 1)]
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(lambda ends: fuzz(seed, range(*ends), tally, kinds), pairwise(cuts)))
+    return tally
 
 
 if __name__ == "__main__":

@@ -1,16 +1,13 @@
 """The readers of strangers' files hold against 5,000 damaged ones, and the harness notices what does not hold."""
 
-import os
 import random
-import signal
 
 import pytest
 
-from tests.fuzz import worker
-from tests.fuzz.__main__ import MEGABYTES, Tally, run
+from tests.fuzz.__main__ import MEGABYTES, SECONDS, Tally, run
 from tests.fuzz.corpus import Seed
 from tests.fuzz.mutator import mutated
-from tests.fuzz.worker import Answer, input_of, outcome
+from tests.fuzz.worker import input_of, outcome
 
 
 @pytest.mark.slow
@@ -44,28 +41,7 @@ def test_the_harness_tells_what_is_neither_read_nor_refused(tmp_path):
     assert outcome(mumble, path)[0] == "unclean"
     assert outcome(fail, path)[0] == "unclean"
     tally = Tally()
-    tally.add(0, Answer("read", "plan", MEGABYTES + 1))
-    tally.add(1, Answer("refused", "plan", 1))
-    tally.add(2, Answer("unclean", "plan", 1, "KeyError: 'rows'"))
-    assert [finding.split()[1] for finding in tally.findings] == ["large", "unclean"]
-
-
-def started(seed, kinds, folder):
-    pass
-
-
-def ended(number):
-    signal.setitimer(signal.ITIMER_PROF, 0.1)
-    while number == 0:
-        pass
-    if number == 1:
-        os._exit(3)
-    return Answer("read", "plan", 1)
-
-
-def test_a_process_that_hangs_or_ends_is_replaced_and_its_input_named(monkeypatch):
-    monkeypatch.setattr(worker, "start", started)
-    monkeypatch.setattr(worker, "read", ended)
-    tally = run(1, range(3), 1)
-    assert [finding.split(":")[0] for finding in tally.findings] == ["0 hang", "1 abort"]
-    assert tally.counts == {("plan", "read"): 1}
+    tally.add(0, ["read", "plan", MEGABYTES + 1, ""], 0.0)
+    tally.add(1, ["refused", "plan", 1, ""], SECONDS + 1.0)
+    tally.add(2, ["unclean", "plan", 1, "KeyError: 'rows'"], 0.0)
+    assert [finding.split()[1] for finding in tally.findings] == ["large", "hang", "unclean"]

@@ -1,17 +1,20 @@
-"""The process that reads inputs: each is read, refused with one line that names it, or anything else."""
+"""The child process: reads inputs one after the other, and says of each on stdout what came of it.
 
+A line is `NUMBER begun`, and then `NUMBER OUTCOME MEGABYTES [WHAT]` as JSON; OUTCOME is read, refused or unclean.
+"""
+
+import json
 import os
 import random
 import resource
 import shutil
-import signal
+import sys
 import tempfile
 import traceback
 import warnings
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
 
 from tests.fuzz import written
 from tests.fuzz.corpus import Seed, corpus
@@ -21,16 +24,6 @@ NAME = "subject"  # what every input is called, so that a message can be seen to
 ADDRESSES = 6_000_000_000  # bytes of addresses that a child may have more than it has at first
 CELLS = 2_000  # of a plan here: a million are allowed, and reading takes as long as there are cells
 LONGEST = 400  # characters of a message
-SECONDS = 10.0  # of CPU time for an input, as a busy machine gives a process little of it
-
-
-class Answer(NamedTuple):
-    """What came of an input."""
-
-    outcome: str  # read, refused or unclean
-    reader: str
-    megabytes: int  # the largest memory of the process meanwhile
-    what: str = ""
 
 
 def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
@@ -104,48 +97,47 @@ def outcome(read: Callable[[Path], object], path: Path) -> tuple[str, str]:
 
 def peak() -> int:
     """Return the largest memory in MB since this was asked last."""
-    lines = Path("/proc/self/status").read_text().splitlines()
-    size = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
-    Path("/proc/self/clear_refs").write_text("5")
+    with open("/proc/self/status", encoding="ascii") as file:
+        size = next(int(line.split()[1]) for line in file if line.startswith("VmHWM"))
+    with open("/proc/self/clear_refs", "w", encoding="ascii") as file:
+        file.write("5")
     return size // 1024
 
 
-class Reader:
-    """Reads the inputs of a seed; what is compiled or imported at first is not an input's."""
-
-    def __init__(self, seed: int, kinds: str, folder: str) -> None:
-        self.seed, self.folder = seed, Path(tempfile.mkdtemp(dir=folder))
-        self.seeds = [valid for valid in corpus(self.folder) if not kinds or valid.reader in kinds.split(",")]
-        self.readers = readers(self.folder)
-        for valid in self.seeds:
-            if (answer := self.read(valid, valid.content)).outcome != "read":
-                raise RuntimeError(f"a valid file is not read: {answer}")
-
-    def read(self, valid: Seed, content: bytes) -> Answer:
-        """Return what came of what a valid file became."""
-        path = self.folder / f"{NAME}{valid.suffix}"
-        path.write_bytes(content)
-        came, what = outcome(self.readers[valid.reader], path)
-        for left in self.folder.glob(f"{NAME}*"):
-            shutil.rmtree(left) if left.is_dir() else left.unlink()
-        return Answer(came, valid.reader, peak(), what)
-
-
-def start(seed: int, kinds: str, folder: str) -> None:
-    """Make this process ready."""
-    global reader
+def main(seed: int, numbers: range, kinds: str) -> None:
+    """Read inputs."""
+    say = os.fdopen(os.dup(1), "w", buffering=1)
     warnings.simplefilter("ignore")
-    reader = Reader(seed, kinds, folder)
-    addresses = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (addresses + ADDRESSES, addresses + ADDRESSES))
-    quiet = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):  # what libraries print
-        os.dup2(quiet, stream)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        seeds = [one for one in corpus(folder) if not kinds or one.reader in kinds.split(",")]
+        known = readers(folder)
+        for one in seeds:  # what is compiled or imported at first is not an input's
+            (folder / f"{NAME}{one.suffix}").write_bytes(one.content)
+            how, what = outcome(known[one.reader], folder / f"{NAME}{one.suffix}")
+            assert how == "read", (one.reader, one.suffix, what)
+            _clear(folder)
+        with open("/proc/self/statm", encoding="ascii") as file:
+            addresses = int(file.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (addresses + ADDRESSES, addresses + ADDRESSES))
+        peak()
+        quiet = os.open(os.devnull, os.O_WRONLY)
+        for stream in (1, 2):  # what libraries print is no part of the answer
+            os.dup2(quiet, stream)
+        for number in numbers:
+            print(f"{number} begun", file=say)
+            one, content = input_of(seeds, seed, number)
+            path = folder / f"{NAME}{one.suffix}"
+            path.write_bytes(content)
+            how, what = outcome(known[one.reader], path)
+            print(number, json.dumps([how, one.reader, peak(), what]), file=say)
+            _clear(folder)
 
 
-def read(number: int) -> Answer:
-    """Return what came of an input; one that takes too much time ends this process."""
-    signal.setitimer(signal.ITIMER_PROF, SECONDS)
-    answer = reader.read(*input_of(reader.seeds, reader.seed, number))
-    signal.setitimer(signal.ITIMER_PROF, 0.0)
-    return answer
+def _clear(folder: Path) -> None:
+    for path in folder.glob(f"{NAME}*"):
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), range(int(sys.argv[2]), int(sys.argv[3])), sys.argv[4])
