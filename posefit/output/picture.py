@@ -79,13 +79,14 @@ class Painter:
         solid = None if radii is None else opacities(radii[MAIN_LEVEL])
         other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
         image = self._panels(frame, observation, filmed, solid, other)
+        others = other_modes(skeleton, frame.modes, frame.pose) if self._scene.count == 1 else []
         if self._count in self._wanted:
-            self._stills.append(self._still(image, row))
-        if self._scene.count == 1:
-            for mode in other_modes(skeleton, frame.modes, frame.pose, MIN_WEIGHT)[:ALTERNATIVES]:
-                alternative = replace(frame, pose=mode.pose, translation=mode.translation)
-                still = self._panels(alternative, observation, filmed)
-                self._stills.append(_labelled(still, f"or this, {100.0 * mode.weight:.0f} %"))
+            weight = sum(mode.weight for mode in frame.modes) - sum(mode.weight for mode in others)
+            self._stills.append(self._still(image, row, f", {100.0 * weight:.0f} %" if others else ""))
+        for mode in [mode for mode in others if mode.weight > MIN_WEIGHT][:ALTERNATIVES]:
+            alternative = replace(frame, pose=mode.pose, translation=mode.translation)
+            still = self._panels(alternative, observation, filmed)
+            self._stills.append(_labelled(still, f"or this, {100.0 * mode.weight:.0f} %"))
         label = [f"frame {self._scene.first + self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
         label += [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
         label += [] if observation.usable else ["pose held"]
@@ -123,10 +124,10 @@ class Painter:
             draw_bones(side, body, camera, other.pose, other.translation, OTHER)
         return np.hstack([self.overlay(frame, observation, filmed, solid, other), side])
 
-    def _still(self, image: Image, row: Row) -> Image:
-        """Return a small picture whose words are large enough to be read in a page."""
+    def _still(self, image: Image, row: Row, weight: str) -> Image:
+        """Return a small picture whose words, with the `weight` of its pose, can be read in a page."""
         worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
-        label = f"frame {self._scene.first + self._count}, {worth}"
+        label = f"frame {self._scene.first + self._count}, {worth}{weight}"
         return _labelled(image, label, row["lost"] >= LOST)
 
     def overlay(
@@ -168,7 +169,7 @@ class Painter:
         return _grid(panels, columns, 0)
 
     def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:
-        """Return notes and stills of the track, above a curve of its error, or of its cost where truth is unknown."""
+        """Return notes and stills, above a curve of a track's error, or of its cost where truth is unknown."""
         grid = _grid(self._stills, 2, BACKGROUND[0])
         width = grid.shape[1]
         parts = []
@@ -182,6 +183,8 @@ class Painter:
         if self._scene.pictures is None or len(self._scene.cameras) > 1:
             parts.append(blank(LABEL_HEIGHT, width))
             _write_legend(parts[-1], LABEL_HEIGHT - 12, SUMMARY_SCALE)
+        if self._scene.count == 1:
+            return np.vstack(parts)
         name = "error_degrees" if "error_degrees" in table else "cost"
         return np.vstack([*parts, curve(table[name], name.replace("_", " "), width, 180, self._scene.first)])
 

@@ -14,7 +14,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.output import picture
 from posefit.output.drawing import BOTH, FAINTEST, MISSED, OTHER, draw_body, opacities, width_of, wrapped
-from posefit.output.picture import PANEL, Painter, curve
+from posefit.output.picture import LABEL_HEIGHT, PANEL, Painter, curve
 from posefit.uncertainty.modes import Mode, Posterior
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, walk
@@ -98,6 +98,28 @@ def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(
     image, half = painted(scene, replace(frame, posterior=posterior))
     for part in (image[:, :half], image[: PANEL - 60, half:]):  # without the words
         assert (pixels(part, OTHER, close=12) > 100) == drawn
+
+
+def test_the_summary_of_a_single_frame_has_each_pose_it_may_be_with_its_weight_and_no_curve(
+    scene: Scene, frame: Frame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words: list[str] = []
+    monkeypatch.setattr(picture, "write", lambda image, text, *_, **__: words.append(text))
+    poses = frame.pose + 0.3 * np.arange(6)[:, None] * np.eye(len(frame.pose))[6]
+    weights = (0.5, 0.2, 0.1, 0.08, 0.07, 0.02)
+    modes = [Mode(weight, pose, frame.translation) for weight, pose in zip(weights, poses, strict=True)]
+    places = np.tile(frame.translation, (6, 1))
+    posterior = Posterior(poses, places, np.array(weights), modes=modes)
+    painter = Painter(scene)
+    painter.add(replace(frame, posterior=posterior), scene.observations[0], row())
+    height = painter.summary({"cost": np.zeros(1)}).shape[0]
+    assert [text for text in words if "%" in text and "thin" not in text] == [
+        "frame 0, cost 0.0, 50 %",
+        "or this, 20 %",
+        "or this, 10 %",
+        "or this, 8 %",
+    ]
+    assert height == 2 * (PANEL // 2 + LABEL_HEIGHT) + LABEL_HEIGHT  # two rows of stills, and the legend
 
 
 @each(("lost", "marked"), [(np.nan, False), (0.49, False), (0.5, True), (1.0, True)])
