@@ -3,16 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from posefit.arrays import Array
-from posefit.fitting.contours import POINT_SPACING, MaskContours, fitted, precisions
-from posefit.geometry.skeleton import ANGLES
+from posefit.fitting.contours import fitted, precisions
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
-from tests.tracking.contour_twin import moved_bodies, pull_of_view
 
 REACHES = (0.09, 0.065, 0.045, 0.045, 0.033, 0.033)
 LOOSE = precisions(np.radians(8.0), 0.003)
@@ -23,32 +20,6 @@ def off(walk: Walk, k: int, radians: float, seed: int = 0) -> tuple[Array, Array
     poses = np.repeat(walk.motion.poses[k : k + 1], 5, axis=0)
     poses += np.random.default_rng(seed).normal(0.0, radians, poses.shape) * walk.motion.skeleton.free
     return poses, np.repeat(walk.motion.translations[k : k + 1], 5, axis=0)
-
-
-def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, reach: float) -> Array:
-    """Return the step of Gauss and Newton (69,) by the derivatives of a drawn body, number by number."""
-    curve, slope = np.diag(LOOSE), LOOSE * np.append(np.zeros(3), pose - mean)
-    for number, camera in enumerate(walk.task.cameras):
-        view = MaskContours.of(camera, number, [walk.observations[k]], place[None], POINT_SPACING)
-        curves, slopes = pull_of_view(view, 0, *moved_bodies(walk.task.body, view.camera, pose, place), reach)
-        curve += curves
-        slope += slopes
-    free = np.append([True] * 3, walk.motion.skeleton.free)
-    steps = np.zeros(ANGLES + 3)
-    steps[free] = np.linalg.solve(curve[np.ix_(free, free)], slope[free])
-    return steps
-
-
-@pytest.mark.pure
-@each("views", [(45.0,), (20.0, 110.0)])
-def test_a_step_is_that_of_a_slow_twin(views: tuple[float, ...]) -> None:
-    walk = walk_of(built_in.motion("walk-a", frames=2), views)
-    poses, places = off(walk, 1, 0.05)
-    contours = FrameCosts(walk.task, walk.observations[1]).contours(places[0])
-    moved, shifted = fitted(walk.task.body, contours, (poses[:1], places[:1]), poses[1:2], LOOSE, (0.09,))
-    expected = step_of_twin(walk, 1, poses[0], places[0], poses[1], 0.09)
-    np.testing.assert_allclose(poses[0] - moved[0], expected[3:], atol=2e-4)
-    np.testing.assert_allclose(places[0] - shifted[0], expected[:3], atol=2e-5)
 
 
 @each("views", [(45.0,), (0.0, 45.0, 90.0, 135.0)])

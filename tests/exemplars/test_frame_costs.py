@@ -15,7 +15,7 @@ from posefit.motion.built_in import average_skeleton
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.calibration import evidence, recalibrated, stored_calibration
+from posefit_exemplars.calibration import recalibrated, stored_calibration
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
@@ -31,16 +31,7 @@ def samples(spread: float) -> Posterior:
 
 def recalibration(cost: float, usable: bool = True) -> Recalibration:
     frame_costs: Any = SimpleNamespace(skeleton=SKELETON, camera_count=1, usable=usable)
-    corrections = recalibrated(samples(0.1), STILL, cost, frame_costs).recalibration
-    assert corrections is not None
-    return corrections
-
-
-def test_the_evidence_of_an_error_is_cost_spread_and_cameras() -> None:
-    one, two = (evidence(SKELETON, samples(0.1), STILL, 5.0, cameras) for cameras in (1, 2))
-    assert (one[0], one[1], one[3], two[3]) == (1.0, math.log(5.0), 0.0, 1.0)
-    assert evidence(SKELETON, samples(0.3), STILL, 5.0, 1)[2] > one[2]
-    assert np.isfinite(evidence(SKELETON, samples(0.0), STILL, 0.0, 1)).all()
+    return recalibrated(samples(0.1), STILL, cost, frame_costs).recalibration
 
 
 def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> None:
@@ -78,7 +69,6 @@ def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evalua
     sampled, others = walk.track(samples=4), walk.track(samples=5)
     for frame, other, observation in zip(sampled[:2], others, observations, strict=False):
         np.testing.assert_array_equal(frame.pose, other.pose)
-        assert frame.posterior is not None
         assert len(frame.posterior) == 4
         assert frame.posterior.coherent
         expected = FrameCosts(walk.task, observation).mirror_costs(frame.pose, frame.translation)
@@ -86,8 +76,6 @@ def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evalua
     assert len(sampled[2].details["mirror_costs"]) == 0
     assert sampled[2].evaluations == 1
     for frame in sampled:
-        assert frame.posterior is not None
-        assert frame.posterior.recalibration is not None
         assert frame.posterior.recalibration.sharpness == stored_calibration().sharpness
 
 

@@ -88,18 +88,6 @@ def test_means_of_yaws_go_the_short_way_round() -> None:
     assert np.cos(smoothed_pose(poses, np.zeros((3, 3)), 1, 1.5)[0][0]) == pytest.approx(-1.0)
 
 
-def test_the_weights_are_gaussian() -> None:
-    poses, places = np.zeros((5, 66)), np.eye(5, 3)
-    poses[2] = 1.0
-    share = np.exp(-0.5 * (np.arange(-2, 3) / 1.5) ** 2)
-    pose, place = smoothed_pose(poses, places, 2, 1.5)
-    assert pose[0] == pytest.approx(share[2] / share.sum())
-    np.testing.assert_allclose(place, share[:3] / share.sum())
-    # at an end as few frames count on the other side
-    np.testing.assert_array_equal(smoothed_pose(poses, places, 0, 1.5)[0], poses[0])
-    np.testing.assert_array_equal(smoothed_pose(poses, places, 2, 0.0)[0], poses[2])
-
-
 def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_always() -> None:
     rng = np.random.default_rng(0)
     rough = [estimate(rng.normal(size=66), rng.normal(size=3), np.zeros(3)) for _ in range(6)]

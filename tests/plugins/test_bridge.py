@@ -37,14 +37,6 @@ def bridges() -> set[threading.Thread]:
     return {thread for thread in threading.enumerate() if thread.name == "posefit_bridges.optimisers"}
 
 
-def test_a_library_is_asked_and_told_until_it_ends() -> None:
-    best = minimise(
-        sphere, Bridge(Toy(3), np.random.default_rng(0), partial(called_back, climbs)), 10_000, budget_known=True
-    )
-    assert best.evaluations == 100
-    assert best.cost < 2.0
-
-
 def test_costs_reach_the_proposals_they_belong_to() -> None:
     calls: list[tuple[Array, Array]] = []
 

@@ -25,7 +25,6 @@ def floor(prior: Any, poses: Array) -> float:
 def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
     skeleton = built_in.average_skeleton()
     prior = Full().fit(angles("walk-a"), skeleton)
-    assert skeleton.limits is not None
     # .asf of CMU: the thigh's rx lies in -160 to 20 degrees, and lfemur is the third inner joint
     assert (np.degrees(skeleton.limits[3, 0]), np.degrees(skeleton.limits[3, 1])) == pytest.approx((-160.0, 20.0))
     assert np.degrees([prior.low[0], prior.high[0]]) == pytest.approx([-160.0, 20.0])

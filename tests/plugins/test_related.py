@@ -8,11 +8,11 @@ import pytest
 
 import posefit
 from posefit.geometry.body import Body
-from posefit.plugin import Observation, check_optimiser, check_prior, check_tracker, contour_fit
+from posefit.plugin import check_optimiser, check_prior, check_tracker, contour_fit
 from posefit.registry import registry
 from posefit.silhouette.mask import Silhouette
 from posefit.testing.tracker_rules import scene
-from posefit_related.frames import costs_of, frame_of, place_of
+from posefit_related.frames import costs_of, frame_of
 from tests.cases import each
 
 METHODS = ["hpso@pca", "haga@pca", "psopf@pca", "local@pca", "sapso@isomap", "sapso@gplvm"]
@@ -68,16 +68,6 @@ def test_without_training_there_is_one_line() -> None:
     for name in ("isomap", "gplvm"):
         with pytest.raises(ValueError, match="angles must hold at least"):
             registry().offer("prior", name).factory().fit(np.zeros((3, 63)))
-
-
-def test_a_mask_says_where_the_root_is() -> None:
-    task, motion, observations = scene()
-    pose, place, observation = motion.poses[0], motion.translations[0], observations[0]
-    assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)  # known
-    unknown = Observation(observation.silhouettes)
-    moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])
-    assert np.linalg.norm(moved - place) < 0.08  # a pixel of 120 rows is 3 cm
-    assert drawn == 1
 
 
 def test_a_pose_is_moved_to_the_contours_of_its_masks() -> None:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from scipy.stats import ks_2samp
 
 from posefit import SearchSpace, Silhouette, Start, minimise
 from posefit.arrays import Array
@@ -24,7 +26,7 @@ from posefit.testing.toy import Toy
 from posefit.testing.tracker_rules import scene
 from posefit_priors.pca import PCA
 from posefit_reproduce.sapso.letter import LetterSAPSO, velocity_limits
-from posefit_swarm.sapso import SAPSO, fly, inertia_at, limited
+from posefit_swarm.sapso import SAPSO, Rows, fly, inertia_at, limited, redrawn
 
 
 class Line:
@@ -377,6 +379,42 @@ def test_a1_2c_to_the_letter_a_velocity_beyond_its_limits_is_redrawn_and_not_mov
     assert redrawn.mean() == pytest.approx(0.075, abs=0.005)
 
 
+FEASIBLE = 0.3  # share of steps that are allowed
+
+
+def stepped(count: int, redraws: int, feasible: float = FEASIBLE) -> tuple[Array, Array]:
+    """Return velocities and positions (n, 2) of particles at -1 whose first coordinate must be below `feasible`."""
+    rng = np.random.default_rng(3)
+
+    def step(rows: Rows) -> tuple[Array, Array]:
+        moved = rng.random((len(rows), 2))
+        return moved + 1.0, moved
+
+    def allowed(_: Array, moved: Array) -> NDArray[np.bool_]:
+        return np.asarray(moved[:, 0] < feasible)
+
+    return redrawn(np.full((count, 2), -1.0), step, allowed, redraws)
+
+
+def test_what_is_drawn_again_has_the_distribution_of_what_is_allowed() -> None:  # Interpretation S7
+    velocity, position = stepped(3000, 100)
+    np.testing.assert_allclose(velocity, position + 1.0)  # both are of the same draw
+    assert position[:, 0].max() < FEASIBLE
+    uniform = np.random.default_rng(4).random((3000, 2)) * [FEASIBLE, 1.0]
+    for k in range(2):
+        assert ks_2samp(position[:, k], uniform[:, k]).pvalue > 0.01
+
+
+def test_a_particle_is_redrawn_as_often_as_asked_and_then_stays_at_rest() -> None:  # Interpretation S7
+    for redraws, failing in [(1, 0.49), (4, 0.16807), (10, 0.019773)]:
+        velocity, position = stepped(4000, redraws)
+        stays = position[:, 0] == -1.0
+        deviation = np.sqrt(failing * (1.0 - failing) / 4000)
+        assert stays.mean() == pytest.approx(failing, abs=3.5 * deviation)  # 0.7^(1 + redraws)
+        np.testing.assert_array_equal(velocity[stays], 0.0)
+        np.testing.assert_array_equal(position[stays], -1.0)
+
+
 def test_a_wall_of_the_box_stops_a_coordinate_there_and_no_other() -> None:  # Interpretation S7
     velocity, position = fly(Toy(3), np.array([[0.9, -0.9, 0.5]]), np.array([[0.2, -0.05, 0.1]]))
     np.testing.assert_allclose(velocity, [[0.0, -0.05, 0.1]])
@@ -493,7 +531,6 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
     assert made[0].space.start is None  # frame 1 is an estimation
     starts = [optimiser.space.start for optimiser in made[1:]]
     for start, step, last in zip(starts, steps, latents, strict=False):
-        assert start is not None
         assert start.velocity[3] == pytest.approx(step)
         assert start.mean[3] == pytest.approx(last)
         assert start.spread[3] == pytest.approx(max(2.0 * abs(step), 0.05))  # Interpretation S5

@@ -14,7 +14,7 @@ from posefit.fitting.tracker import Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit_vsmm.groups import Topology, read_topology
+from posefit_vsmm.groups import TOPOLOGY, Topology
 from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import (
     _TIPS,
@@ -56,7 +56,6 @@ def canvas() -> np.ndarray:
 
 def lines(image: np.ndarray) -> Lines:
     shape = lines_of(image > 0)
-    assert shape is not None
     return shape
 
 
@@ -332,13 +331,12 @@ def test_a_models_step_is_the_same_from_any_place_and_heading() -> None:
 
 
 def test_the_groups_are_those_of_the_reading() -> None:  # VSMM 4
-    topology = read_topology("", library().models.names)
-    assert topology.groups == {
+    assert TOPOLOGY.groups == {
         "G1": ("stiff-walk", "walk", "arms-out"),
         "G2": ("arms-out", "jacks", "jump"),
         "G3": ("jacks", "jump", "squat"),
     }
-    matrix = topology.transition(("walk", "arms-out", "jacks"))
+    matrix = TOPOLOGY.transition(("walk", "arms-out", "jacks"))
     assert np.allclose(matrix, [[0.92, 0.08, 0.0], [0.04, 0.92, 0.04], [0.0, 0.08, 0.92]])
 
 
@@ -574,9 +572,8 @@ def test_a_new_model_starts_from_the_captured_state_that_matches_best() -> None:
 
 
 def test_old_and_new_groups_are_in_force_together() -> None:  # VSMM 8.4
-    topology = read_topology("", library().models.names)
-    assert topology.union(("G3", "G1")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
-    assert topology.union(("G1", "G2")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump")
+    assert TOPOLOGY.union(("G3", "G1")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
+    assert TOPOLOGY.union(("G1", "G2")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump")
 
 
 def test_by_default_a_new_model_gets_what_the_transitions_give_it() -> None:  # Interpretation V11

@@ -14,7 +14,6 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion import built_in
-from posefit.motion.motion import Motion
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.progress import Progress
 from posefit.silhouette.cost import areas
@@ -35,11 +34,6 @@ def walk(frames: int, views: Sequence[float] = (45.0,), size: tuple[int, int] = 
     return synthetic(built_in.motion("walk", frames=frames), views, size, [], (None, None))
 
 
-def truth_of(scene: Scene) -> Motion:
-    assert scene.truth is not None
-    return scene.truth
-
-
 def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observation) -> Frame:
     """Return the frame of a tracker that estimates a pose."""
     views = zip(scene.cameras, observation.silhouettes, strict=True)
@@ -49,7 +43,7 @@ def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observa
 
 def exact_frames(scene: Scene, **values: Any) -> list[Frame]:
     """Return frames of the true poses, without posteriors."""
-    truth = truth_of(scene)
+    truth = scene.truth
     each = zip(truth.poses, truth.translations, scene.observations, strict=False)
     return [replace(frame_of(scene, *estimate), **values) for estimate in each]
 

@@ -25,7 +25,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.lookup import Lookup
 from tests.cases import each
 from tests.testing import planted
-from tests.tracking.scenes import frame_of, truth_of, walk
+from tests.tracking.scenes import frame_of, walk
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
@@ -65,7 +65,7 @@ def test_restarts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_who
     size: tuple[int, int], rows: int
 ) -> None:
     scene = walk(5, [90.0], size)
-    motion, task = truth_of(scene), Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
+    motion, task = scene.truth, Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
     views: list[tuple[int, float]] = []
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -112,7 +112,7 @@ def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int
         rows = [next(k for k, other in enumerate(observations) if other is observation) for observation in chosen]
         calls.append((rows, task.fps))
         areas = np.zeros((len(scene.cameras), 3), np.int64)
-        return iter([Frame(truth_of(scene).poses[0], scene.anchor, 0.0, areas, 0)] * len(rows))
+        return iter([Frame(scene.truth.poses[0], scene.anchor, 0.0, areas, 0)] * len(rows))
 
     for count in counts:
         fitted_build(task, observations, follow, count, None, 0)
@@ -155,8 +155,8 @@ def test_a_build_that_begins_late_looks_for_the_pose_again(late: int, restarts: 
     observations[:late] = [
         replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in observations[:late]
     ]
-    frame = Frame(truth_of(scene).poses[40], scene.anchor, 0.0, np.zeros((2, 3), np.int64), 0)
-    first = replace(frame, pose=truth_of(scene).poses[0])
+    frame = Frame(scene.truth.poses[40], scene.anchor, 0.0, np.zeros((2, 3), np.int64), 0)
+    first = replace(frame, pose=scene.truth.poses[0])
     task = task_of(scene, TrackOptions(evaluations=80, translation="known"), [built_in.motion("walk")])
     task = replace(task, yaw=0.5, first_pose=first.pose[3:], before=(first,))
     starts: list[tuple[float | None, tuple[Frame, ...]]] = []

@@ -118,11 +118,6 @@ def test_what_stays_lies_between_the_surest_frames_near_both_ends(start: int, st
     assert best_ends(frames, start, stop, FPS) == ends
 
 
-def test_the_surest_frame_is_one_that_most_cameras_see() -> None:
-    frames = [frame(0.0, 9.0 if k in (5, 50) else 1.0, cameras=1 + (k in (5, 50))) for k in range(60)]
-    assert best_ends(frames, 1, 59, FPS) == (5, 50)
-
-
 def posterior(offset: float) -> Posterior:
     poses = np.repeat(WALK.poses[:1], 2, axis=0)
     poses[:, 10] += [offset, -offset]

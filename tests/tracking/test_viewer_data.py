@@ -14,10 +14,11 @@ import pytest
 from posefit.fitting.tracker import Observation
 from posefit.measuring.angles import clinical_angles
 from posefit.output.page import stills
+from posefit.output.page.bodies import in_16_bits
 from posefit.output.page.stills import Stills, Strip
 from posefit.page.document import embedded
 from posefit.silhouette.mask import Silhouette
-from tests.tracking.scenes import MAXWELL, SIZE, exact_frames, truth_of, uncertain_frames, viewed, walk
+from tests.tracking.scenes import MAXWELL, SIZE, exact_frames, uncertain_frames, viewed, walk
 
 
 def data_of(page: Path) -> dict[str, Any]:
@@ -98,9 +99,14 @@ def test_pictures_of_leaves_stay_within_a_few_megabytes() -> None:
     assert image(coarse).shape[0] in {height for _, (height, _) in stills.FINENESS}
 
 
+def test_metres_are_whole_millimetres_and_what_is_not_known_has_a_number_of_its_own() -> None:
+    assert numbers(in_16_bits(np.array([0.0, 0.0014, -0.0016, 1.25]))).tolist() == [0, 1, -2, 1250]
+    assert numbers(in_16_bits(np.array([40.0, -40.0, np.inf, np.nan]))).tolist() == [32767, -32767, 32767, -32768]
+
+
 def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> None:
     scene = walk(4)
-    truth = truth_of(scene)
+    truth = scene.truth
     data = data_of(viewed(tmp_path / "out", scene, uncertain_frames(scene, [0.0, 0.3, 0.0, 0.0])))
     joints = numbers(data["estimate"]).reshape(4, 27, 3)
     true = 1e3 * truth.joints

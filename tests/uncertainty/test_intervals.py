@@ -61,16 +61,6 @@ def test_factors_multiply_the_intervals() -> None:
     np.testing.assert_allclose(angle_intervals(known, STILL), 3.0 * angle_intervals(plain, STILL))
 
 
-def test_errors_of_footage_add_by_squares() -> None:
-    model = in_footage(Recalibration(joint_spreads=np.full(27, 0.03)), 2, True)
-    np.testing.assert_allclose(model.joint_spreads**2, 0.03**2 + shared_spreads(2) ** 2)
-    np.testing.assert_allclose(model.place_spreads**2, 0.03**2 + shared_spreads(2, world=True) ** 2)
-    some = yawed([0, 10, 20], [0.5, 0.3, 0.2], model)
-    other = replace(some, recalibration=replace(model, joint_spreads=model.place_spreads))
-    radii = joint_intervals(SKELETON, some, STILL, world=True)
-    np.testing.assert_array_equal(radii, joint_intervals(SKELETON, other, STILL))
-
-
 def test_the_root_is_off_in_the_world_alone() -> None:
     for cameras in (1, 2, 4):
         about, world = shared_spreads(cameras), shared_spreads(cameras, world=True)
