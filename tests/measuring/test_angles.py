@@ -177,23 +177,14 @@ def test_a_long_c3d_counts_its_frames_and_its_events(walk: Motion, tmp_path: Pat
 
 def test_a_trc_is_what_a_plain_reader_reads(walk: Motion, tmp_path: Path) -> None:
     write_trc(tmp_path / "walk.trc", walk, BLANK)
-    lines = [line.split("\t") for line in (tmp_path / "walk.trc").read_text().split("\n")]
-    assert dict(zip(lines[1], lines[2], strict=True))["NumMarkers"] == "27"
-    names = [name for name in lines[3][2:] if name]
-    assert names == list(PLACES)
-    expected = walk.joints
-    points = np.full(expected.shape, np.nan)
-    for line in lines[6:]:
-        if line == [""]:
-            continue
-        k = int(line[0]) - 1
-        assert float(line[1]) == pytest.approx(k / 30.0, abs=1e-6)
-        for column, value in enumerate(line[2:]):
-            if value:
-                points[k, column // 3, column % 3] = float(value)
-    assert {int(k) for k in np.flatnonzero(np.isnan(points).all(axis=(1, 2)))} == BLANK
-    known = [k for k in range(len(walk)) if k not in BLANK]
-    np.testing.assert_allclose(points[known], expected[known], atol=TENTH)
+    lines = (tmp_path / "walk.trc").read_text().splitlines()
+    assert dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))["NumMarkers"] == "27"
+    assert lines[3].split() == ["Frame#", "Time", *PLACES]
+    table, expected = np.genfromtxt(lines[6:], delimiter="\t"), walk.joints.reshape(len(walk), -1)
+    np.testing.assert_array_equal(table[:, 0], np.arange(1, len(walk) + 1))
+    np.testing.assert_allclose(table[:, 1], np.arange(len(walk)) / 30.0, atol=1e-6)
+    expected[[*BLANK]] = np.nan
+    np.testing.assert_allclose(table[:, 2:], expected, atol=TENTH)
 
 
 def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
@@ -212,15 +203,14 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
 
 def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion, tmp_path: Path) -> None:
     write_angles(tmp_path / "angles.csv", walk, BLANK)
-    rows, expected = csv_rows(tmp_path / "angles.csv"), clinical_angles(walk.skeleton, walk.poses)
-    assert list(rows[0]) == ["frame", "seconds", *COLUMNS]
-    assert len(rows) == len(walk)
-    for k, row in enumerate(rows):
-        assert (row["frame"], float(row["seconds"])) == (str(k), pytest.approx(k / 30.0, abs=1e-6))
-        for name in COLUMNS:
-            written = float(row[name]) if row[name] else np.nan
-            value = np.nan if k in BLANK else expected[name][k]
-            assert written == pytest.approx(value, abs=1e-3, nan_ok=True)
+    table, count = np.genfromtxt(tmp_path / "angles.csv", delimiter=",", names=True), len(walk)
+    assert table.dtype.names == ("frame", "seconds", *COLUMNS)
+    np.testing.assert_array_equal(table["frame"], np.arange(count))
+    np.testing.assert_allclose(table["seconds"], np.arange(count) / 30.0, atol=1e-6)
+    for name, values in clinical_angles(walk.skeleton, walk.poses).items():
+        np.testing.assert_allclose(
+            table[name], np.where(np.isin(np.arange(count), [*BLANK]), np.nan, values), atol=1e-3
+        )
 
 
 def test_angles_of_recorded_people_do_not_jump() -> None:

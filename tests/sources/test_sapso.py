@@ -13,6 +13,7 @@ from posefit import SearchSpace, Silhouette, Start, minimise
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.box import draw_population
+from posefit.fitting.prior import Components
 from posefit.fitting.tracker import Prediction, Predictor, SynthesisTracker
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -29,29 +30,18 @@ from posefit_reproduce.sapso.letter import LetterSAPSO, velocity_limits
 from posefit_swarm.sapso import SAPSO, Rows, fly, inertia_at, limited, redrawn
 
 
-class Line:
+class Line(Components):
     """A prior of one latent, the first joint angle; feasible unless it lies in a gap."""
 
-    def __init__(self, gap: tuple[float, float] | None = None) -> None:
-        self.low, self.high, self.gap = np.array([-1.0]), np.array([1.0]), gap
-
-    def fit(self, angles: Array, skeleton: object = None) -> "Line":
-        assert angles.shape[1] == 63
-        return self
-
-    def transform(self, angles: Array) -> Array:
-        return angles[:, :1]
-
-    def inverse_transform(self, latents: Array) -> Array:
-        return np.column_stack([latents, np.zeros((len(latents), 62))])
+    def __init__(self, gap: tuple[float, float] = (np.inf, -np.inf)) -> None:
+        super().__init__(np.zeros(63), np.eye(1, 63), np.array([-1.0]), np.array([1.0]))
+        self.gap = gap
 
     def feasible(self, latents: Array) -> Any:
-        if self.gap is None:
-            return np.ones(len(latents), dtype=bool)
         return (latents[:, 0] <= self.gap[0]) | (latents[:, 0] >= self.gap[1])
 
 
-def line_space(gap: tuple[float, float] | None = None, start: Start | None = None) -> SearchSpace:
+def line_space(gap: tuple[float, float] = (np.inf, -np.inf), start: Start | None = None) -> SearchSpace:
     return SearchSpace(Line(gap), np.zeros(3), np.ones(3), np.zeros(3), start=start)
 
 
@@ -195,18 +185,6 @@ def test_a_periodic_coordinate_moves_the_short_way_round() -> None:
     velocity, position = moved(v=0.0, r1=0.0, r2=0.5, x=0.9, gbest=-0.9, wrapping=1)
     assert velocity == pytest.approx(0.2)
     assert position == pytest.approx(-0.9)
-
-
-def test_every_particle_and_dimension_has_draws_of_its_own() -> None:  # Interpretation S8
-    # the draws are in the order they are asked for: all of the pulls to personal bests, then all to the swarm's
-    position, velocity, best = (np.array([[0.1, 0.0], [0.2, -0.1]]) * scale for scale in (1.0, 0.5, 2.0))
-    swarm = SAPSO(Toy(2), np.random.default_rng(0), population_size=2, inertia=0.5, alpha=1.0)
-    swarm.x, swarm.v, swarm.pbest, swarm.pbest_cost = position, velocity, best, np.array([1.0, 2.0])
-    rand, rows = np.arange(0.1, 0.9, 0.1), np.array([1, 0])
-    swarm.rng = Fixed(*rand)
-    r1, r2 = rand.reshape(2, 2, 2)
-    expected = 0.5 * velocity[rows] + 2.0 * r1 * (best - position)[rows] + 2.0 * r2 * (best[0] - position[rows])
-    np.testing.assert_allclose(swarm.step(rows), [expected, position[rows] + expected])
 
 
 def test_c1_and_c2_are_2_and_section_5_sets_the_rest() -> None:
