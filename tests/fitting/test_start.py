@@ -8,7 +8,7 @@ import posefit
 from posefit.fitting.box import Start, draw_population
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.fitting.start import MODE_RADIUS, MODE_SPREAD, modes_apart, start_in
+from posefit.fitting.start import MODE_SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
 from posefit.testing.toy import Toy
@@ -39,14 +39,6 @@ def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
         error = 4.0 * spread / np.sqrt(rows.sum())
         np.testing.assert_allclose(drawn[rows].mean(axis=0), mean, atol=error)
         np.testing.assert_allclose(drawn[rows].std(axis=0), spread, atol=error)
-
-
-def test_poses_near_each_other_are_one_mode_with_the_sum_of_their_weights() -> None:
-    both = weighted([5, 5, 5], [0.0, 0.05, np.pi], [1.0, 3.0, 4.0])
-    modes = modes_apart(WALK.skeleton, both)
-    assert sorted(weight for weight, _ in modes) == [0.5, 0.5]
-    assert sorted(len(mode) for _, mode in modes) == [1, 2]
-    assert 0.1 < MODE_RADIUS < 0.4  # a body that is turned by half a circle is farther from itself
 
 
 def problem_of(row: int, turn: float) -> PoseProblem:

@@ -75,17 +75,6 @@ def test_the_same_poses_have_the_same_clusters_and_fewer_than_asked_are_centres_
     assert reach == 0.0
 
 
-def test_a_linear_transformer_is_inverted_as_scikit_learn_does_it() -> None:
-    from sklearn import decomposition
-
-    poses = angles("walk-a", "walk-b")
-    prior = Transformed(variant="PCA", components=5).fit(poses)
-    theirs = decomposition.PCA(5, random_state=0).fit(poses)
-    latents = prior.transform(poses)
-    np.testing.assert_allclose(latents, theirs.transform(poses), atol=1e-12)
-    np.testing.assert_allclose(prior.inverse_transform(latents), theirs.inverse_transform(latents), atol=1e-12)
-
-
 def test_a_loose_prior_reaches_what_its_components_do_not() -> None:
     prior, pca = Loose().fit(angles("walk-a", "walk-b", "walk-c"), built_in.average_skeleton()), PCA(components=12)
     pca.fit(angles("walk-a", "walk-b", "walk-c"))

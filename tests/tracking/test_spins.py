@@ -19,11 +19,9 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_hypotheses
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
-    best_ends,
     facing_consensus,
     initial_guess,
     retrack_spins,
-    spin_mask,
 )
 from posefit.tracking.trajectory import Tracked
 from posefit.uncertainty.modes import Posterior
@@ -60,26 +58,6 @@ def rows_of(observations: Iterable[Observation]) -> list[int]:
     return [next(k for k, other in enumerate(OBSERVATIONS) if other is observation) for observation in observations]
 
 
-JUMP = [0.0] * 6 + [70.0] * 6
-
-
-@each(
-    ("degrees", "fps", "visible", "spins"),
-    [
-        (JUMP, FPS, 12, [3, 4, 5, 6, 7, 8]),
-        (JUMP, FPS, 6, []),
-        (JUMP, 10.0, 12, [5, 6]),
-        (15.0 * np.arange(12), FPS, 12, []),  # 450 degrees a second
-        (25.0 * np.arange(12), FPS, 12, list(range(12))),
-        ([179.0] * 6 + [-179.0] * 6, FPS, 12, []),
-    ],
-)
-def test_a_body_spins_if_it_turns_by_more_than_60_degrees_in_a_tenth_of_a_second(
-    degrees: Sequence[float], fps: float, visible: int, spins: list[int]
-) -> None:
-    assert np.flatnonzero(spin_mask(np.radians(degrees), np.arange(12) < visible, fps)).tolist() == spins
-
-
 @each(
     ("frames", "agrees"),
     [
@@ -100,22 +78,6 @@ def test_a_frame_has_a_vote_for_each_camera_that_sees_the_person() -> None:
     assert all(agrees[:9])
     assert not any(agrees[9:])
     assert consensus(frames_facing([0.0] * 4), visible=False) == [False] * 4
-
-
-@each(
-    ("start", "stop", "ends"),
-    [
-        (0, 60, (0, 59)),  # all of the track
-        (0, 40, (0, 33)),
-        (20, 60, (33, 59)),
-        (30, 36, (32, 33)),
-        (40, 42, (40, 41)),
-    ],
-)
-def test_what_stays_lies_between_the_surest_frames_near_both_ends(start: int, stop: int, ends: tuple[int, int]) -> None:
-    costs = {4: 0.5, 32: 0.6, 33: 0.4, 57: 0.5}
-    frames = [frame(0.0, costs.get(k, 1.0)) for k in range(60)]
-    assert best_ends(frames, start, stop, FPS) == ends
 
 
 def posterior(offset: float) -> Posterior:

@@ -35,25 +35,8 @@ from tests.cases import each
 from tests.tracking.scenes import exact_frames, tracked, viewed, walk
 
 ALL = np.ones(60, dtype=bool)
-FINE: dict[str, Any] = {
-    "frames": 100,
-    "size_ratio": 1.0,
-    "size_m": 1.8,
-    "height_m": 1.8,
-    "depth_scatter": 0.01,
-    "foot_share": 0.9,
-    "stance_spread_m": 0.01,
-    "explained": 0.95,
-    "lost": 0.0,
-    "unknown": 0.05,
-    "interval_mm": 90.0,
-    "training_mm": 40.0,
-    "frontal": 0.2,
-    "held": 0.0,
-    "cropped": 0.0,
-    "iou": 0.88,
-    "acceleration": 6.0,
-}
+FINE: dict[str, Any] = {name: sign.limits[0] if sign.limits else 90.0 for name, sign in SIGNS.items()}
+FINE |= {"frames": 100, "size_m": 1.8, "height_m": 1.8}
 
 
 def test_the_longer_side_of_a_mask_is_that_of_its_bounding_box() -> None:
