@@ -1,7 +1,5 @@
 """CMA-ES: our strategy and the library cmaes agree on the same proposals; `cma` at the sides of its box, round a circle."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from cmaes import CMA
@@ -14,47 +12,31 @@ from posefit.testing.toy import Toy, shell
 from tests.cases import each
 
 
-def pair(d: int, population: int, seed: int = 0) -> tuple[Strategy, Any]:
-    """Return our strategy and the library's, at the same place with the same spread."""
-    rng = np.random.default_rng(seed)
-    mean, spread = rng.normal(0.0, 0.1, d), rng.uniform(0.05, 0.5, d)
-    size = float(np.sqrt((spread**2).mean()))
-    theirs = CMA(mean.copy(), size, population_size=population, cov=np.diag((spread / size) ** 2))
-    return Strategy(mean, spread, population), theirs
-
-
-def assert_equal_states(ours: Strategy, theirs: Any) -> None:
-    pairs = [
-        (ours.mean, theirs._mean),
-        (ours.covariance, theirs._C),
-        (ours.step_path, theirs._p_sigma),
-        (ours.path, theirs._pc),
-        (np.array([ours.sigma]), np.array([theirs._sigma])),
-    ]
-    for mine, other in pairs:
-        np.testing.assert_allclose(mine, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
-
-
-def learn(ours: Strategy, theirs: Any, proposals: Array, costs: Array) -> bool:
-    """Have both learn a generation; return whether they have ended."""
-    ours.learn(proposals, costs)
-    theirs.tell(list(zip(proposals, costs.tolist(), strict=True)))
-    assert_equal_states(ours, theirs)
-    assert ours.ended() == theirs.should_stop()
-    return ours.ended()
-
-
 @each("ties", [False, True])
 @each("sizes", [(1, 5), (2, 6), (2, 7), (9, 10), (9, 40), (28, 13), (28, 40)])
 def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) -> None:
     d, population = sizes
     rng = np.random.default_rng(d)
-    ours, theirs = pair(d, population)
-    valley = rng.normal(size=(d, d))
+    mean, spread, valley = rng.normal(0.0, 0.1, d), rng.uniform(0.05, 0.5, d), rng.normal(size=(d, d))
+    size = float(np.sqrt((spread**2).mean()))
+    ours = Strategy(mean, spread, population)
+    theirs = CMA(mean.copy(), size, population_size=population, cov=np.diag((spread / size) ** 2))
     for _ in range(250):
         proposals = ours.sample(rng, population)
         costs = ((proposals @ valley) ** 2).sum(axis=1)
-        if learn(ours, theirs, proposals, np.round(2.0 * costs) / 2.0 if ties else costs):
+        costs = np.round(2.0 * costs) / 2.0 if ties else costs
+        ours.learn(proposals, costs)
+        theirs.tell(list(zip(proposals, costs.tolist(), strict=True)))
+        for mine, other in (
+            (ours.mean, theirs._mean),
+            (ours.covariance, theirs._C),
+            (ours.step_path, theirs._p_sigma),
+            (ours.path, theirs._pc),
+            (ours.sigma, theirs._sigma),
+        ):
+            np.testing.assert_allclose(mine, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+        assert ours.ended() == theirs.should_stop()
+        if ours.ended():
             return
     assert d > 2
 

@@ -18,10 +18,6 @@ def angles(*names: str) -> Array:
     return np.concatenate([built_in.motion(name).poses[:, 3:] for name in names])
 
 
-def floor(prior: Any, poses: Array) -> float:
-    return float(np.degrees(np.abs(prior.inverse_transform(prior.transform(poses)) - poses)).mean())
-
-
 def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
     skeleton = built_in.average_skeleton()
     prior = Full().fit(angles("walk-a"), skeleton)
