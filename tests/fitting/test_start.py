@@ -1,6 +1,7 @@
 """Modes of first poses, their projection onto a prior's latents, and populations that are drawn from several."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -70,21 +71,12 @@ def test_a_mode_is_around_its_pose_that_costs_least() -> None:
     np.testing.assert_allclose(SPACE.decode(start.mean[None])[0][0, 0], WALK.poses[5, 0], atol=1e-9)
 
 
-class Knows:
-    """Guesses one pose; the ten lines that any model of silhouettes needs."""
-
-    def __init__(self, task: Task) -> None:
-        self.task = task
-
-    def posterior(self, observation: Observation) -> Posterior | None:
-        return weighted([5], [1.0], [1.0])
-
-
 def test_nothing_is_guessed_where_the_pose_is_known_or_nothing_shows() -> None:
     body = posefit.Body.of(WALK.skeleton)
     camera = posefit.Camera.framing(WALK.joints[0], body.joint_radii(), 0.0, (64, 48))
     observation = Observation([posefit.Silhouette.of(np.ones((48, 64)))])
-    task = Task(body, [camera], 100, None, np.zeros(3), start=Knows)
+    guess = SimpleNamespace(posterior=lambda observation: weighted([5], [1.0], [1.0]))
+    task = Task(body, [camera], 100, None, np.zeros(3), start=lambda task: guess)
     ((weight, mode),) = guessed_modes(task, observation)
     assert (weight, len(mode)) == (1.0, 1)
     assert not guessed_modes(replace(task, first_pose=WALK.poses[0, 3:]), observation)
