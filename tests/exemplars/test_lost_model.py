@@ -56,7 +56,7 @@ def test_evidence_of_a_frame(walker: Walk) -> None:
     # the cheapest reflected and the mirrored one: (6 + 1) / (4 + 1) and (7 + 1) / (4 + 1)
     expected = {"cost": 4.0, "reflected": 1.4, "mirrored": 1.6, "second": 0.25, "views": 1.0}
     assert {name: evidence[name] for name in expected} == pytest.approx(expected)
-    pose, mirrored = skeleton.joints(frame_of(walker).posterior.poses)  # type: ignore[union-attr]
+    pose, mirrored = skeleton.joints(frame_of(walker).posterior.poses)
     assert evidence["farthest"] == pytest.approx(float(np.linalg.norm(pose - mirrored, axis=1).mean()))
 
 

@@ -38,7 +38,7 @@ def drawn(problem: PoseProblem, count: int) -> Array:
 def test_a_cost_has_the_same_bits_whatever_stands_beside_it(
     problem: PoseProblem, translation: str, tilted: bool
 ) -> None:
-    tilt = Tilt.of(problem.space.prior, [built_in.motion("walk-a")], 0.99, 0.1) if tilted else None  # type: ignore[arg-type]
+    tilt = Tilt.of(problem.space.prior, [built_in.motion("walk-a")], 0.99, 0.1) if tilted else None
     problem = replace(problem, space=replace(problem.space, translation=translation, tilt=tilt))
     proposals = drawn(problem, 1000)
     costs = problem.evaluate(proposals)

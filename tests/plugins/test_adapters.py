@@ -105,12 +105,12 @@ def test_a_borrowed_global_generator_is_put_back() -> None:
         with generator:
             return [float(np.random.rand()) for _ in range(2)]  # noqa: NPY002
 
-    before = np.random.get_state()[1].copy()  # type: ignore[index, union-attr]  # noqa: NPY002
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
     one, other = GlobalRandom(5), GlobalRandom(5)
     first = draws(one)
     assert draws(other) == first
     assert draws(one) != first  # it goes on
-    np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]  # noqa: NPY002
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
 
 
 LIBRARIES = {

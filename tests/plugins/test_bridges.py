@@ -14,7 +14,7 @@ SENT = ROOT / "docs" / "contributions"
 
 
 def problem(function: int = 1, **more: object) -> Problem:
-    return posefit.suite("posefit-2026.3", function, 10_000, 9, **more)  # type: ignore[arg-type]
+    return posefit.suite("posefit-2026.3", function, 10_000, 9, **more)
 
 
 def check(searched: Problem, proposals: Iterable[object], costs: Iterable[float]) -> None:

@@ -61,9 +61,6 @@ def walk() -> Array:
     return np.concatenate([built_in.motion(style).poses[:, 3:] for style in ("walk-a", "walk-b", "walk-c")])
 
 
-# Section 2
-
-
 def test_the_skeleton_has_27_joints_and_66_angles() -> None:
     assert (len(JOINTS), len(INNER), len(ENDS)) == (27, 21, 5)
     assert 3 + 21 * 3 == ANGLES == 66
@@ -151,9 +148,6 @@ def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None: 
     low, high = velocity_limits(space)
     np.testing.assert_allclose([low[3], high[3]], [0.15, 0.45])
     assert (np.isinf(low[:3]) & np.isinf(high[:3])).all()  # they are those of x_s, and not of the root
-
-
-# Section 3
 
 
 def moved(
@@ -429,9 +423,6 @@ def test_s11_a_refused_move_keeps_its_velocity() -> None:
     np.testing.assert_allclose(swarm.v, inertia_at(1, 2, 0.9) * before)
 
 
-# Section 4
-
-
 def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> None:
     # v_pred of 3, -3 and 0.1: drawn from U(0, 3) no more than a twentieth lies below the limit 0.15; the rest is
     # clipped to it. U(0, 0.1) needs no clipping.
@@ -512,9 +503,6 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
         assert start.velocity[3] == pytest.approx(step)
         assert start.mean[3] == pytest.approx(last)
         assert start.spread[3] == pytest.approx(max(2.0 * abs(step), 0.05))  # Interpretation S5
-
-
-# Section 5
 
 
 def test_eq_8_is_the_mean_absolute_difference_of_66_angles() -> None:  # SAPSO (8)

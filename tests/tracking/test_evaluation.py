@@ -222,7 +222,7 @@ def test_a_resumed_track_keeps_the_certainty_of_its_first_part(scene: Scene, tmp
     frames = [replace(f, lost=0.75) for f in uncertain_frames(scene, np.full(FRAMES, 0.3), coherent=True)]
     stopped = [*frames[:3], None]  # which cannot be recorded
     with pytest.raises(AttributeError), OutputFolder(tmp_path / "out", False, False, {}, print) as output:
-        tracked(scene, stopped, output)  # type: ignore[arg-type]
+        tracked(scene, stopped, output)
     with OutputFolder(tmp_path / "out", False, True, {}, print) as output:
         track = tracked(scene, frames, output)
     assert track.summary["unknown_sides"] == track.summary["lost_frames"] == list(range(FRAMES))

@@ -103,6 +103,14 @@ def test_too_few_frames_for_a_build_are_reported(tmp_path: Path, count: int, bod
     assert (track.log.build is None) == message.startswith("no build")
 
 
+def with_one_camera_late(scene: Scene, late: int) -> tuple[Silhouette, list[Observation]]:
+    """Return a mask in which nothing is known, and the observations of a scene: the first `late` have one like it."""
+    unknown = Silhouette.of(*np.zeros((2, *scene.observations[0].silhouettes[0].mask.shape), dtype=bool))
+    shown = [scene.observations[k] for k in range(scene.count)]
+    blind = [replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in shown[:late]]
+    return unknown, [*blind, *shown[late:]]
+
+
 def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int) -> list[tuple[list[int], float]]:
     """Return the numbers and the rate of the frames that builds of so many frames are fitted to."""
     task = task_of(scene, TrackOptions(evaluations=80, translation="known"), [built_in.motion("walk")])
@@ -125,11 +133,7 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
     thirds, all_of_them = frames_of_builds(scene, observations, 10, 11)
     assert thirds == (list(range(0, 30, 3)), scene.fps / 3)
     assert all_of_them == (list(range(11)), scene.fps)
-    unknown = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
-    observations = [scene.observations[k] for k in range(40)]
-    observations[:10] = [
-        replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in observations[:10]
-    ]
+    unknown, observations = with_one_camera_late(scene, 10)
     few, many = frames_of_builds(scene, observations, 5, 11)  # too many for those that come after
     assert few[0] == [10, 13, 16, 19, 22]
     assert many[0] == list(range(11))
@@ -150,11 +154,7 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
 @each(("late", "restarts"), [(10, 0), (20, 0), (20, 1)])
 def test_a_build_that_begins_late_looks_for_the_pose_again(late: int, restarts: int) -> None:
     scene = walk(50, [0.0, 90.0], (80, 60))
-    unknown = Silhouette.of(*np.zeros((2, 60, 80), dtype=bool))
-    observations = [scene.observations[k] for k in range(50)]
-    observations[:late] = [
-        replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in observations[:late]
-    ]
+    _, observations = with_one_camera_late(scene, late)
     frame = Frame(scene.truth.poses[40], scene.anchor, 0.0, np.zeros((2, 3), np.int64), 0)
     first = replace(frame, pose=scene.truth.poses[0])
     task = task_of(scene, TrackOptions(evaluations=80, translation="known"), [built_in.motion("walk")])

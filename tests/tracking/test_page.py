@@ -42,7 +42,7 @@ def test_a_strip_keeps_what_it_has_room_for_evenly() -> None:
     for count, room, every in ((7, 70, 1), (8, 70, 2), (14, 70, 2), (15, 70, 4), (100, 10, 128), (3, 0, 4)):
         strip = Strip(room, 1)
         for k in range(count):
-            strip.add((k, 0, 1, 1), lambda k=k: [f"{k:06d}", "more"])  # type: ignore[misc]
+            strip.add((k, 0, 1, 1), lambda k=k: [f"{k:06d}", "more"])
         assert strip.every == every
         assert strip.pictures == [((k, 0, 1, 1), f"{k:06d}", "more") for k in range(0, count, every)]
 
