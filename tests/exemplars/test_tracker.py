@@ -15,7 +15,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
 from posefit.testing import check_tracker
 from posefit_exemplars import tracker
-from posefit_exemplars.tracker import MIN_EVALUATIONS, ExemplarTracker
+from posefit_exemplars.tracker import MIN_EVALUATIONS, WRONG_YAW_COST, ExemplarTracker, yaw_costs
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
@@ -148,3 +148,10 @@ def test_a_sampled_path_is_one_movement(walker: Walk) -> None:
     turns = np.abs(wrapped(np.diff(yaws, axis=0)))
     assert np.median(turns) < np.radians(5.0)
     assert float(np.mean(turns > np.radians(30.0))) < 0.05
+
+
+def test_a_yaw_away_from_the_known_one_costs_more() -> None:
+    yaws = np.radians([10.0, 55.0, 77.5, 100.0, -170.0, 370.0])
+    expected = WRONG_YAW_COST * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0])
+    np.testing.assert_allclose(yaw_costs(yaws, np.radians(10.0)), expected, atol=1e-12)
+    np.testing.assert_array_equal(yaw_costs(yaws, None), np.zeros(6))

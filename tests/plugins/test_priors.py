@@ -121,3 +121,14 @@ def test_mistakes_in_settings_are_named() -> None:
             kind(**settings)
     with pytest.raises(ValueError, match="angles must hold at least 7 frames, got 3"):
         PCA().fit(np.zeros((3, 63)))
+
+
+def test_a_linear_transformer_is_inverted_as_scikit_learn_does_it() -> None:
+    from sklearn import decomposition
+
+    poses = angles("walk-a", "walk-b")
+    prior = Transformed(variant="PCA", components=5).fit(poses)
+    theirs = decomposition.PCA(5, random_state=0).fit(poses)
+    latents = prior.transform(poses)
+    np.testing.assert_allclose(latents, theirs.transform(poses), atol=1e-12)
+    np.testing.assert_allclose(prior.inverse_transform(latents), theirs.inverse_transform(latents), atol=1e-12)

@@ -8,11 +8,11 @@ import pytest
 
 import posefit
 from posefit.geometry.body import Body
-from posefit.plugin import check_optimiser, check_prior, check_tracker, contour_fit
+from posefit.plugin import Observation, check_optimiser, check_prior, check_tracker, contour_fit
 from posefit.registry import registry
 from posefit.silhouette.mask import Silhouette
 from posefit.testing.tracker_rules import scene
-from posefit_related.frames import costs_of, frame_of
+from posefit_related.frames import costs_of, frame_of, place_of
 from tests.cases import each
 
 METHODS = ["hpso@pca", "haga@pca", "psopf@pca", "local@pca", "sapso@isomap", "sapso@gplvm"]
@@ -98,3 +98,13 @@ def test_a_camera_that_knows_nothing_does_not_count() -> None:
         part = replace(task, cameras=[task.cameras[0]] * cameras)
         costs += [costs_of(part, views, pose, place)[0], frame_of(part, views, pose[0], place[0], 0).cost]
     assert len(set(costs)) == 1
+
+
+def test_a_mask_says_where_the_root_is() -> None:
+    task, motion, observations = scene()
+    pose, place, observation = motion.poses[0], motion.translations[0], observations[0]
+    assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)  # known
+    unknown = Observation(observation.silhouettes)
+    moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])
+    assert np.linalg.norm(moved - place) < 0.08  # a pixel of 120 rows is 3 cm
+    assert drawn == 1

@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from posefit import minimise
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.scene import synthetic
 from posefit.footage.segmentation import Extraction
-from posefit.footage.source import kind_of
-from posefit.motion import built_in
+from posefit.footage.source import kind_of, scene_of
+from posefit.motion import built_in, recorded
+from posefit.progress import Progress
 from posefit.registry import Offer, Plugin, Registry, registry
 from posefit.testing.toy import Toy, sphere
 from posefit.tracking import defaults, method
@@ -265,3 +267,18 @@ def test_a_search_that_ends_long_before_its_budget_says_so(name: str) -> None:
     optimiser = registry().optimiser(name)(Toy(9), np.random.default_rng(0))
     with pytest.warns(UserWarning, match="ended its search after 24.. of 100000 evaluations: .* build it with it"):
         minimise(sphere, optimiser, 100_000)
+
+
+def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_path: Path) -> None:
+    scene, log = scene_of(["09_01"], frames=(0, 8), size=(120, 90)), list[str]()
+    masks = [observation.silhouettes[0].mask for observation in scene.observations]
+    np.savez(tmp_path / "masks.npz", masks=masks)
+    track = posefit.track(tmp_path / "masks.npz", evaluations=800, body_frames=5, progress=Progress(log.append))
+    assert track.summary["method"] == "exemplars"
+    assert track.summary["train"] == [clip.name for clip in recorded.clips()]
+    assert track.summary["build"] is not None
+    assert not any("looking for the first pose" in line for line in log)
+    assert "fitting the person's build to 5 frames" in log
+    more = {"train": ["walk-a"], "restarts": 1, "body_frames": 0}
+    posefit.track(tmp_path / "masks.npz", evaluations=800, progress=Progress(log.append), **more)
+    assert "looking for the first pose around 1 pose with such a silhouette" in log
