@@ -89,3 +89,10 @@ def test_what_is_moved_is_moved_towards_the_best_of_the_last_generation() -> Non
         proposals, costs = optimiser.ask(), np.random.default_rng(seed).random(10)
         optimiser.tell(proposals, costs)
         np.testing.assert_array_equal(optimiser.home, proposals[costs.argmin()])
+
+
+def test_an_eigenvalue_that_rounding_makes_negative_becomes_a_small_one() -> None:
+    strategy = Strategy(np.zeros(3), np.ones(3), 7)
+    strategy.covariance = np.diag([1.0, 1.0, -1e-17])
+    strategy.decompose()
+    np.testing.assert_allclose(strategy.covariance, np.diag([1.0, 1.0, 1e-8]), atol=1e-15)
