@@ -25,8 +25,7 @@ from posefit.geometry.camera import Camera
 from posefit.registry import Registry, registry
 from posefit.silhouette.foreground import Image, Person
 from tests.cases import each
-from tests.commands import error_of, run
-from tests.files import arrays
+from tests.commands import error_of
 from tests.footage.composites import DEMO, Kind, backgrounds, composed
 from tests.footage.conftest import Box, camera, iou, truth
 
@@ -166,19 +165,6 @@ def of(mask: Any) -> Person:
     return Person(mask, np.ones_like(mask), int(mask.sum()), 1, 0.0, False)
 
 
-def rows_of(part: Any) -> list[dict[str, Any]]:
-    """Return the rows of a figure that moves by 6 pixels a frame, of which `part` leaves a part in the mask."""
-    quality = FrameQuality(30.0)
-    return [quality.row(image, of(part(mask)), k) for k, (image, mask) in enumerate(figure(6 * k) for k in range(8))]
-
-
-def test_a_mask_that_covers_what_moves_is_usable() -> None:
-    rows = rows_of(lambda mask: mask)
-    assert all(row["usable"] for row in rows)
-    assert max(row["beside"] for row in rows) == 0.0
-    assert {row["longer_side"] for row in rows} == {60}
-
-
 def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
     def arm(mask: Any) -> Any:
         part = mask.copy()
@@ -186,7 +172,8 @@ def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
         part[:, : np.flatnonzero(mask.any(axis=0))[12]] = False
         return part
 
-    rows = rows_of(arm)
+    quality = FrameQuality(30.0)
+    rows = [quality.row(image, of(arm(mask)), k) for k, (image, mask) in enumerate(figure(6 * k) for k in range(8))]
     assert min(row["beside"] for row in rows[4:]) > 0.5
     assert not any(row["usable"] for row in rows[4:])
 
@@ -313,17 +300,6 @@ def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None
         posefit.track([tmp_path / "c" / "0.npz", tmp_path / "c" / "1.npz"], camera=moved)
 
 
-def test_a_segmenter_gets_the_roi_alone_and_its_masks_are_put_there(
-    filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
-) -> None:
-    segmenter("box", Box)
-    _, masks = segmented(filmed[0], Extraction("box", roi=(40, 10, 80, 100)), (0, 4))
-    assert masks[0].shape == (120, 160)
-    rows, columns = np.flatnonzero(masks[0].any(axis=1)), np.flatnonzero(masks[0].any(axis=0))
-    assert (rows[0], columns[0], columns[-1]) == (30, 45, 57)
-    assert len(masks) == 4
-
-
 def test_a_segmenter_that_breaks_a_rule_is_named(
     filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
 ) -> None:
@@ -335,13 +311,6 @@ def test_a_segmenter_that_breaks_a_rule_is_named(
     ]:
         with pytest.raises(BrokenRuleError, match=message):
             segmented(filmed[0], Extraction("box", settings={"wrong": wrong}))
-
-
-def test_settings_of_a_segmenter_reach_it(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
-    for name, words in (("a", []), ("b", ["--set", "mixture.threshold=4000"])):
-        assert run("extract", filmed[0], "--frames", "14:40", *words, "--out", tmp_path / name).exit_code == 0
-    areas = [arrays(tmp_path / name / "masks.npz")["masks"].sum() for name in ("a", "b")]
-    assert areas[1] < 0.8 * areas[0]
 
 
 MIDDLE = np.array([0.0, 1.0, 0.0])

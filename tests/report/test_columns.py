@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from posefit.evaluation.measures import BASELINES, MEASURES
+from posefit.evaluation.measures import BASELINES
 from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import run_cell
 from tests.report.contests import FIRST
@@ -45,15 +45,3 @@ def test_a_row_has_how_often_the_likeliest_mode_was_right(row):
     assert all(0.0 <= share <= 1.0 for share in right)
     without = run_cell(replace(CELL, frames=2)).row
     assert (without["mode_reliability"], without["interval_mm"]) == ([], None)
-
-
-def test_titles_meanings_and_digits_are_those_of_the_measures():
-    about = {name: COLUMNS[name].as_dict() for name, column in COLUMNS.items() if column.in_tables}
-    for name, measure in {"error": "error_degrees", "lost": "lost_rate", "iou": "iou", "mpjpe": "mpjpe_mm"}.items():
-        assert about[name]["title"].startswith(MEASURES[measure].label)
-        assert about[name]["about"] == MEASURES[measure].meaning
-    assert all(column["about"] for column in about.values())
-    assert (about["lost"]["factor"], about["lost"]["digits"], about["ms"]["factor"], about["ms"]["digits"]) == (
-        100.0, 1, 1.0, 1,
-    )  # fmt: skip
-    assert [COLUMNS[name].heading for name in ("mpjpe", "lost")] == ["MPJPE (mm)", "lost"]  # a share in files

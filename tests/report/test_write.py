@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -187,23 +186,13 @@ def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) 
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
 
 
-def test_only_figures_need_a_library_beyond_the_core(results: Path, tmp_path: Path) -> None:
-    code = """
-import sys
-for name in ("matplotlib", "pandas", "distributed", "playwright"):
-    sys.modules[name] = None
-from posefit.cli import main
-main(sys.argv[1:])
-"""
-    words = [sys.executable, "-W", "error", "-c", code, "report", str(results), "--out"]
-    done = subprocess.run([*words, str(tmp_path / "a.html")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    words += [str(tmp_path / "b.html"), "--figures", str(tmp_path / "figures")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "figures need the library matplotlib: pip install posefit[figures]" in done.stderr
-    assert not (tmp_path / "b.html").exists()
+def test_without_matplotlib_figures_are_one_line_and_nothing_is_written(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    line = error_of("report", results, "--out", tmp_path / "b.html", "--figures", tmp_path / "figures")
+    assert "figures need the library matplotlib: pip install posefit[figures]" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["results"]
 
 
 def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
@@ -218,22 +207,7 @@ def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
     }  # fmt: skip
 
 
-def test_csv_is_read_back_with_what_would_break_it(tmp_path: Path) -> None:
-    rows = [{"method": 'a,"b"\nc', "error": 0.1 + 0.2}, {"method": "Ä", "lost": None, "error": 1}]
-    write_csv(rows, tmp_path / "rows.csv")
-    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
-        read = list(csv.DictReader(file))
-    assert read == [
-        {"method": 'a,"b"\nc', "error": "0.30000000000000004", "lost": ""},
-        {"method": "Ä", "error": "1", "lost": ""},
-    ]
-
-
-def test_csv_without_rows_or_over_a_file_is_refused(tmp_path: Path) -> None:
+def test_csv_without_rows_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="rows must be at least one, got none"):
         write_csv([], tmp_path / "rows.csv")
     assert list(tmp_path.iterdir()) == []
-    (tmp_path / "rows.csv").write_text("mine")
-    with pytest.raises(ValueError, match="rows.csv: expected a new name to write to, got one that exists"):
-        write_csv([{"a": 1}], tmp_path / "rows.csv")
-    assert (tmp_path / "rows.csv").read_text() == "mine"
