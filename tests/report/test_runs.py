@@ -1,6 +1,5 @@
 """The rows of a ledger as numbers: distinct names, a stable order, and nan where a row has no figure."""
 
-import json
 import random
 from dataclasses import replace
 from pathlib import Path
@@ -106,14 +105,3 @@ def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
 def test_seeds_of_any_size_keep_every_digit(tmp_path: Path) -> None:
     runs = read(tmp_path, *(result(replace(FIRST, seed=seed), 1.0) for seed in (2**70 + 1, 2**70)))
     assert [runs.seeds[k] for k in runs.seed] == [2**70, 2**70 + 1]
-
-
-def test_failures_have_their_reasons_and_their_command(tmp_path: Path) -> None:
-    runs = read(tmp_path / "a", result(FIRST, 1.0), lost=[(SAPSO, ["slow", "slow", "dead"])])
-    (failure,) = runs.failures
-    assert (runs.failed, runs.unfinished) == ((0,), ("sapso@pca",))
-    assert (failure["name"], failure["reasons"]) == (str(SAPSO), ["slow", "dead"])
-    assert 'method = "sapso@pca"' in failure["command"]
-    assert json.dumps(runs.failures)
-    lost = [(replace(COOLER, seed=1), ["slow"])]
-    assert read(tmp_path / "b", result(SAPSO, 1.0), result(COOLER, 2.0), lost=lost).failed == (0, 1)
