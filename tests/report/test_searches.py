@@ -105,7 +105,6 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     data = data_in((tmp_path / "page.html").read_text("utf-8"))
     assert data["answer"] == lines[:3]
     assert data["failures"][0]["name"] == "pso on f1 in 9D, instance 10001, seed 3"
-    assert data["header"]["unfinished"] == ["pso"]
     assert data["baselines"] == [{"baseline": "random", "reached": pytest.approx(10.345)}]
     with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
         assert len(list(csv.DictReader(file))) == 12 + 1

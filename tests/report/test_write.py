@@ -97,23 +97,8 @@ def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_pat
         "left out of the comparison, for every method: 1 instance",
         "  walk, view 45°, instance 1: no run of sapso@pca",
     ]
-    assert lines[9].split() == [
-        "error",
-        "deg",
-        "95",
-        "%",
-        "interval",
-        "behind",
-        "p",
-        "lost",
-        "in",
-        "lost",
-        "%",
-        "skill",
-    ]
-    header = data_in(page)["header"]
-    assert header["failed_by"] == {"sapso@pca": 2}
-    assert header["dropped"] == [{"instance": "walk, view 45°, instance 1", "missing": ["sapso@pca"]}]
+    assert " ".join(lines[9].split()) == "error deg 95 % interval behind p lost in lost % skill"
+    assert data_in(page)["header"]["dropped"] == [{"instance": "walk, view 45°, instance 1", "missing": ["sapso@pca"]}]
 
 
 def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: Path) -> None:
@@ -125,7 +110,6 @@ def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: 
     ]
     data = data_in(page)
     assert data["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
-    assert data["header"]["unfinished"] == ["random@pca"]
 
 
 def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> None:

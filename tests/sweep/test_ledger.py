@@ -73,11 +73,8 @@ SPEC = cells(1)[0].spec
     ("column", "change", "reason"),
     [
         ("row", {"cost": "low"}, "cost must be a number that a cell can measure, got 'low'"),
-        ("row", {"cost": 10**400}, "cost must be a number"),
         ("row", {"cost": float("nan")}, "finite numbers"),
-        ("row", {"error_degrees": {"mean": "x"}}, "error_degrees must be"),
         ("row", {"trace": {"evaluations": [1, 1], "cost": [2, 1]}}, "trace must be rising evaluations"),
-        ("row", {"trace": {"evaluations": [1], "cost": []}}, "trace must be rising evaluations"),
         ("row", {"joint_errors_mm": [0.0] * 26}, "joint_errors_mm must be 27 numbers"),
         ("row", {"warnings": "none"}, "warnings must be"),
         ("row", {"warnings": ["\ud800"]}, "whole characters"),
