@@ -189,9 +189,8 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         runs=len(runs),
         above=float(np.median([run.cost - run.truth_cost for run in runs])),
         reached=float(np.isfinite(reached).mean()),
-        running_times={above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},
+        running_times={
+            above: float(times[place]) if np.isfinite(times[place]) else None
+            for above, place in zip(shown, places, strict=True)
+        },
     )
-
-
-def _finite(value: Array | float) -> float | None:
-    return float(value) if np.isfinite(value) else None
