@@ -65,7 +65,8 @@ def test_a_height_half_or_twice_the_usual_is_no_other_unit() -> None:
 
 def test_one_of_several_cameras_is_chosen_by_name(tmp_path: Path) -> None:
     path, source = calibration(tmp_path / "two.toml", 1.0), views(tmp_path)[0]
-    assert len(scene_of([source], camera=[f"{path}:cam0"], up="y").cameras) == 1
+    scene = scene_of([source], camera=[f"{path}:cam0"], up="y")
+    np.testing.assert_allclose(scene.cameras[0].position, camera(AZIMUTHS[0]).position, atol=1e-6)
     error = error_of("track", source, "--camera", path, "--out", tmp_path / "out")
     assert "camera must be given for each view, 1, got 2: cam0, cam1; FILE:NAME is one of a file" in error
     assert "unit must be given for calibrations and files of motions only, got 'mm' for masks" in error_of(
