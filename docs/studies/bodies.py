@@ -123,7 +123,7 @@ ACTS: Mapping[str, Sequence[Act]] = {
     "squats": [Act("02_06", 40.0, start=180), Act("14_06", 60.0), Act("14_20", 20.0)],
     "turns": [Act("29_01", 60.0, start=100), Act("09_12", 30.0, start=200), Act("17_03", 80.0)],
 }
-LIMPS = [Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "29_01", "49_01")]
+LIMPS = [Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "16_22", "49_01")]
 
 
 class Shot(NamedTuple):
