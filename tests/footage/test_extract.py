@@ -16,7 +16,7 @@ from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
-from posefit.silhouette.foreground import Still, people
+from posefit.silhouette.foreground import Still, mean_background, people
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.files import arrays, csv_rows
@@ -72,6 +72,15 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
         tmp_path / "out" / "masks.npz", method="@loose", frames=(5, 9), view_degrees=90, evaluations=400
     )
     assert result.summary["iou"] > 0.4
+
+
+def test_a_mean_background_is_the_mean_and_its_spread() -> None:
+    images = [np.full((2, 3, 3), value, dtype=np.uint8) for value in (10, 20, 30)]
+    still = mean_background(iter(images))
+    np.testing.assert_allclose(still.middle, 20.0)
+    np.testing.assert_allclose(still.spread, np.sqrt(200.0 / 3.0), rtol=1e-6)
+    with pytest.raises(ValueError, match="at least one frame"):
+        mean_background([])
 
 
 def test_a_shadow_is_darker_but_has_the_grounds_colour() -> None:

@@ -1,4 +1,4 @@
-"""Without a GPU: what is said where there is none, and that nothing of one is needed until it is asked for."""
+"""Without a GPU: what is said where there is none, and what a device would get."""
 
 import numpy as np
 import pytest
