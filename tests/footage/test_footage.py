@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from posefit.uncertainty.modes import nearer_mirrored
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, iou, truth, walk
+from tests.tracking.scenes import stopping
 
 QUICK: dict[str, Any] = {
     "method": "sapso",
@@ -97,15 +98,9 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     assert not views[2].silhouettes[0].valid.any()
     assert views[2].silhouettes[1].valid.all()
     assert views[3].silhouettes[0].valid.all()
-    calibration, sources = (
-        toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6)),
-        [tmp_path / "a.npz", tmp_path / "b.npz"],
-    )
-    settings: dict[str, Any] = {"method": "@loose", "evaluations": 200, "restarts": 1, "body_frames": 0}
-    result = posefit.track(sources, camera=calibration, up="y", **settings)
-    assert result.summary["held_frames"] == 0
     np.savez(tmp_path / "b.npz", masks=front, usable=~usable)  # no frame shows enough in both
-    scene = scene_of(sources, camera=[calibration], up="y")
+    calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
+    scene = scene_of([tmp_path / "a.npz", tmp_path / "b.npz"], camera=[calibration], up="y")
     assert np.linalg.norm(scene.anchor - walk().translations[8]) < 1.0
 
 
@@ -126,30 +121,14 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path:
     assert not silhouette.valid.all()
 
 
-class StopError(Exception):
-    """The power fails."""
-
-
-def stopping(after: int, error: BaseException) -> Any:
-    def progress(frames: Iterator[Any], count: int) -> Iterator[Any]:
-        for k, frame in enumerate(frames):
-            yield frame
-            if count == 20 and k + 1 == after:
-                raise error
-
-    return progress
-
-
 def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8), usable=np.arange(20) != 11)
     settings: dict[str, Any] = {"evaluations": 400, "restarts": 1, "body_frames": 0, "method": "sapso"}
     whole = posefit.track(path, out=tmp_path / "whole", **settings)
     messages: list[str] = []
-    with pytest.raises(StopError):
-        posefit.track(
-            path, out=tmp_path / "out", progress=Progress(messages.append, stopping(11, StopError())), **settings
-        )
+    with pytest.raises(KeyboardInterrupt):
+        posefit.track(path, out=tmp_path / "out", progress=replace(stopping(11), log=messages.append), **settings)
     assert not (tmp_path / "out").exists()
     assert "11 finished frames are kept: the same command with --resume goes on from there" in messages
     again = posefit.track(path, out=tmp_path / "out", resume=True, progress=Progress(messages.append), **settings)
