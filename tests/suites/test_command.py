@@ -167,15 +167,11 @@ def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> Non
     assert together.reached == pytest.approx(np.mean([score.reached for score in others]))
 
 
-def test_the_ledger_is_a_table_and_a_report(results: Path, tmp_path: Path) -> None:
+def test_the_ledger_is_a_table(results: Path) -> None:
     table = Ledger(results).frame()
     assert len(table) == 12
     assert set(table["function"]) == {1, 7}
     assert set(table["settings"]) == {"", "population_size=20"}
-    done = run("report", results, "--out", tmp_path / "page.html")
-    assert done.exit_code == 0, done.stderr
-    assert " % of all targets reached " in done.stdout.splitlines()[0]
-    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
 @each(
