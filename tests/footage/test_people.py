@@ -8,7 +8,7 @@ import numpy as np
 
 import posefit
 from posefit.footage.cleaning import people_in
-from posefit.footage.people import People, cut_out, paste, planes_of
+from posefit.footage.people import People, planes_of
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
@@ -60,16 +60,6 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     wrong = [k for k, pair in enumerate(shares) if pair[1 - which] > pair[which]]
     assert len(wrong) <= 0.02 * FRAMES
     assert np.mean(shares, axis=0)[1 - which] < 0.05
-
-
-def test_a_mask_is_the_same_after_it_was_cut_out() -> None:
-    mask = np.random.default_rng(0).random((40, 50)) > 0.98
-    again = np.zeros_like(mask)
-    paste(cut_out(mask), again)
-    np.testing.assert_array_equal(again, mask)
-    nothing = np.zeros_like(mask)
-    paste(cut_out(nothing), nothing)
-    assert not nothing.any()
 
 
 def test_memory_of_noise_is_given_back() -> None:
