@@ -414,12 +414,11 @@ def intervals_lines(films: Sequence[Film]) -> Iterator[str]:
     cells, unwidened = [], []
     for views, (where, name) in product(PLACES, enumerate(("body", "world"))):
         some = [film for film in films if film.views == views]
-        same_kind = [film for film in films if (film.views > 1) == (views > 1)]
-        taught = {part: int(1e3 * GRID[least_shared(same_kind, where, joints)]) for part, joints in JOINTS_OF.items()}
+        taught = {part: int(1e3 * GRID[least_shared(some, where, joints)]) for part, joints in JOINTS_OF.items()}
         yield f"{views} cameras, in the {name}, mm: {taught}"
         held = np.empty((len(some), len(LEVELS), len(JOINTS)))
         for film, shares in zip(some, held, strict=True):
-            others = [other for other in same_kind if other.body != film.body]
+            others = [other for other in some if other.body != film.body]
             for joints in JOINTS_OF.values():
                 shares[:, joints] = film.held[where, least_shared(others, where, joints)][:, joints]
         parts = [percent(float(held[:, MAIN_LEVEL, joints].mean()), 0) for joints in JOINTS_OF.values()]

@@ -1,7 +1,7 @@
 """What joints of footage are off in all frames alike: the build, joint centres, the calibration, and depth.
 
-A posterior's samples share these errors with the reported pose. `docs/studies/bodies.py` learned them from
-21 tracks.
+A posterior's samples share these errors with the reported pose. `docs/studies/bodies.py` learned them from 160
+tracks.
 """
 
 import math
@@ -24,15 +24,15 @@ PARTS: Mapping[str, Sequence[str]] = {  # joints, named after the bones that end
     "head": ("upperneck", "head"),
     "arms": ("humerus", "radius", "wrist", "hand"),
 }
-# Standard deviations of each axis in millimetres, by one camera and by several: about the root, and in the world.
-SHARED_MM: Mapping[str, tuple[tuple[int, int], tuple[int, int]]] = {
-    "pelvis": ((0, 0), (50, 30)),
-    "hips": ((0, 20), (60, 35)),
-    "knees": ((20, 30), (0, 50)),
-    "feet": ((70, 35), (0, 35)),
-    "shoulders": ((15, 25), (60, 30)),
-    "head": ((10, 20), (0, 25)),
-    "arms": ((0, 25), (0, 40)),
+# Standard deviations of each axis in millimetres, by one camera, by two and by more: about the root, and in the world.
+SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
+    "pelvis": ((0, 0, 0), (0, 60, 30)),
+    "hips": ((0, 15, 15), (0, 60, 30)),
+    "knees": ((30, 20, 15), (0, 80, 40)),
+    "feet": ((0, 25, 20), (0, 70, 35)),
+    "shoulders": ((15, 20, 20), (0, 60, 30)),
+    "head": ((15, 15, 20), (0, 60, 25)),
+    "arms": ((0, 20, 25), (0, 70, 50)),
 }
 DEPTH = 0.02  # of the distance from a camera that is alone, where the person's height is given
 STATURE = 0.054  # of adults' height; a person who is a tenth taller than assumed is a tenth farther away
@@ -49,7 +49,8 @@ def in_footage(model: Recalibration, cameras: int, height_known: bool) -> Recali
 def shared_spreads(cameras: int, world: bool = False) -> Array:
     """Return by how much joints (27,) are off, metres on each axis: about the root, or in the world but for depth."""
     part_of = {name: part for part, names in PARTS.items() for name in names}
-    return np.array([1e-3 * SHARED_MM[part_of[kind(joint)]][world][cameras > 1] for joint in JOINTS])
+    column = min(cameras, 3) - 1
+    return np.array([1e-3 * SHARED_MM[part_of[kind(joint)]][world][column] for joint in JOINTS])
 
 
 def depth_halves(model: Recalibration, camera: Camera, place: Array) -> Array:

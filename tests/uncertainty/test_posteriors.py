@@ -73,11 +73,11 @@ def test_factors_multiply_the_intervals() -> None:
 
 
 def test_the_root_is_off_in_the_world_alone() -> None:
-    for cameras in (1, 2, 4):
+    for cameras in (2, 3, 4):  # one camera leaves the depth open, see the next test, and that is more than the rest
         about, world = shared_spreads(cameras), shared_spreads(cameras, world=True)
         assert about[0] == 0.0
         assert world[0] > 0.0
-    np.testing.assert_array_equal(shared_spreads(2), shared_spreads(4))
+    np.testing.assert_array_equal(shared_spreads(3), shared_spreads(4))
 
 
 def test_one_camera_alone_does_not_show_the_depth() -> None:
