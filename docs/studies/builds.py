@@ -13,6 +13,7 @@ from typing import NamedTuple
 import click
 import numpy as np
 
+from posefit.cli.output import Command
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Task
 from posefit.footage.scene import rendered, synthetic
@@ -50,7 +51,6 @@ LIMBS = {
     "thigh": ("lfemur",),
     "shank": ("ltibia",),
     "upper arm": ("lhumerus",),
-    "forearm": ("lradius",),
     "forearm and hand": ("lradius", "lwrist", "lhand"),
 }
 PARTS = ("stature", *LIMBS)
@@ -97,7 +97,7 @@ def _off(body: Body, true: Body) -> list[float]:
     return [100.0 * abs(length / other - 1.0) for length, other in zip(lengths, others, strict=True)]
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @WORKERS
 def main(workers: int | None) -> None:
     for line in builds_lines(workers):

@@ -6,7 +6,6 @@ ln(1 + best cost), which the rewards of an episode sum up to.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import click
@@ -20,8 +19,7 @@ from posefit.fitting.cma import Strategy
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.policies import Policy, race_action, race_features
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES, SEARCHES
-from posefit_reproduce.jobs import each
-from table import LEVEL, RESAMPLES, WORKERS, earlier, kept, markdown
+from table import WORKERS, drawn_means, markdown, measured, quantiles
 
 NAME = "posefit/Race-v0"
 INSTANCES, SEEDS = 192, 2
@@ -36,16 +34,14 @@ LOG_DEVIATION = -1.0  # of PPO's first actions: of several that are clipped to 1
 SAC_ENVIRONMENTS, SAC_STEPS = 16, 24_000
 SAC_SETTINGS: dict[str, Any] = {"buffer_size": SAC_STEPS, "gradient_steps": 4}
 REFERENCES = ("round robin", "random actions", "one restarted", "halving")
-NETWORKS = ("PPO, a shared net", "PPO", "SAC")
-LEARNERS = ("bandit", "linear, CMA-ES", *NETWORKS)
+LEARNERS = ("bandit", "linear, CMA-ES", "PPO, a shared net", "PPO", "SAC")
 
 
 class Turn(NamedTuple):
-    """One row: a policy, the seed of its training, and the held-out instances."""
+    """One row: a policy, and the seed of its training."""
 
     agent: str
     seed: int
-    instances: int
 
 
 def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
@@ -271,13 +267,11 @@ def policy_of(turn: Turn, env: Any) -> tuple[Policy, int]:
 
 
 def row_of_turn(turn: Turn) -> dict[str, Any]:
-    """Return a row: the final costs of a policy on the held-out instances, and what its training took."""
-    start, env = perf_counter(), _made(turn.instances)
+    """Return a row: the final costs of a policy on the held-out instances, and the steps of its training."""
+    env, numbers = _made(INSTANCES), range(HELD_OUT, HELD_OUT + INSTANCES)
     policy, steps = policy_of(turn, env)
-    minutes = (perf_counter() - start) / 60.0
-    numbers = range(HELD_OUT, HELD_OUT + turn.instances)
     costs, _ = final_costs(policy, env, numbers, numbers)
-    return turn._asdict() | {"steps": steps, "minutes": round(minutes, 2), "costs": costs.tolist()}
+    return turn._asdict() | {"steps": steps, "costs": costs.tolist()}
 
 
 def turn_of(row: Mapping[str, Any]) -> Turn:
@@ -287,56 +281,26 @@ def turn_of(row: Mapping[str, Any]) -> Turn:
 
 def race_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the printed table, the highest mean first; intervals are of 95 %, a bootstrap of seeds and instances."""
-    costs = {agent: np.array([row["costs"] for row in rows if row["agent"] == agent]) for agent in _agents(rows)}
-    cells = []
+    agents = dict.fromkeys(row["agent"] for row in rows)
+    costs = {agent: np.array([row["costs"] for row in rows if row["agent"] == agent]) for agent in agents}
+    robin, cells = costs["round robin"], []
     for agent, own in sorted(costs.items(), key=lambda item: -float(item[1].mean())):
-        mine = [row for row in rows if row["agent"] == agent]
-        steps, minutes = (np.mean([row[name] for row in mine]) for name in ("steps", "minutes"))
-        gains = [_interval(_drawn(costs["round robin"]) - _drawn(own), costs["round robin"].mean() - own.mean())]
-        gains += [_interval(_drawn(costs["one restarted"]) - _drawn(own), costs["one restarted"].mean() - own.mean())]
-        whole = costs["round robin"].mean() - costs["halving"].mean()
-        shares = (_drawn(costs["round robin"]) - _drawn(own)) / (
-            _drawn(costs["round robin"]) - _drawn(costs["halving"])
-        )
-        gains += [_interval(shares, (costs["round robin"].mean() - own.mean()) / whole)]
-        cells.append([agent, f"{steps:,.0f}", str(len(own)), f"{minutes:.1f}", f"{own.mean():.2f}", *gains])
-    heads = ["policy", "trained steps", "seeds", "minutes", "ln(1 + cost)", "below round robin", "below one restarted"]
-    yield from markdown([*heads, "share of halving's gain"], cells)
-
-
-def _agents(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(row["agent"] for row in rows))
-
-
-def _drawn(costs: Array) -> Array:
-    """Return means (2000,) of costs (seeds, instances) by a bootstrap of both, with the same instances for all."""
-    rng = np.random.default_rng(0)
-    columns = rng.integers(costs.shape[1], size=(RESAMPLES, costs.shape[1]))
-    seeds = rng.integers(len(costs), size=(RESAMPLES, len(costs)))
-    return np.array([costs[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)])
-
-
-def _interval(drawn: Array, value: float) -> str:
-    low, high = np.quantile(drawn, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
-    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+        steps = np.mean([row["steps"] for row in rows if row["agent"] == agent])
+        low, high = quantiles(drawn_means(robin) - drawn_means(own))
+        gain = f"{robin.mean() - own.mean():.2f} ({low:.2f} to {high:.2f})"
+        cells.append([agent, f"{steps:,.0f}", str(len(own)), f"{own.mean():.2f}", gain])
+    yield from markdown(["policy", "trained steps", "seeds", "ln(1 + cost)", "below round robin"], cells)
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--agent", "names", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
-@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
-@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
 @click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
 @WORKERS
-def main(names: tuple[str, ...], seeds: int, instances: int, rows: str | None, workers: int | None) -> None:
-    learners = names or LEARNERS
-    if set(learners) & set(NETWORKS):
-        check_learners()
-    turns = [Turn(agent, 0, instances) for agent in REFERENCES]
-    turns += [Turn(agent, seed, instances) for agent in learners for seed in range(seeds)]
-    done = earlier(rows, turn_of)
-    jobs = {turn: partial(row_of_turn, turn) for turn in turns if turn not in done}
-    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
-    for line in race_lines([done[turn] for turn in turns]):
+def main(rows: str | None, workers: int | None) -> None:
+    check_learners()
+    turns = [Turn(agent, 0) for agent in REFERENCES]
+    turns += [Turn(agent, seed) for agent in LEARNERS for seed in range(SEEDS)]
+    done = measured({turn: partial(row_of_turn, turn) for turn in turns}, rows, turn_of, workers)
+    for line in race_lines([*done.values()]):
         click.echo(line)
 
 
