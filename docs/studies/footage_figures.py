@@ -241,10 +241,8 @@ def main(
             estimates = estimates_of(scene, motions[shows].training)
             table = table_of(recording.name, {name: figures_of(each, scene) for name, each in estimates.items()})
             (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
-            click.echo(
-                f"{recording.name}: {shows}, frames {first} to {first + scene.count - 1}, camera {scene.placing}"
-            )
-            click.echo("\n".join([f"\n{table}\n", *scene.warnings]))
+            head = f"{recording.name}: {shows}, frames {first} to {first + scene.count - 1}, camera {scene.placing}"
+            click.echo("\n".join([f"{head}\n\n{table}\n", *scene.warnings]))
             shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
             for figure, each in (("figure-8", single), ("figure-10", estimates)):
                 image = picture(scene, each, shown, first)
