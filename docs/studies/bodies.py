@@ -6,13 +6,14 @@
 The motions of the library's people, each left out of it, get bodies with other proportions, drawn with the spreads and
 correlations of adults, other girths, and flesh that is not centred on the joints. One, two or four cameras at eight
 metres, whose calibrations are a little wrong, film them; the masks are damaged as a segmenter does. A half of the
-films by one camera has landmarks that exchange left and right at times. Each track is kept in the folder, which the
-same command continues. The report says what intervals lack, learned from all bodies,
-and judges each body by what the others teach.
+films by one camera has landmarks that exchange left and right at times. Ten films are tracked with five seeds. Each
+track is kept in the folder, which the same command continues. The report says what intervals lack, learned from all
+bodies, and judges each body by what the others teach.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +23,7 @@ import cv2
 import numpy as np
 from scipy.special import ndtri
 
+from angles import SAGITTAL, angle_errors
 from composites_scene import (
     ACROSS,
     DISTANCE,
@@ -37,6 +39,7 @@ from composites_scene import (
     on_ground,
     walked_on,
 )
+from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS
@@ -58,9 +61,9 @@ from posefit.tracking.front import track
 from posefit.tracking.result import Track
 from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, Recalibration
 from posefit.uncertainty.intervals import quantiles
-from posefit.uncertainty.modes import nearer_mirrored
 from posefit.uncertainty.shared import DEPTH, PARTS, STATURE, shared_spreads
-from table import earlier, kept, markdown, percent
+from posefit_reproduce.jobs import each
+from table import WORKERS, earlier, kept, markdown, percent
 
 GIRTH = 0.1  # that a part of the body may be thicker or thinner than the average's
 # Standard deviations in metres of the flesh's middle from the joints: to the side, upwards, forwards. Ours.
@@ -88,6 +91,8 @@ EXCHANGE_FRAMES = 6.0  # that such an exchange lasts on average
 LONGEST = 60  # frames of those who stay
 WALK_METRES = 2.6
 BODIES = 10
+SEVERAL, SEEDS = 10, 5  # films, and seeds that each of them is tracked with
+SOONER = 60  # films before the other seeds
 GRID = 1e-3 * np.array([0, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70, 80, 100, 120, 150])  # metres of shared error
 STRIDE = 2  # frames of which the first is counted
 JOINTS_OF = {part: [j for j, joint in enumerate(JOINTS) if kind(joint) in names] for part, names in PARTS.items()}
@@ -95,6 +100,7 @@ SEGMENTS = {
     name: BONES.index(f"l{bone}")
     for name, bone in {"thigh": "femur", "shank": "tibia", "upper arm": "humerus", "forearm": "radius"}.items()
 }
+LEGS = [j for j, joint in enumerate(JOINTS) if kind(joint) in ("femur", "tibia", "foot")]  # knees, ankles, balls
 RIGHT_MM, WRONG_MM = 65.0, 75.0  # MPJPE of a track: at most, at least
 LIMP_DEGREES, LIMP_WARP = 7.0, 0.15  # of one thigh, and of the time: the share by which a cycle runs faster and slower
 
@@ -117,7 +123,7 @@ ACTS: Mapping[str, Sequence[Act]] = {
     "squats": [Act("02_06", 40.0, start=180), Act("14_06", 60.0), Act("14_20", 20.0)],
     "turns": [Act("29_01", 60.0, start=100), Act("09_12", 30.0, start=200), Act("17_03", 80.0)],
 }
-LIMPS = [Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "29_01", "49_01")]
+LIMPS = [Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "16_22", "49_01")]
 
 
 class Shot(NamedTuple):
@@ -128,12 +134,14 @@ class Shot(NamedTuple):
     views: int
     body: int
     landmarks: bool = False
+    seed: int = 0  # of the track
 
     @property
     def name(self) -> str:
         """Of its row, and of its file."""
         marks = "-landmarks" if self.landmarks else ""
-        return f"{self.situation}-{self.number}-{self.views}-{self.body}{marks}"
+        again = f"-seed-{self.seed}" if self.seed else ""
+        return f"{self.situation}-{self.number}-{self.views}-{self.body}{marks}{again}"
 
 
 def shots() -> list[Shot]:
@@ -146,7 +154,13 @@ def shots() -> list[Shot]:
                     listed.append(Shot(situation, number, views, (body + again) % BODIES, views == 1 and again == 0))
                 body += 1
     order = np.random.default_rng(62).permutation(len(listed))  # so that a part of them is of all kinds
-    return [listed[k] for k in order]
+    listed = [listed[k] for k in order]
+    first = [shot for shot in listed if shot.situation != "limp"][:SEVERAL]
+    return [
+        *listed[:SOONER],
+        *(shot._replace(seed=seed) for seed in range(1, SEEDS) for shot in first),
+        *listed[SOONER:],
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +193,12 @@ def body_of(number: int) -> tuple[Body, Body, Array]:
         right = rng.standard_normal(3) * spread
         for prefix, sign in (("", 1.0),) if name in JOINTS else (("l", 1.0), ("r", -1.0)):
             off[JOINTS.index(prefix + name)] = right * [sign, 1.0, 1.0]
+    bones = np.vstack([np.zeros(3), body.skeleton.offsets])
+    ends = [[j, *(k for k, parent in enumerate(PARENTS) if parent == j)] for j in range(len(JOINTS))]
+    for joint in range(len(JOINTS)):  # flesh turns about the joints: it is moved across the longest bone, not along it
+        longest = max((bones[k] for k in ends[joint]), key=np.linalg.norm)
+        along = longest / np.linalg.norm(longest)
+        off[joint] -= (off[joint] @ along) * along
     for joint, parent in enumerate(PARENTS):
         if joint and not off[joint].any():  # hands, toes and the head go with what they hang on
             off[joint] = off[parent]
@@ -279,6 +299,7 @@ def measured(folder: Path, shot: Shot) -> dict[str, Any]:
             camera=calibrated,
             height=who.body.stature,
             train=[recorded.leaving_out(recorded.LIBRARY, [who.motion.name.partition("_")[0]])],
+            seed=shot.seed,
             progress=QUIET,
         )
     except ValueError as error:
@@ -287,29 +308,40 @@ def measured(folder: Path, shot: Shot) -> dict[str, Any]:
         for path in paths:
             path.unlink()
     row |= figures(result, who)
-    keep(folder / f"{shot.name}.npz", result, who)
+    if not shot.seed:
+        keep(folder / f"{shot.name}.npz", result, who)
     return row
 
 
 def figures(result: Track, who: Person) -> dict[str, Any]:
     """Return what a track is worth."""
     true, joints = who.motion.joints, result.motion.joints
-    mpjpe, swapped = metrics.mpjpe_mm(true, joints), nearer_mirrored(true, joints)
+    mpjpe, swapped = metrics.mpjpe_mm(true, joints), legs_exchanged(true, joints)
     known = result.table["unknown_sides"] == 0.0
     lengths = [motion.skeleton.lengths for motion in (who.motion, result.motion)]
+    angles = clinical_angles(result.motion.skeleton, result.motion.poses)
     assert result.trust is not None
     return {
         "mpjpe_mm": float(mpjpe.mean()),
         "lost": float((mpjpe > LOST_MM).mean()),
-        "swapped": float(swapped.mean()),
+        "exchanged": float(swapped.mean()),
         "unknown": float(1.0 - known.mean()),
-        "known_wrong": float((swapped & known).mean()),
+        "known_exchanged": float((swapped & known).mean()),
         "iou": result.measures.iou,
         "lengths": {name: float(lengths[1][bone] / lengths[0][bone] - 1.0) for name, bone in SEGMENTS.items()},
         "build": result.log.build,
+        "degrees": angle_errors(who.motion, angles, np.ones(len(true), dtype=bool)),
         "trust": {name: value for name, value in vars(result.trust).items() if name != "unknown_signs"},
         "gait": [steps_of(gait_of(who.motion)), steps_of(result.gait)],
     }
+
+
+def legs_exchanged(true: Array, joints: Array) -> Array:
+    """Return in which frames (T,) the legs of joints (T, 27, 3) are nearer to the other ones of the truth."""
+    here, there = joints - joints[:, :1], true - true[:, :1]
+    other = np.array(OTHER_SIDE)[LEGS]
+    off, exchanged = (np.linalg.norm(there[:, LEGS] - here[:, legs], axis=2).mean(axis=1) for legs in (LEGS, other))
+    return np.asarray(exchanged < off)
 
 
 def steps_of(gait: Gait) -> dict[str, float | None]:
@@ -401,40 +433,50 @@ def intervals_lines(films: Sequence[Film]) -> Iterator[str]:
 
 
 def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield errors of joints and lengths, and verdicts, by the number of cameras."""
-    heads = [
-        "cameras",
-        "films",
-        "MPJPE mm",
-        *(f"{name} %" for name in SEGMENTS),
-        "known and wrong %",
-        "right",
-        "good %",
-        "wrong",
-        "good %",
-    ]
+    """Yield errors of joints, lengths and angles, by the number of cameras."""
+    heads = ["cameras", "films", "MPJPE mm", "through", *(f"{name} %" for name in SEGMENTS)]
+    heads += ["known and exchanged %", *(f"{name.replace('_', ' ')} degrees" for name in SAGITTAL)]
     cells = []
     for views in PLACES:
         some = [row for row in rows if row["views"] == views]
-        off = [100.0 * float(np.mean([abs(row["lengths"][name]) for row in some])) for name in SEGMENTS]
-        right, wrong = (
-            [row["trust"]["grade"] == "good" for row in some if ok(row["mpjpe_mm"])]
-            for ok in (lambda x: x <= RIGHT_MM, lambda x: x >= WRONG_MM)
-        )
-        verdicts = [
-            text for each in (right, wrong) for text in (str(len(each)), percent(np.mean(each), 0) if each else "-")
-        ]
+        walks = [row["mpjpe_mm"] for row in some if row["situation"] == "through"]
         cells.append(
             [
                 str(views),
                 str(len(some)),
                 f"{np.median([row['mpjpe_mm'] for row in some]):.0f}",
-                *(f"{x:.1f}" for x in off),
-                percent(np.mean([row["known_wrong"] for row in some]), 1),
-                *verdicts,
+                f"{np.median(walks):.0f}" if walks else "-",
+                *(f"{100.0 * np.mean([abs(row['lengths'][name]) for row in some]):.1f}" for name in SEGMENTS),
+                percent(float(np.mean([row["known_exchanged"] for row in some])), 1),
+                *(f"{np.median([row['degrees'][name] for row in some]):.1f}" for name in SAGITTAL),
             ]
         )
     yield from markdown(heads, cells, 1)
+
+
+def verdict_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield how many right tracks, and how many wrong ones, read good, by bodies and the number of cameras."""
+    cells = []
+    for views, odd in product(PLACES, (0, 1)):
+        some = [row for row in rows if row["views"] == views and row["body"] % 2 == odd]
+        right = [row["trust"]["grade"] for row in some if row["mpjpe_mm"] <= RIGHT_MM]
+        wrong = [row["trust"]["grade"] for row in some if row["mpjpe_mm"] >= WRONG_MM]
+        good = [f"{grades.count('good')} of {len(grades)}" for grades in (right, wrong)]
+        cells.append([str(views), "odd" if odd else "even", *good])
+    yield from markdown(["cameras", "bodies", "right: good", "wrong: good"], cells, 2)
+
+
+def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield by how much the MPJPE of films differs between seeds of the track."""
+    films: dict[str, list[float]] = {}
+    for row in rows:
+        films.setdefault(row["name"].partition("-seed-")[0], []).append(row["mpjpe_mm"])
+    cells = [
+        [name, str(len(mpjpe)), f"{min(mpjpe):.0f} to {max(mpjpe):.0f}", f"{np.std(mpjpe, ddof=1):.1f}"]
+        for name, mpjpe in films.items()
+        if len(mpjpe) > 1
+    ]
+    yield from markdown(["film", "seeds", "MPJPE mm", "standard deviation"], cells, 1)
 
 
 def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -460,24 +502,25 @@ def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 @click.command(help=__doc__)
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--report", is_flag=True, help="Print what the folder holds instead.")
-def main(folder: Path, report: bool) -> None:
+@WORKERS
+def main(folder: Path, report: bool, workers: int | None) -> None:
     folder.mkdir(exist_ok=True)
     rows = folder / "rows.jsonl"
     done = earlier(str(rows), lambda row: row["name"])
-    if report:
-        tracked = [row for row in done.values() if "refused" not in row]
-        click.echo(f"{len(tracked)} of {len(done)} films were tracked")
-        limps = [row for row in tracked if row["situation"] == "limp"]
-        for lines in (
-            intervals_lines([film_of(folder, row) for row in tracked]),
-            accuracy_lines(tracked),
-            limps_lines(limps),
-        ):
-            click.echo("\n".join([*lines, ""]))
-        return
-    remaining = ((shot.name, measured(folder, shot)) for shot in shots() if shot.name not in done)
-    for name, row in kept(str(rows), remaining, len(shots()) - len(done)):
-        click.echo(f"{name}: {row.get('refused') or round(row['mpjpe_mm'])}")
+    if not report:
+        jobs = {shot.name: partial(measured, folder, shot) for shot in shots() if shot.name not in done}
+        done |= each(jobs, workers, partial(kept, str(rows))) if jobs else {}
+    tracked = [row for row in done.values() if "refused" not in row]
+    films = [row for row in tracked if not row["seed"]]
+    click.echo(f"{len(films)} of {len(shots()) - SEVERAL * (SEEDS - 1)} films were tracked")
+    for lines in (
+        intervals_lines([film_of(folder, row) for row in films]),
+        accuracy_lines(films),
+        verdict_lines(films),
+        seeds_lines(tracked),
+        limps_lines([row for row in films if row["situation"] == "limp"]),
+    ):
+        click.echo("\n".join([*lines, ""]))
 
 
 if __name__ == "__main__":

@@ -86,7 +86,7 @@ def _percent_off(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
     training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
     task = Task(start, scene.cameras, options.budget, scene.yaw, scene.anchor, setup.translation, training=training)
-    shape = fitted_build(task, scene.observations, prepare(options, task).follow, BODY_FRAMES, height, seed)
+    shape, _ = fitted_build(task, scene, prepare(options, task).follow, BODY_FRAMES, height, seed)
     return _off(shape.body, true), _off(start, true)
 
 

@@ -22,6 +22,7 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, acceleration, runs, standing
+from posefit.reading import counted
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, touches_border
@@ -230,7 +231,7 @@ SIGNS: dict[str, Sign] = {each.name: each.metadata["sign"] for each in fields(Tr
 
 def signs_against(figures: Mapping[str, Any]) -> list[tuple[Grade, str]]:
     """Return what speaks against a track, the worst first, by figures named as `SIGNS`; None of them is not known."""
-    few = f"{figures['frames']} frames that show the person are too few to judge by"
+    few = f"only {counted(figures['frames'], 'frame')} to judge the person by"
     signs = [(1.0 - figures["frames"] / MIN_FRAMES, few)]
     for name, sign in SIGNS.items():
         if sign.limits is not None and figures[name] is not None:

@@ -1,7 +1,7 @@
 """Poses moved until the contours of a body are those of masks, by least squares: one frame, or the sums for many."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
 
 import cv2
@@ -59,6 +59,10 @@ class MaskContours:
         starts = np.cumsum([0, *map(len, points)])
         return cls(camera, metres, float(step), fields, np.array(corners), sizes, np.concatenate(points), starts)
 
+    def seen_by(self, camera: Camera) -> Self:
+        """Return the same borders as a camera sees them that stands and looks elsewhere."""
+        return replace(self, camera=replace(self.camera, rotation=camera.rotation, translation=camera.translation))
+
     def add(self, body: Body, frames: Array, scale: float, grown: kernels.Growth, sums: kernels.BoneSquares) -> None:
         """Add the squares of the distances between these borders and those of bodies, see `kernels.add_frames`."""
         camera = tuple(writeable(getattr(self.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
@@ -102,7 +106,7 @@ def _between(mask: Mask, around: Mask) -> Array:
 class ContourSquares(NamedTuple):
     """Half the Hessians and half the gradients of the squared distances between borders.
 
-    They are by n numbers of each frame, the root's place and the free angles, and by F factors of the build.
+    They are by n numbers of each frame, the root's place and the free angles, and by F factors that frames share.
     """
 
     hessians: Array  # (T, n, n)
@@ -118,21 +122,21 @@ def contour_squares(
     poses: Array,
     places: Array,
     scale: float,
-    grown: tuple[Array, Array] | None = None,
+    grown: Sequence[tuple[Array, Array]] = (),
 ) -> ContourSquares:
     """Return the squares of the distances between the borders of masks and those of a body in T poses at places.
 
-    Views have T frames, or one that all poses belong to. Distances beyond `scale` metres count less. `grown` is the
-    `growth` of the body; without it there are no factors.
+    Views have T frames, or one that all poses belong to. Distances beyond `scale` metres count less. `grown` says of
+    each view how joints (T, F, 27, 3) and radii (F, 26, 2) change with the factors; without it there are none.
     """
     skeleton, count = body.skeleton, len(poses)
-    wider, larger = grown or (np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))
-    factors = len(larger)
+    grown = grown or [(np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))] * len(views)
+    factors = len(grown[0][1])
     placed = skeleton.frames(poses, places)
     squares = np.zeros((1 + factors, 1 + factors))
     bones = [np.zeros((count, len(JOINTS), 6, columns)) for columns in (6, 1 + factors)]
     sums = kernels.BoneSquares(*bones)
-    for view in views:
+    for view, (wider, larger) in zip(views, grown, strict=True):
         view.add(body, placed[0], scale, kernels.Growth(wider, larger, squares), sums)
     free = np.flatnonzero(np.append([True] * 3, skeleton.free))
     hessians, gradients = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))

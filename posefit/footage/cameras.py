@@ -62,7 +62,7 @@ def combined(
     """
     rate, stated = _rate(views, fps)
     guesses = [guess for view in views for guess in view.masks.guesses]
-    if not stated:
+    if not stated and len(views[0].masks) > 1:
         guesses.append(f"{rate:g} frames a second")
     if not known:
         guesses.append("a level camera, 40 degrees across: distances and sizes are as good as that")

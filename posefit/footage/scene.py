@@ -47,6 +47,11 @@ class Scene:
     camera_moves: bool = False  # whether the first camera seems to
     reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
 
+    @property
+    def turns(self) -> bool:
+        """Whether cameras may be turned a little from their calibrations, which several masks show to be off."""
+        return len(self.cameras) > 1 and self.placing == "given"
+
     def motion(self, frames: Sequence[Frame]) -> Motion:
         """Return the person's motion that some frames estimate."""
         poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])

@@ -12,6 +12,7 @@ from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.settings import POPULATION_SIZE
@@ -26,6 +27,8 @@ from posefit.tracking.restarts import (
     first_shown_whole,
     usable_observations,
 )
+from posefit.tracking.smoothing.contours import fit_contours
+from posefit.tracking.smoothing.path import Visibility
 
 MIN_BODY_FRAMES = 5
 WARM_UP_POPULATIONS = 8
@@ -61,11 +64,15 @@ def initialise(
     if task.yaw is None:
         task = replace(task, start=method.start)
     _warm_up(method, task, scene)
-    start, shape, body_frames = clocks(), None, options.body_frames
+    start, shape, body_frames = clocks(), None, options.body_frames if scene.count > 1 else 0
     if options.restarts:
         searched = scene.observations, method.follow, options.restarts, options.seed
         task, _ = best_restart(task, *searched, log=progress.log)
-    if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
+    if (
+        body_frames
+        and scene.count > 1
+        and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES
+    ):
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
         needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
         progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
@@ -73,15 +80,15 @@ def initialise(
         progress.log(f"fitting the person's build to {body_frames} frames")
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = options.height or (task.body.stature if alone else None)
-        fitted = scene.observations, method.follow, body_frames, height, options.seed
-        shape = fitted_build(task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0)
-        task = replace(task, body=shape.body)
+        fitted = scene, method.follow, body_frames, height, options.seed
+        shape, cameras = fitted_build(task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0)
+        task = replace(task, body=shape.body, cameras=cameras)
     return task, shape, start
 
 
 def fitted_build(
     task: Task,
-    observations: Sequence[Observation],
+    scene: Scene,
     follow: Follow,
     frames: int,
     height: float | None,
@@ -89,14 +96,16 @@ def fitted_build(
     *,
     beta: float = BETA,
     restarts: int = 0,
-) -> Shape:
-    """Return the person's build, from the first usable frames: every third, where there are so many.
+) -> tuple[Shape, Sequence[Camera]]:
+    """Return the person's build, from the first usable frames, every third, where there are so many; and the cameras.
+
+    Several calibrated ones are turned a little so that their masks agree.
 
     It begins with the first frame that shows most: a person who comes in is cut, and visible to few cameras. By then
     they may have turned from the pose that the task begins with. Where that is longer ago than `NEAR_SECONDS`, the pose
     is searched again, with so many `restarts`, or by the tracker itself.
     """
-    stride, whole = TRIAL_STRIDE, first_shown_whole(observations)
+    observations, stride, whole = scene.observations, TRIAL_STRIDE, first_shown_whole(scene.observations)
     chosen = usable_observations(observations, frames, stride, whole)
     if len(chosen) < frames:
         chosen, stride = usable_observations(observations, frames), 1
@@ -112,7 +121,13 @@ def fitted_build(
         return list(follow(replace(task, body=body), chosen, np.random.default_rng(seed)))
 
     aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
-    return fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
+    shape = fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
+    if not scene.turns:
+        return shape, task.cameras
+    scene = replace(scene, body=shape.body, observations=chosen, count=len(chosen), fps=task.fps)
+    motion = scene.motion(frames_of(shape.body))
+    scene, _, fitted = fit_contours(scene, motion, Visibility.of(scene), shape, beta)
+    return fitted or shape, scene.cameras
 
 
 def _first_usable(observations: Sequence[Observation]) -> int:

@@ -19,6 +19,8 @@ from threadpoolctl import threadpool_limits
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, on_device
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import geodesic
 from posefit.motion.motion import Motion
 from posefit.output.folder import Recorder
 from posefit.progress import QUIET, Progress
@@ -52,6 +54,15 @@ def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
     return replace(scene, warnings=[*scene.warnings, *notes])
 
 
+def with_turns(scene: Scene, calibrated: Sequence[Camera]) -> Scene:
+    """Return a scene whose guesses say by how much its cameras were turned from their calibrations."""
+    turns = [geodesic(camera.rotation, other.rotation) for camera, other in zip(scene.cameras, calibrated, strict=True)]
+    if not scene.turns:
+        return scene
+    said = ", ".join(f"{np.degrees(turn):.2f}" for turn in turns)
+    return replace(scene, guesses=[*scene.guesses, f"cameras turned by {said} degrees, so that their masks agree"])
+
+
 def track_scene(
     scene: Scene,
     training: Sequence[Motion],
@@ -64,7 +75,7 @@ def track_scene(
 
     The options are those that `posefit.tracking.defaults.completed` returns. `recorder` gets every frame as it comes.
     """
-    scene = with_notes(on_device(scene, options.device), training)
+    scene = given = with_notes(on_device(scene, options.device), training)
     for warning in scene.warnings:
         progress.warn(warning)
     task = task_of(scene, options, training)
@@ -72,7 +83,7 @@ def track_scene(
         method = prepare(options, task)
         with progress.phase("build"):
             task, shape, start_clocks = initialise(scene, method, task, options, progress)
-            scene = replace(scene, body=task.body)
+            scene = replace(scene, body=task.body, cameras=task.cameras)
         method.audit.clear()  # what was tried before the first frame is in no row
         with progress.phase("track"):
             hypotheses = track_hypotheses(scene, task, method, options, recorder or Recorder(), progress)
@@ -88,6 +99,7 @@ def track_scene(
         if options.smooth:
             with progress.phase("smooth"):
                 scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
+        scene = with_turns(scene, given.cameras)
         with progress.phase("evaluate"):
             clock = clocks() - start_clocks + scene.reading_seconds
             track = evaluate(scene, frames, tracked, shape, method, task, options, clock)

@@ -115,7 +115,7 @@ def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int
         return iter([Frame(truth_of(scene).poses[0], scene.anchor, 0.0, areas, 0)] * len(rows))
 
     for count in counts:
-        fitted_build(task, observations, follow, count, None, 0)
+        fitted_build(task, replace(scene, observations=observations), follow, count, None, 0)
     return [call for k, call in enumerate(calls) if call not in calls[:k]]
 
 
@@ -165,7 +165,7 @@ def test_a_build_that_begins_late_looks_for_the_pose_again(late: int, restarts: 
         starts.append((task.yaw, tuple(task.before)))
         return iter([frame] * len(list(chosen)))
 
-    fitted_build(task, observations, follow, 5, None, 0, restarts=restarts)
+    fitted_build(task, replace(scene, observations=observations), follow, 5, None, 0, restarts=restarts)
     assert scene.fps == 30.0
     if late < 15:  # half a second
         assert starts == [(0.5, (first,))] * 2

@@ -133,7 +133,7 @@ def test_a_body_covers_half_of_what_moves() -> None:
         ({"stance_spread_m": 0.3}, "doubtful: feet stand at heights 0.30 m apart"),
         ({"explained": 0.35}, "do not use: the body covers 35% of what moves only"),
         ({"acceleration": 30.0}, "doubtful: joints jerk, by 30 m/s2"),
-        ({"frames": 2}, "doubtful: 2 frames that show the person are too few to judge by"),
+        ({"frames": 2}, "doubtful: only 2 frames to judge the person by"),
         (
             {"unknown": 0.3, "lost": 0.4},
             "doubtful: the person is lost in 40% of the frames, and 1 more sign speaks against it",
@@ -265,7 +265,7 @@ def test_the_sentence_stands_on_top_of_every_output_where_the_truth_is_unknown(t
     assert json.loads((tmp_path / "known" / "summary.json").read_text())["trust"] is None
     page = viewed(tmp_path / "unknown", replace(scene, truth=None), exact_frames(scene))
     summary = json.loads((tmp_path / "unknown" / "summary.json").read_text())
-    expected = "Trust: doubtful: 3 frames that show the person are too few to judge by."
+    expected = "Trust: doubtful: only 3 frames to judge the person by."
     assert summary["trust"]["sentence"] == expected
     assert str(tracked(replace(scene, truth=None), exact_frames(scene))).splitlines()[0] == expected
     assert f'"verdict":"{expected} The method does not report' in page.read_text("utf-8").replace('": "', '":"')

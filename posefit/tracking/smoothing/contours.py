@@ -1,12 +1,14 @@
 """Poses, path and build whose contours are those of the masks, by least squares over all frames at once.
 
 A tracker's estimate is one of the poses that it knows, and a search in each frame makes it shake. Here every angle
-gives way a little, and smoothly, to the contours of the masks; so does the build, which is the same in all frames.
+gives way a little, and smoothly, to the contours of the masks; so do the build and the turns of several cameras,
+which are the same in all frames.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,9 @@ from posefit.fitting.shape import MODEL_SPREAD, NAMES, PRECISION, REACH, SPREAD,
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import BONES
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
@@ -25,7 +29,8 @@ FACTOR_DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotie
 ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
 CONTOUR_ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
-MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor
+MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor, or of a camera's turn
+CAMERA_DEVIATION = np.radians(0.2)  # that a calibrated camera may be turned: standard deviation about each axis; ours
 BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
 CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
@@ -48,34 +53,35 @@ class _Part:
     height: float | None
     visibility: Visibility
     spread: Array  # (17,) standard deviations of these logarithms
+    cameras: Sequence[Camera]
+    turns: Array  # (V, 3) radians that each camera's world was turned by; (0, 3) where calibrations are held
 
 
 def fit_contours(
     scene: Scene, motion: Motion, visibility: Visibility, shape: Shape | None, beta: float = BETA
-) -> tuple[Motion, Shape | None]:
-    """Return a steady motion fitted to the borders of a scene's masks, and the build fitted with it.
+) -> tuple[Scene, Motion, Shape | None]:
+    """Return a steady motion fitted to the borders of a scene's masks, with the scene's cameras and the build.
 
-    The build stays as it is where it was not fitted before (`shape` is None): it is then known. That of a long
-    track is fitted in the window with most usable frames. A result that costs more than its start is discarded. A
-    motion of fewer than 3 frames is returned as it is.
+    The build stays as it is where it was not fitted before (`shape` is None): it is then known. Several cameras are
+    turned a little from their calibrations. Both are fitted in the window of a long track with most usable frames. A
+    result that costs more than its start is discarded. A motion of fewer than 3 frames is returned as it is.
     """
     if len(motion) < 3 or not visibility.usable.any():
-        return motion, shape
+        return scene, motion, shape
     parts = windows_over(len(motion), CONTOUR_WINDOW, CONTOUR_OVERLAP)
     fitted: dict[int, _Part] = {}
-    if shape is not None:
+    if shape is not None or scene.turns:
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
-        part = _fitted(scene, motion, visibility, parts[best][0], scene.body, shape, beta)
-        if part.body is not scene.body:  # else no build fits better, and only poses are fitted
+        part = fitted[best] = _fitted(scene, motion, visibility, parts[best][0], shape, beta, turned=True)
+        if shape is not None and part.body is not scene.body:  # else no build fits better, and only poses are fitted
             spread = np.minimum(np.hypot(part.spread, MODEL_SPREAD), SPREAD)
             shape = replace(shape, body=part.body, factors=np.exp(part.factors), spread=spread)
-            fitted[best] = part
-    body = scene.body if shape is None else shape.body
+        scene = replace(scene, body=part.body, cameras=part.cameras)
     poses, places = motion.poses.copy(), motion.translations.copy()
     for k, (rows, inner) in enumerate(parts):
-        part = fitted.get(k) or _fitted(scene, motion, visibility, rows, body, None, beta)
+        part = fitted.get(k) or _fitted(scene, motion, visibility, rows, None, beta)
         poses[rows[inner]], places[rows[inner]] = part.fitted.poses[inner], part.fitted.translations[inner]
-    return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
+    return scene, replace(motion, skeleton=scene.body.skeleton, poses=poses, translations=places), shape
 
 
 def _fitted(
@@ -83,63 +89,97 @@ def _fitted(
     motion: Motion,
     visibility: Visibility,
     rows: NDArray[np.int64],
-    body: Body,
     shape: Shape | None,
     beta: float,
+    turned: bool = False,
 ) -> _Part:
     """Return some frames of a motion as the best step fits them, with the build where there is a shape to fit."""
+    body, cameras = scene.body, scene.cameras
     estimate = replace(motion, skeleton=body.skeleton, poses=motion.poses[rows], translations=motion.translations[rows])
     observations = [scene.observations[k] for k in rows.tolist()]
     places = estimate.translations
-    borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(scene.cameras)]
+    borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(cameras)]
     factors, height = (np.empty(0), None) if shape is None else (np.log(shape.factors), shape.height)
-    part = _Part(estimate, estimate, body, factors, height, visibility.at(rows), np.zeros(len(factors)))
-    best, least = part, _mean_cost(scene, part, observations, beta)
+    turns = np.zeros((len(cameras) if turned and scene.turns else 0, 3))
+    spread = np.zeros(len(factors))
+    part = _Part(estimate, estimate, body, factors, height, visibility.at(rows), spread, cameras, turns)
+    best, least = part, _mean_cost(part, observations, beta)
     for scale in ROBUST_SCALES:
         part = _stepped(part, borders, scale)
-        if (cost := _mean_cost(scene, part, observations, beta)) < least:
+        if (cost := _mean_cost(part, observations, beta)) < least:
             best, least = part, cost
     return best
 
 
-def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], beta: float) -> float:
+def _mean_cost(part: _Part, observations: Sequence[Observation], beta: float) -> float:
     """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
     costs = []
     for k in np.flatnonzero(part.visibility.usable).tolist():
         pose, place = part.fitted.poses[k : k + 1], part.fitted.translations[k : k + 1]
-        costs.append(pose_costs(part.body, scene.cameras, observations[k].silhouettes, pose, place, beta)[0][0])
+        costs.append(pose_costs(part.body, part.cameras, observations[k].silhouettes, pose, place, beta)[0][0])
     return float(np.mean(costs)) if costs else np.inf
 
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
     """Return a window after a Gauss-Newton step to the borders of all views."""
-    fitted, estimate, factors, spread = part.fitted, part.estimate, len(part.factors), part.spread
+    fitted, estimate, count = part.fitted, part.estimate, len(part.factors)
     angles = np.flatnonzero(fitted.skeleton.free).tolist()
-    poses, places, numbers = fitted.poses, fitted.translations, 3 + len(angles)
-    grown = growth(part.body, part.height, fitted) if factors else None
-    hessians, gradients, mixed, hessian, gradient = contour_squares(part.body, borders, poses, places, scale, grown)
-    squares, of_angles, changes = Squares(len(fitted), numbers), slice(3, numbers), np.zeros(factors)
+    poses, places, numbers = fitted.poses.copy(), fitted.translations, 3 + len(angles)
+    turned = [border.seen_by(camera) for border, camera in zip(borders, part.cameras, strict=True)]
+    hessians, gradients, mixed, hessian, gradient = contour_squares(
+        part.body, turned, poses, places, scale, _changes(part)
+    )
+    squares, of_angles = Squares(len(fitted), numbers), slice(3, numbers)
     squares.add(slice(None), hessians, gradients)
     add_root(squares, estimate, part.visibility, CONTOUR_ROOT_DEVIATION, places - estimate.translations)
     change = wrapped(poses - estimate.poses)[:, angles]
     squares.add(of_angles, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
     squares.add_bends(of_angles, change, fitted.fps**2 / ANGLE_ACCELERATION)
     add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.viewpoints), angles)
-    if not factors:
-        steps = squares.least()
-    else:
-        solved = squares.steps_for(np.concatenate([squares.gradients[..., None], mixed], axis=2))
-        steps, by_factor = solved[..., 0], solved[..., 1:]
-        held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
-        known = held * PRECISION
-        hessian = hessian + known - np.einsum("tni,tnj->ij", mixed, by_factor)
-        gradient = gradient + known @ part.factors - np.einsum("tni,tn->i", mixed, steps)
-        changes = np.clip(np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
-        changes = part.factors - np.clip(part.factors - changes, -REACH * SPREAD, REACH * SPREAD)
-        steps = steps - by_factor @ changes
-        spread = np.sqrt(held * np.diag(np.linalg.inv(hessian)))
-    poses = poses.copy()
+    solved = squares.steps_for(np.concatenate([squares.gradients[..., None], mixed], axis=2))
+    steps, by_factor = solved[..., 0], solved[..., 1:]
+    held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
+    values, known = np.append(part.factors, part.turns), np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
+    known[:count, :count] = PRECISION[:count, :count]
+    hessian = hessian + held * known - np.einsum("tni,tnj->ij", mixed, by_factor)
+    gradient = gradient + held * known @ values - np.einsum("tni,tn->i", mixed, steps)
+    changes = np.clip(np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
+    reach = REACH * np.append(SPREAD[:count], np.full(part.turns.size, CAMERA_DEVIATION))
+    changes = values - np.clip(values - changes, -reach, reach)
+    steps = steps - by_factor @ changes
     poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    body = shaped(part.body, np.exp(-changes), part.height) if factors else part.body
-    fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3])
-    return replace(part, fitted=fitted, body=body, factors=part.factors - changes, spread=spread)
+    body = shaped(part.body, np.exp(-changes[:count]), part.height) if count else part.body
+    turns = changes[count:].reshape(-1, 3)
+    return replace(
+        part,
+        fitted=replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3]),
+        body=body,
+        factors=part.factors - changes[:count],
+        spread=np.sqrt(held * np.diag(np.linalg.inv(hessian)))[:count],
+        cameras=[turned_camera(*each) for each in zip(part.cameras, -turns, strict=True)]
+        if len(turns)
+        else part.cameras,
+        turns=part.turns - turns,
+    )
+
+
+def _changes(part: _Part) -> list[tuple[Array, Array]]:
+    """Return how joints and radii change in each view with the factors of the build and the turns of the cameras."""
+    joints, turns = part.fitted.joints, part.turns.size
+    wider, larger = np.empty((len(joints), 0, *joints.shape[1:])), np.empty((0, len(BONES), 2))
+    if len(part.factors):
+        wider, larger = growth(part.body, part.height, part.fitted)
+    larger, changes = np.concatenate([larger, np.zeros((turns, len(BONES), 2))]), []
+    for view, camera in enumerate(part.cameras):
+        turned = np.zeros((len(joints), turns, *joints.shape[1:]))
+        if turns:  # in this view the world turns about its optical centre
+            away = (joints - camera.position)[:, None]
+            turned[:, 3 * view : 3 * view + 3] = np.cross(np.eye(3)[:, None], away)
+        changes.append((np.concatenate([wider, turned], axis=1), larger))
+    return changes
+
+
+def turned_camera(camera: Camera, turn: Array) -> Camera:
+    """Return a camera that sees the world turned about its optical centre, by a rotation vector (3,)."""
+    rotation = camera.rotation @ cv2.Rodrigues(turn)[0]
+    return replace(camera, rotation=rotation, translation=-rotation @ camera.position)

@@ -27,9 +27,8 @@ def smooth(
     """
     visibility = Visibility.of(scene)
     motion = smooth_path(steadied(scene.motion(frames), visibility), visibility)
-    motion, shape = fit_contours(scene, motion, visibility, shape, beta)
+    scene, motion, shape = fit_contours(scene, motion, visibility, shape, beta)
     motion = smooth_path(motion, visibility)  # contours pull at standing feet
-    scene = scene if shape is None else replace(scene, body=shape.body)
     smoothed = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smoothed, visibility.usable))
