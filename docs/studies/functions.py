@@ -14,7 +14,7 @@ from typing import Any
 import click
 import cv2
 import numpy as np
-from scipy.stats import rankdata
+from scipy.stats import spearmanr
 
 from posefit.arrays import Array
 from posefit.cli.output import Command
@@ -95,11 +95,6 @@ def _distance(cost: Cost, best: Array, ways: Array, level: float) -> Array:
     return np.where(over.any(axis=1), met, np.minimum(REACH[-1], 1.0 / np.abs(ways).max(axis=1)))
 
 
-def correlation(first: Array, second: Array) -> float:
-    """Return the correlation of ranks."""
-    return float(np.corrcoef(rankdata(first), rankdata(second))[0, 1])
-
-
 def features(
     cost: Cost, noise_free: Cost, known: Array, points: Array, rng: np.random.Generator
 ) -> tuple[Row, list[tuple[float, Array]]]:
@@ -137,9 +132,9 @@ def features(
         "elsewhere": 1.0 - arrived / DESCENTS,
         "basins": len(basins),
         "interaction": float(np.abs(both - one - other).sum() / (np.abs(one) + np.abs(other)).sum()),
-        "ruggedness": 1.0 - correlation(costs, cost(points + STEP * off)),
+        "ruggedness": 1.0 - float(spearmanr(costs, cost(points + STEP * off)).statistic),
         "rises": float(way.clip(0.0).sum() / np.abs(way).sum()),
-        "distance": correlation(costs, np.linalg.norm(points - best, axis=1)),
+        "distance": float(spearmanr(costs, np.linalg.norm(points - best, axis=1)).statistic),
         "noise": float((again - again[0]).std() / costs.std()),
     }, basins
 
