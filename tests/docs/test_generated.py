@@ -9,13 +9,11 @@ from typing import Any
 
 import generator
 import pytest
-from click.testing import CliRunner
-from generator import angles, commands, figures, settings
-from generator.prose import restructured, shortened
+from generator import angles, figures, settings
+from generator.prose import restructured
 
 import posefit
 from posefit import track
-from posefit.cli import main
 from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
 from posefit.registry import registry
@@ -26,21 +24,10 @@ from posefit.sweep.plan import LISTS
 from posefit.sweep.table import flat
 from tests.docs.pages import DOCS
 
-HELPS = commands.helps()
-
 
 def rows(page: str) -> set[str]:
     """Return what the rows of a page's tables begin with."""
     return set(re.findall(r"^\| `([^`]+)` \|", page, re.MULTILINE))
-
-
-def test_the_page_of_commands_holds_the_help_of_each() -> None:
-    assert {"posefit", "posefit track", "posefit plugins new", "posefit reproduce sapso"} <= set(HELPS)
-    for name in ("posefit", "posefit track"):
-        shown = CliRunner().invoke(
-            main, [*name.split()[1:], "--help"], prog_name="posefit", terminal_width=commands.WIDTH
-        )
-        assert shown.output.strip() == HELPS[name]
 
 
 def test_the_settings_of_every_method_are_described() -> None:
@@ -116,12 +103,6 @@ def test_a_docstring_is_read_as_plain_text() -> None:
     assert restructured(["one   first", "two   second"])[0] == "::"
     assert restructured(["| a | b |", "|---|---|", "| 1 | 2 |"])[0] == ".. list-table::"
     assert restructured(["Settings:", "    a (b): c"])[:3] == ["Settings:", "", "* **a (b)**: c"]
-
-
-def test_arrays_are_named_as_the_code_names_them() -> None:
-    long = "(poses: ~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]], more: dict = <factory>)"
-    assert shortened(long) == "(poses: Array, more: dict = ...)"
-    assert shortened("ndarray[tuple[Any, ...], dtype[bool]]") == "Array[bool]"
 
 
 def test_the_page_of_the_architecture_lists_every_package() -> None:

@@ -1,7 +1,6 @@
 """Every study can be started, every plan beside them is one, and what they compute is right."""
 
 import importlib
-import os
 from pathlib import Path
 
 import click
@@ -42,9 +41,9 @@ def test_plans_of_built_in_motions_are_plans() -> None:
     assert [len(Plan.read(STUDIES / f"{name}.toml")) for name in ("views", "degradation")] == [45, 36]
 
 
-def test_plans_of_recorded_clips_are_plans(cmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_of_recorded_clips_is_one(cmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(cmu)
-    assert [len(Plan.read(STUDIES / f"{name}.toml")) for name in ("accuracy",)] == [60]
+    assert len(Plan.read(STUDIES / "accuracy.toml")) == 60
 
 
 def test_the_table_of_a_plan_has_a_line_a_group(tmp_path: Path) -> None:
@@ -53,10 +52,8 @@ def test_the_table_of_a_plan_has_a_line_a_group(tmp_path: Path) -> None:
         '[defaults]\nframes = 2\nevaluations = 80\n[product]\nmethods = ["random@pca"]\nmotions = ["walk"]\n'
         "corruptions = [{}, { holes = 0.5 }]\nseeds = 2\n"
     )
-    before = Path.cwd()
     words = [str(plan), "--by", "method", "--by", "corruption", "--workers", "1"]
     result = CliRunner(env={"POSEFIT_CMU": ""}).invoke(table.main, words)
-    os.chdir(before)
     assert result.exit_code == 0, result.output
     lines = [line for line in result.stdout.splitlines() if line.startswith("|")]
     assert [line.split(" | ")[:3] for line in lines[2:]] == [
