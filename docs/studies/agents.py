@@ -184,7 +184,7 @@ def cloned(model: Any, env: Any, steps: int) -> None:
                 truths[infos["_truth"]] = infos["truth"][infos["_truth"]]
         inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
         answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
-        for rows in [part for _ in range(EPOCHS) for part in torch.randperm(length).split(BATCH)]:
+        for rows in [part for _ in range(EPOCHS) for part in torch.split(torch.randperm(length), BATCH)]:
             means = model.policy.get_distribution(inputs[rows]).distribution.mean
             model.policy.optimizer.zero_grad()
             (means - answers[rows]).square().sum(dim=1).mean().backward()

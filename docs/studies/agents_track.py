@@ -16,22 +16,14 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation
 
-from agents import (
-    ENVIRONMENTS,
-    HELD_OUT,
-    MAX_EVALUATIONS,
-    SEARCHES,
-    SHOWN,
-    STEPS,
-    check_learners,
-    ppo,
-)
+from agents import ENVIRONMENTS, HELD_OUT, SEARCHES, SHOWN, STEPS, check_learners, ppo
 from posefit import minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import to_sb3_vec_env
+from posefit_envs.fit import MAX_EVALUATIONS
 from posefit_envs.track import FRAMES
 from posefit_reproduce.jobs import each
 from table import WORKERS, bar, drawn_means, markdown, quantiles
@@ -75,7 +67,8 @@ def trained(seed: int, steps: int) -> Callable[[Any], Array]:
 
 def searched(name: str, budget: int) -> Array:
     """Return the costs (n, frames) that an optimiser commits in the held-out tracks."""
-    env, factory = gym.make_vec(NAME, INSTANCES, evaluations_per_frame=2, errors=False), registry().optimiser(name)
+    env: Any = gym.make_vec(NAME, INSTANCES, evaluations_per_frame=2, errors=False)
+    factory = registry().optimiser(name)
     env.reset(options={"instance": TESTED})
     few = {"population_size": budget} if budget < 40 else {}  # one population of sapso
     settings, costs = planned(factory, few, budget), []

@@ -72,7 +72,7 @@ def legs_exchanged(scene: Scene, actor: Motion, seen: NDArray[np.bool_]) -> floa
     exchanged, legs = list[bool](), GROUPS[0]
     for camera, view, rows in zip(scene.cameras, range(len(scene.cameras)), seen, strict=True):
         for k in np.flatnonzero(rows):
-            landmarks = scene.observations[k].landmarks
+            landmarks = scene.observations[int(k)].landmarks
             if landmarks is not None and landmarks[view, :, 2].any():
                 pixels, depths = camera.project(actor.joints[k])
                 same, other = (

@@ -238,7 +238,7 @@ def main(
         for recording in recordings:
             shows = recording.activity or activity
             scene, first = filmed_scene(recording, frames, **view)
-            estimates = estimates_of(scene, motions[shows].training)
+            estimates = estimates_of(scene, motions[str(shows)].training)
             table = table_of(recording.name, {name: figures_of(each, scene) for name, each in estimates.items()})
             (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
             head = f"{recording.name}: {shows}, frames {first} to {first + scene.count - 1}, camera {scene.placing}"

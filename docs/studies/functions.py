@@ -92,7 +92,7 @@ def _distance(cost: Cost, best: Array, ways: Array, level: float) -> Array:
     low, high = costs[n, k - 1], costs[n, k]
     part = ((level - low) / np.maximum(high - low, 1e-300)).clip(0.0, 1.0)
     met = REACH[k - 1] + part * (REACH[k] - REACH[k - 1])
-    return np.where(over.any(axis=1), met, np.minimum(REACH[-1], 1.0 / np.abs(ways).max(axis=1)))
+    return np.asarray(np.where(over.any(axis=1), met, np.minimum(REACH[-1], 1.0 / np.abs(ways).max(axis=1))))
 
 
 def features(
@@ -150,7 +150,7 @@ def bbob(number: int, dimension: int) -> Row:
 
     rng = np.random.default_rng([1, number])
     points = rng.uniform(-1.0, 1.0, (POINTS, dimension))
-    return features(cost, cost, np.array(problem.optimum.x) / 5.0, points, rng)[0]
+    return features(cost, cost, np.array(problem.optimum.x, np.float64) / 5.0, points, rng)[0]
 
 
 def measured(number: int, instance: int, dimension: int) -> tuple[Row, Array, Shares, Array]:

@@ -6,6 +6,7 @@ The file of a suite is never replaced: its numbers would change. This documents 
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,10 +60,9 @@ def main() -> None:
         for name in (*TRAINING_PEOPLE, HELD_OUT_GROUP)
     }
     learned = [learned_from(upright_poses(people)) for people in groups.values()]
-    arrays = {name: np.stack([group[name] for group in learned]) for name in learned[0]}
-    np.savez_compressed(
-        Path(__file__).parents[2] / "posefit" / "suites" / "boxes.npz", names=np.array(list(groups)), **arrays
-    )  # type: ignore[arg-type]
+    arrays: dict[str, Any] = {name: np.stack([group[name] for group in learned]) for name in learned[0]}
+    path = Path(__file__).parents[2] / "posefit" / "suites" / "boxes.npz"
+    np.savez_compressed(path, names=np.array(list(groups)), **arrays)
 
 
 if __name__ == "__main__":

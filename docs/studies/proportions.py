@@ -36,7 +36,7 @@ def proportions(table: Path) -> Array:
     columns = {name: np.array([float(row[name]) for row in rows]) for name in _measures()}
     lengths = [sum(columns[name.strip("-")] * (-1 if name[0] == "-" else 1) for name in of) for of in MEASURES.values()]
     stature = columns["stature"]
-    return np.log(np.column_stack([1e-3 * stature, *(length / stature for length in lengths)]))
+    return np.asarray(np.log(np.column_stack([1e-3 * stature, *(length / stature for length in lengths)])))
 
 
 def _measures() -> set[str]:

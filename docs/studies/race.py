@@ -240,12 +240,13 @@ def _shared_net() -> type:
 
     class SharedNet(ActorCriticPolicy):  # type: ignore[misc]
         def _build_mlp_extractor(self) -> None:
-            self.mlp_extractor = Scores()
+            self.mlp_extractor: Any = Scores()
 
         def _build(self, schedule: Any) -> None:
             super()._build(schedule)
             self.action_net = nn.Identity()  # scores are the actions
-            self.optimizer = self.optimizer_class(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
+            optimizer: Any = self.optimizer_class
+            self.optimizer = optimizer(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
 
     return SharedNet
 

@@ -34,6 +34,7 @@ from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.output.picture import ALTERNATIVES, MIN_WEIGHT
 from posefit.progress import QUIET
+from posefit.silhouette.mask import Mask
 from posefit.sweep.cell import ALL_AROUND, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.uncertainty.modes import other_modes
@@ -56,7 +57,7 @@ class Image:
     camera: posefit.Camera
     body: posefit.Body
     pose: Array
-    mask: Array
+    mask: Mask
 
     def errors_mm(self, joints: Array) -> Array:
         """Return the mean distances (n,) of joints (n, 27, 3), roots at one point."""
