@@ -123,7 +123,7 @@ def test_a_film_gives_figures_8_and_10(tmp_path: Path, monkeypatch: pytest.Monke
     words = [str(write_humaneva(tmp_path, walk(40))), "--out", str(tmp_path / "out")]
     result = CliRunner(env={"POSEFIT_CMU": ""}).invoke(main, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("S1_Walking_1_C1: walk, frames 5 to 39, camera calibrated\n")
+    assert result.stdout.startswith("S1_Walking_1_C1: walk, frames 5 to 39, camera given\n")
     lines = (tmp_path / "out" / "S1_Walking_1_C1.md").read_text().splitlines()[2:]
     rows = {line.split(" | ")[0].strip("| "): line.split(" | ") for line in lines}
     assert list(rows) == [LABELS[name] for name in (SINGLE, *TRACKED)]
