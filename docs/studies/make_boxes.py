@@ -8,6 +8,7 @@ The file of a suite is never replaced: its numbers would change. This documents 
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 
 from posefit.arrays import Array
@@ -53,6 +54,7 @@ def upright_poses(subjects: tuple[str, ...]) -> Array:
     return wrapped(np.concatenate([poses, mirrored_poses(built_in.average_skeleton(), poses)]))
 
 
+@click.command()
 def main() -> None:
     """Write the file."""
     groups = {

@@ -3,9 +3,9 @@
 A row is a clip of each group of `people.py`, from 45 degrees: the best frame, four of the film, and the worst.
 """
 
-import sys
 from typing import Any
 
+import click
 import cv2
 import numpy as np
 
@@ -51,10 +51,12 @@ def strip(clip: Clip) -> Array:
     return np.hstack(stills)
 
 
+@click.command()
+@click.argument("out")
 def main(out: str) -> None:
     """Track a clip of each group, and draw it."""
     cv2.imwrite(out, np.vstack([strip(clips[0]) for clips in GROUPS.values()]), [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()
