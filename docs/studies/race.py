@@ -4,7 +4,7 @@ All have the same instances, first populations and budgets, so that they are com
 ln(1 + best cost), which the rewards of an episode sum up to.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -44,95 +44,68 @@ class Turn(NamedTuple):
     seed: int
 
 
-def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
-    """Return the policy that draws actions uniformly from an environment's box."""
-    shape = env.action_space.shape
-    return lambda _, __: rng.uniform(-1.0, 1.0, shape)
+def round_robin(observation: Any, step: int) -> Array:
+    """Return the action by which searches take turns."""
+    features, _ = race_features(observation)
+    searches: int = features.shape[-2]
+    return race_action(np.full(features.shape[:-2], step % searches), searches)
 
 
-def round_robin_policy() -> Policy:
-    """Return the policy whose searches take turns."""
-
-    def act(observation: Any, step: int) -> Array:
-        features, _ = race_features(observation)
-        searches: int = features.shape[-2]
-        return race_action(np.full(features.shape[:-2], step % searches), searches)
-
-    return act
-
-
-def restarted_policy(slope: float = 0.05) -> Policy:
-    """Return the policy that advances one search until it shows a slope below `slope`, and then another.
+def restarted(observation: Any, _: int, *, slope: float) -> Array:
+    """Return the action that advances one search until its slope is below `slope`, and then another.
 
     The next one is a search that never was advanced, or where there is none, one that begins.
     """
-
-    def act(observation: Any, _: int) -> Array:
-        features = race_features(observation)[0]
-        open_ones = features[..., 1] >= slope
-        longest = np.where(open_ones, features[..., 3], -1.0).argmax(axis=-1)
-        searches = features.shape[-2]
-        return race_action(np.where(open_ones.any(axis=-1), longest, searches), searches)
-
-    return act
+    features = race_features(observation)[0]
+    steep = features[..., 1] >= slope
+    longest = np.where(steep, features[..., 3], -1.0).argmax(axis=-1)
+    searches = features.shape[-2]
+    return race_action(np.where(steep.any(axis=-1), longest, searches), searches)
 
 
-def halving_policy() -> Policy:
-    """Return successive halving as a policy: after each of equal parts of the budget the worse half stops.
+def halving(observation: Any, _: int) -> Array:
+    """Return the action of successive halving: after each of equal parts of the budget the worse half stops.
 
     Those that are left take turns. K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and
     hyperparameter optimization, AISTATS 2016.
     """
-
-    def act(observation: Any, _: int) -> Array:
-        features, common = race_features(observation)
-        searches = features.shape[-2]
-        parts = int(np.log2(searches)) + 1
-        done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)  # float32 shows the budget
-        ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
-        left = ranks < searches // 2.0 ** done[..., None]
-        return race_action(np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches)
-
-    return act
+    features, common = race_features(observation)
+    searches = features.shape[-2]
+    parts = int(np.log2(searches)) + 1
+    done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)  # float32 shows the budget
+    ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
+    left = ranks < searches // 2.0 ** done[..., None]
+    return race_action(np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches)
 
 
-def bandit_policy(curiosity: float = 0.4) -> Policy:
-    """Return UCB1 as a policy: the lowest best cost, less what a search may gain that had few generations.
+def bandit(observation: Any, step: int, *, curiosity: float) -> Array:
+    """Return the action of UCB1: the lowest best cost, less what a search may gain that had few generations.
 
     That is `curiosity` times the root of ln(generations of all) / generations, in shown costs. It begins no search.
     P. Auer, N. Cesa-Bianchi, P. Fischer, Finite-time analysis of the multiarmed bandit problem, Machine Learning 47,
     2002, whose rewards are means and not bests.
     """
-
-    def act(observation: Any, step: int) -> Array:
-        features, _ = race_features(observation)
-        searches, used = int(features.shape[-2]), np.asarray(features[..., 3])
-        total = step + searches
-        generations = used / used.sum(axis=-1, keepdims=True) * total
-        index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)
-        return race_action(index.argmin(axis=-1), searches)
-
-    return act
+    features, _ = race_features(observation)
+    searches, used = int(features.shape[-2]), np.asarray(features[..., 3])
+    total = step + searches
+    generations = used / used.sum(axis=-1, keepdims=True) * total
+    index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)
+    return race_action(index.argmin(axis=-1), searches)
 
 
-def linear_policy(weights: Any) -> Policy:
-    """Return the policy with the choice of the highest score, linear in what is shown of a search.
+def linear(observation: Any, _: int, *, weights: Array) -> Array:
+    """Return the action with the highest score, linear in what is shown of a search.
 
     `weights` (..., 9), one policy or one for each row of observations: of four numbers, of these times the budget left,
     and the score of another search. The numbers are the best cost above the best of all, slope, spread and use.
     """
-    own = np.asarray(weights, dtype=np.float64)
-
-    def act(observation: Any, _: int) -> Array:
-        features, common = race_features(observation)
-        features[..., 0] -= common[..., :1]
-        shown = np.concatenate([features, features * common[..., 1, None, None]], axis=-1)
-        scores = (shown @ own[..., :-1, None])[..., 0]
-        another = np.broadcast_to(own[..., -1:], (*scores.shape[:-1], 1))
-        choice = np.concatenate([scores, another], axis=-1).argmax(axis=-1)
-        return race_action(choice, scores.shape[-1])
-
-    return act
+    features, common = race_features(observation)
+    features[..., 0] -= common[..., :1]
+    shown = np.concatenate([features, features * common[..., 1, None, None]], axis=-1)
+    scores = (shown @ weights[..., :-1, None])[..., 0]
+    another = np.broadcast_to(weights[..., -1:], (*scores.shape[:-1], 1))
+    choice = np.concatenate([scores, another], axis=-1).argmax(axis=-1)
+    return race_action(choice, scores.shape[-1])
 
 
 def final_costs(policy: Policy, env: Any, numbers: Sequence[int], seeds: Sequence[int]) -> tuple[Array, int]:
@@ -171,12 +144,12 @@ def evolved(seed: int) -> tuple[Policy, int]:
     for _ in range(GENERATIONS):
         weights = strategy.sample(rng, CANDIDATES)
         numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
-        policy = linear_policy(weights.repeat(EPISODES, axis=0))
+        policy = partial(linear, weights=weights.repeat(EPISODES, axis=0))
         tiled = np.tile(numbers, CANDIDATES).tolist(), np.tile(seeds, CANDIDATES).tolist()
         costs, steps = final_costs(policy, env, *tiled)
         strategy.learn(weights, costs.reshape(CANDIDATES, EPISODES).mean(axis=1))
         taken += steps
-    return linear_policy(strategy.mean), taken
+    return partial(linear, weights=strategy.mean), taken
 
 
 def trained(agent: str, seed: int) -> tuple[Policy, int]:
@@ -253,17 +226,18 @@ def _shared_net() -> type:
 
 def policy_of(turn: Turn, env: Any) -> tuple[Policy, int]:
     """Return the policy of a row, trained, and the steps of its training."""
-    plain: dict[str, Callable[[], Policy]] = {
-        "round robin": round_robin_policy,
-        "random actions": lambda: uniform_policy(env, np.random.default_rng(turn.seed)),
-        "halving": halving_policy,
+    rng = np.random.default_rng(turn.seed)
+    plain: dict[str, Policy] = {
+        "round robin": round_robin,
+        "random actions": lambda _, __: rng.uniform(-1.0, 1.0, env.action_space.shape),
+        "halving": halving,
     }
     if turn.agent in plain:
-        return plain[turn.agent](), 0
+        return plain[turn.agent], 0
     if turn.agent == "one restarted":
-        return chosen([restarted_policy(slope) for slope in SLOPES], turn.seed)
+        return chosen([partial(restarted, slope=slope) for slope in SLOPES], turn.seed)
     if turn.agent == "bandit":
-        return chosen([bandit_policy(curiosity) for curiosity in CURIOSITIES], turn.seed)
+        return chosen([partial(bandit, curiosity=curiosity) for curiosity in CURIOSITIES], turn.seed)
     return evolved(turn.seed) if turn.agent == "linear, CMA-ES" else trained(turn.agent, turn.seed)
 
 
