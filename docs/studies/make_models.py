@@ -19,8 +19,8 @@ from sklearn.covariance import LedoitWolf
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
+from posefit.geometry.skeleton import MIRROR
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
@@ -154,7 +154,7 @@ def dependent(clips: list[Recorded]) -> dict[str, Any]:
     for clip in clips:
         for states, angles in (
             (clip.states, clip.angles),
-            (mirrored_states(clip.states), mirrored_angles(clip.angles)),
+            (mirrored_states(clip.states), mirrored_poses(built_in.average_skeleton(), clip.angles)),
         ):
             quaternions = states[::4, 7:].reshape(-1, 4)
             inputs.append(Rotation.from_quat(quaternions, scalar_first=True).as_rotvec().reshape(-1, 3 * len(BONES)))
@@ -164,17 +164,6 @@ def dependent(clips: list[Recorded]) -> dict[str, Any]:
     normal = (x - middle).T @ (x - middle) + 0.05 * len(x) * np.eye(x.shape[1])
     matrix = np.linalg.solve(normal, (x - middle).T @ (y - mean)).T
     return {"matrix": rounded(matrix), "offset": rounded(mean - matrix @ middle)}
-
-
-def mirrored_angles(poses: Array) -> Array:
-    """Return the poses (n, 66) of the mirror image, left for right."""
-    flip = np.diag([-1.0, 1.0, 1.0])
-    other = np.zeros((len(poses), ANGLES))
-    for joint in INNER:
-        here, there = angle_index(joint), angle_index(MIRROR[joint])
-        turned = flip @ rotation_from_joint_angles(poses[:, there : there + 3]) @ flip
-        other[:, here : here + 3] = joint_angles_from_rotation(turned)
-    return other
 
 
 def rounded(values: Array) -> Any:
