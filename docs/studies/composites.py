@@ -12,16 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from angles import SAGITTAL, angle_errors
-from composites_scene import (
-    PLACES,
-    SHOWS,
-    SIZE,
-    Situation,
-    check_video,
-    film,
-    plate,
-    situation,
-)
+from composites_scene import PLACES, SHOWS, SIZE, Situation, check_video, film, plate, situation
 from posefit import clinical_angles
 from posefit.cli.output import Command
 from posefit.fitting import metrics
@@ -164,7 +155,8 @@ def main(
     for name in set(extractions) - {DEFAULT}:
         registry().offer("segmenter", name)
     check_video(video)
-    shots = [Shot(*x[1:], x[0]) for x in product(range(seeds), situations or SHOWS, PLACES, extractions)]
+    grid = product(range(seeds), situations or SHOWS, PLACES, extractions)
+    shots = [Shot(*place, seed) for seed, *place in grid]
     done = measured({shot: partial(row_of, video, shot) for shot in shots}, rows, shot_of, workers, LIMITS)
     for line in composites_lines([*done.values()]):
         click.echo(line)
