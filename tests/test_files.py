@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from posefit.files import MARK as UNFINISHED
-from posefit.files import Unfinished, check_new, check_place, new_file, new_folder, replaceable, replaced_file
+from posefit.files import Unfinished, new_file, new_folder, replaced_file
 
 MARK = b"<!-- ours -->"
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -73,21 +73,6 @@ def test_a_link_at_the_name_counts_as_existing_and_is_not_followed(tmp_path, ope
     assert {path.name for path in tmp_path.iterdir()} == {"theirs", "out", "dangling"}
 
 
-def test_a_name_and_its_place_are_checked_before_anything_is_computed(tmp_path):
-    (tmp_path / "file").write_text("")
-    (tmp_path / "dangling").symlink_to(tmp_path / "nothing")
-    for name in ("file", "dangling"):
-        check_place(tmp_path / name)
-        with pytest.raises(ValueError, match=f"{name}: expected a new name to write to, got one that exists"):
-            check_new(tmp_path / name)
-    for name in ("none/out", "file/out"):
-        check_new(tmp_path / name)
-        with pytest.raises(ValueError, match=f"{name}: expected a place to write to, got one in .*, which is none"):
-            check_place(tmp_path / name)
-    check_new(tmp_path / "out")
-    check_place(tmp_path / "out")
-
-
 @NEW
 @pytest.mark.parametrize("links", [True, False])
 def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypatch, opened, links):
@@ -107,24 +92,12 @@ def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_only_a_file_that_carries_the_mark_is_replaced(tmp_path):
+def test_a_failure_leaves_an_earlier_file_as_it_was(tmp_path):
     path = tmp_path / "out.html"
-    for text in (b"one", b"two"):
-        with replaced_file(path, MARK) as building:
-            building.write_bytes(MARK + text)
-    assert path.read_bytes() == MARK + b"two"
-    assert replaceable(path, MARK)
-    assert not replaceable(tmp_path, MARK)
-
+    path.write_bytes(MARK + b"one")
     with pytest.raises(ValueError, match="got No space left on device"):
         fail(replaced_file(path, MARK), FULL)
-    assert path.read_bytes() == MARK + b"two"
-    path.write_text("a letter")
-    wanted = r"out.html: expected a new name or an earlier file of this kind"
-    with pytest.raises(ValueError, match=wanted), replaced_file(path, MARK):
-        pass
-    assert path.read_text() == "a letter"
-    assert list(tmp_path.iterdir()) == [path]
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("out.html", MARK + b"one")]
 
 
 def test_only_marked_folders_of_this_target_that_are_not_in_use_count_as_interrupted(tmp_path):

@@ -156,7 +156,7 @@ def main(
         registry().offer("segmenter", name)
     check_video(video)
     grid = product(range(seeds), situations or SHOWS, PLACES, extractions)
-    shots = [Shot(*place, seed) for seed, *place in grid]
+    shots = [Shot(shown, views, extraction, seed) for seed, shown, views, extraction in grid]
     done = measured({shot: partial(row_of, video, shot) for shot in shots}, rows, shot_of, workers, LIMITS)
     for line in composites_lines([*done.values()]):
         click.echo(line)

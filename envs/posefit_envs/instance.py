@@ -264,9 +264,9 @@ class Episode:
         return space.proposals(np.concatenate([pose[:3], searched, latents]))
 
 
-def first_episode(world: World, number: int, evaluations: int, frames: int = 1) -> Episode:
+def first_episode(world: World, number: int, evaluations: int) -> Episode:
     """Return the search for the first frame's pose of an instance."""
-    made = instance(world, number, frames, evaluations)
+    made = instance(world, number, 1, evaluations)
     task = made.task
     centre = np.array([task.yaw, 0.0, 0.0])
     reach = np.radians(ROOT_RANGE_DEGREES if world.yaw == "guessed" else ANY_YAW_DEGREES)

@@ -12,7 +12,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.masks import PackedMasks, Views, undistorted
+from posefit.footage.images import IMAGES
+from posefit.footage.masks import ARRAYS, PackedMasks, Views, undistorted
 from posefit.footage.quality import apparent_sizes, disagreement, extent_of, meeting
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
@@ -216,8 +217,16 @@ def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
 
 def listed(cameras: Sequence[Camera | Calibration | str | Path]) -> list[Camera | Calibration]:
     """Return cameras, those of files read; a file with several cameras serves for several views, in its order."""
-    each = [[camera] if isinstance(camera, Camera | Calibration) else read_calibrations(camera) for camera in cameras]
+    each = [[camera] if isinstance(camera, Camera | Calibration) else _read(camera) for camera in cameras]
     return list(chain.from_iterable(each))
+
+
+def _read(path: str | Path) -> list[Calibration]:
+    """Return the calibrations of a file. Raises InputError where it is one of masks."""
+    if (suffix := Path(path).suffix.lower()) in (*IMAGES, *ARRAYS) or Path(path).is_dir():
+        came = "a file of masks" if suffix in ARRAYS else "an image" if suffix in IMAGES else "a folder"
+        raise InputError(f"{path}: expected a calibration of the camera, got {came}")
+    return read_calibrations(path)
 
 
 def calibrated(

@@ -17,6 +17,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.limits import allowed_bytes
 from posefit.silhouette.mask import Silhouette
 
+ARRAYS = (".npz", ".npy")  # files of masks
 Range = tuple[int | None, int | None]
 Planes = NDArray[np.uint8]  # (T, bytes): of each frame the bits of its pixels, row by row
 

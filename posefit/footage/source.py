@@ -14,7 +14,7 @@ from posefit.files import opencv_name
 from posefit.footage.cameras import CameraView, calibrated, combined, listed, world_of
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import IMAGES, is_photo, page_count
-from posefit.footage.masks import Range
+from posefit.footage.masks import ARRAYS, Range
 from posefit.footage.people import Choice
 from posefit.footage.quality import Verdict
 from posefit.footage.readers import Masks, images_in, name_of, read_masks
@@ -32,7 +32,7 @@ from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
 
-NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".npy", ".asf", ".json", ".csv", ".txt")
+NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf", ".json", ".csv", ".txt")
 SIZE = (320, 240)  # pixels of a rendered picture
 Kind = Literal["motion", "masks", "video", "pictures"]
 _KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video", "pictures": "pictures"}
@@ -235,7 +235,9 @@ def kind_of(source: Footage) -> Kind:
     if path.suffix.lower() in IMAGES and not path.is_dir():
         return kind_of((path,))
     if path.is_dir():
+        if (path / "poses.npz").is_file() and (path / "summary.json").is_file():
+            raise InputError(f"{path}: expected a source, got a track's folder: give the source that it was made from")
         return kind_of(tuple(images)) if (images := images_in(path)) else "masks"
-    if path.suffix.lower() in (".npz", ".npy") or (not path.suffix and os.sep in str(source)):
+    if path.suffix.lower() in ARRAYS or (not path.suffix and os.sep in str(source)):
         return "masks"
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"

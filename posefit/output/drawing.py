@@ -90,12 +90,10 @@ def side_camera(body: Body, camera: Camera, pose: Array, translation: Array, sid
     )
 
 
-def side_view(
-    body: Body, camera: Camera, pose: Array, translation: Array, side: int, solid: Array | None = None
-) -> Image:
+def side_view(body: Body, camera: Camera, pose: Array, translation: Array, side: int) -> Image:
     """Return the body (side, side, 3) viewed from the camera's right: left limbs orange, right ones blue."""
     image = blank(side, side)
-    draw_body(image, body, side_camera(body, camera, pose, translation, side), pose, translation, solid)
+    draw_body(image, body, side_camera(body, camera, pose, translation, side), pose, translation)
     return image
 
 

@@ -16,7 +16,7 @@ r"""The report of a ledger: a page that any browser opens, figures for papers, r
 | the rows of a ledger as that table | runs.py |
 | what differs between tracks and single searches | tracks.py, searches.py |
 | figures and the score: digits, averages, texts | columns.py |
-| the methods compared on the runs that they share; the leaderboard | contest.py |
+| the methods compared on the runs that they share; the leaderboard | leaderboard.py |
 | charts of the page and for papers, as numbers | charts.py |
 | the sentences of the first screen | summary.py |
 | the data of the page, by two lists of sections | content.py |

@@ -117,8 +117,6 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "notes": _notes(runs, contest) + (_track_notes(contest) if contest and runs.kind.name == "track" else []),
         "done": len(runs),
         "failed": len(runs.failures),
-        "failed_by": Counter(failure["method"] for failure in runs.failures),
-        "unfinished": runs.unfinished,
         "dropped": dropped,
         "problems": _problems(runs, dropped, unpaired_sentence(contest) if contest else ""),
     }

@@ -168,7 +168,6 @@ def running_times(contest: Contest) -> list[dict[str, Any]]:
             "reached": 100.0 * score.reached,
             "above": score.above,
             "times": [score.running_times[above] for above in SHOWN],
-            "ends": [score.running_time_ends[above] for above in SHOWN],
         }
         for method in contest.methods
         for score in suite_scores(runs[k] for k in contest.rows_of(method).tolist())

@@ -61,9 +61,7 @@ COLUMNS = (
     Column("unknown", _share("unknown_rate"), ("unknown_rate",), optional=True, average=mean),
     *_interval_columns(),
     Column("mpjpe", MEASURES["mpjpe_mm"], ("mpjpe_mm",)),
-    Column("pa_mpjpe", MEASURES["pa_mpjpe_mm"], ("pa_mpjpe_mm",), in_tables=False),
     Column("iou", MEASURES["iou"], ("iou",), higher_is_better=True),
-    Column("cost", MEASURES["cost"], ("cost",), in_tables=False),
     Column("ms", replace(_TIME, factor=1.0), ("seconds_per_frame",), scale=_TIME.factor),
     Column("cpu_ms", replace(_CPU, factor=1.0), ("cpu_seconds_per_frame",), scale=_CPU.factor),
     Column("evaluations", _EVALUATIONS, ("evaluations_used",), per_frame=True),
@@ -71,7 +69,6 @@ COLUMNS = (
         Column(f"baseline_{name}", replace(_BASELINE, label=label), ("baselines_degrees", name), in_tables=False)
         for name, label in BASELINES.items()
     ),
-    Column("floor", MEASURES["prior_floor_degrees"], ("prior_floor_degrees",), in_tables=False),
 )
 
 

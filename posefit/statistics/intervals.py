@@ -40,9 +40,7 @@ def iqm(errors: ArrayLike) -> Array:
     return np.asarray(trim_mean(array.reshape(len(array), -1), TRIMMED, axis=1))
 
 
-def iqm_intervals(
-    errors: ArrayLike, rng: np.random.Generator, *, resamples: int = RESAMPLES, level: float = LEVEL
-) -> Intervals:
+def iqm_intervals(errors: ArrayLike, rng: np.random.Generator, *, resamples: int = RESAMPLES) -> Intervals:
     """Return the interquartile mean of each method with its interval, of errors (methods, instances, seeds).
 
     The interval is for other seeds on these instances: seeds are resampled within each instance. It is
@@ -56,10 +54,11 @@ def iqm_intervals(
 
     With one seed or fewer than 8 runs there is no interval: low and high are nan. Every method has the
     same resamples, so that its interval does not depend on which others there are. Raises ValueError where errors are
-    not finite or not of that shape, `resamples` is below 100 or `level` not between 0 and 1.
+    not finite or not of that shape, or `resamples` is below 100.
     """
     array = finite("errors", errors, ("methods", "instances", "seeds"))
-    check_bootstrap(resamples, level)
+    if resamples < MIN_RESAMPLES:
+        raise InputError(f"resamples must be at least {MIN_RESAMPLES}, got {resamples}")
     values, seeds = iqm(array), array.shape[2]
     if seeds == 1 or array[0].size < MIN_RUNS:
         return Intervals(values, np.full(len(array), np.nan), np.full(len(array), np.nan))
@@ -75,7 +74,7 @@ def iqm_intervals(
                 pivots[m, start : start + count] = (means - values[m]) / errors_of_means
     pivots[np.isnan(pivots)] = 0.0
     # Pivots may be infinite, so an end is one of them and never a mean of two.
-    upper, lower = np.quantile(pivots, [0.5 + level / 2.0, 0.5 - level / 2.0], axis=1, method="inverted_cdf")
+    upper, lower = np.quantile(pivots, [0.5 + LEVEL / 2.0, 0.5 - LEVEL / 2.0], axis=1, method="inverted_cdf")
     spread = _estimate(array)[1]
     with np.errstate(invalid="ignore"):
         low, high = (np.where(spread > 0.0, values - pivot * spread, values) for pivot in (upper, lower))
@@ -94,11 +93,3 @@ def _estimate(runs: Array) -> tuple[Array, Array]:
     variance = winsorised.var(axis=2, ddof=1).sum(axis=1) / (instances * instances * seeds)
     remaining = 1.0 - 2.0 * cut / count
     return ordered[:, cut : count - cut].mean(axis=1), np.sqrt(variance) / remaining
-
-
-def check_bootstrap(resamples: int, level: float) -> None:
-    """Raise ValueError where an interval of that level cannot be read off so many resamples."""
-    if resamples < MIN_RESAMPLES:
-        raise InputError(f"resamples must be at least {MIN_RESAMPLES}, got {resamples}")
-    if not 0.0 < level < 1.0:
-        raise InputError(f"level must lie between 0 and 1, got {level}")

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.statistics.intervals import LEVEL, RESAMPLES
 from posefit.statistics.pairing import finite
 
 Trace = tuple[Array, Array]
@@ -51,31 +50,6 @@ def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
     return np.asarray(
         np.divide(used_in_all, reached.sum(axis=0), out=np.full(len(used_in_all), np.inf), where=reached.any(axis=0))
     )
-
-
-def running_time_interval(
-    hits: ArrayLike, evaluations: ArrayLike, clusters: ArrayLike, rng: np.random.Generator, *, level: float = LEVEL
-) -> tuple[Array, Array]:
-    """Return the ends, each (targets,), of the intervals of `expected_running_time` that other clusters would give.
-
-    Runs of one cluster (runs,), such as an instance, are drawn together: percentiles of the bootstrap over clusters
-    (Efron and Tibshirani, 1993, 13.3), inf where a resample has no hit. With one cluster both ends are nan.
-    """
-    times, used = np.asarray(hits, dtype=np.float64), finite("evaluations", evaluations, ("runs",))
-    names, cluster = np.unique(np.asarray(clusters), return_inverse=True)
-    count = len(names)
-    if count < 2:
-        return np.full(times.shape[1], np.nan), np.full(times.shape[1], np.nan)
-    reached = np.isfinite(times)
-    cluster_used, cluster_hits = np.zeros((2, count, times.shape[1]))
-    np.add.at(cluster_used, cluster, np.where(reached, times, used[:, None]))
-    np.add.at(cluster_hits, cluster, reached)
-    drawn = rng.multinomial(count, np.full(count, 1.0 / count), size=RESAMPLES).astype(np.float64)
-    cluster_used, cluster_hits = drawn @ cluster_used, drawn @ cluster_hits
-    resampled = np.divide(cluster_used, cluster_hits, out=np.full(cluster_used.shape, np.inf), where=cluster_hits > 0.0)
-    # an end is one of the resamples and never a mean of two, of which one may be infinite
-    low, high = np.quantile(resampled, [0.5 - level / 2.0, 0.5 + level / 2.0], axis=0, method="inverted_cdf")
-    return low, high
 
 
 def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:

@@ -6,7 +6,6 @@ result holds for these instances. For a claim about instances like these, make e
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -15,7 +14,6 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
@@ -36,24 +34,21 @@ class PairedTest:
     adjusted: float  # Holm's, for all comparisons made together
 
 
-def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) -> list[PairedTest]:
-    """Return two-sided paired comparisons of all, or of some, pairs of methods; errors (methods, instances, seeds).
+def wilcoxon(errors: ArrayLike) -> list[PairedTest]:
+    """Return two-sided paired comparisons of all pairs of methods; errors (methods, instances, seeds).
 
     Blocks in which both are equal are ranked but count for neither (Pratt, 1959). The p-value is exact for up to 50
-    blocks without ties and up to 13 with ties, as in scipy. Holm's adjustment is over the pairs compared: Holm, 1979.
+    blocks without ties and up to 13 with ties, as in scipy. Holm's adjustment is over all pairs: Holm, 1979.
     The ends of a median's interval are order statistics, by the sign test: Conover, Practical nonparametric
     statistics, 1999, 3.2.
     """
     array = finite("errors", errors, _SHAPE, (2, 1, 1))
-    chosen = list(combinations(range(len(array)), 2)) if pairs is None else list(pairs)
-    for pair in chosen:
-        if len({*pair}) != 2 or not all(0 <= m < len(array) for m in pair):
-            raise InputError(f"pairs must be of two different methods of 0 to {len(array) - 1}, got {pair}")
-    differences = [(array[first] - array[second]).ravel() for first, second in chosen]
+    pairs = list(combinations(range(len(array)), 2))
+    differences = [(array[first] - array[second]).ravel() for first, second in pairs]
     p_values = [_signed_rank(values) for values in differences]
     return [
         PairedTest(*pair, float(np.median(values)), *_median_interval(values), p_value, adjusted)
-        for pair, values, p_value, adjusted in zip(chosen, differences, p_values, holm(p_values).tolist(), strict=True)
+        for pair, values, p_value, adjusted in zip(pairs, differences, p_values, holm(p_values).tolist(), strict=True)
     ]
 
 

@@ -18,7 +18,7 @@ from posefit.errors import InputError
 from posefit.fitting.optimiser import BudgetError, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry
-from posefit.statistics.profiles import expected_running_time, hits, running_time_interval
+from posefit.statistics.profiles import expected_running_time, hits
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import EVALUATIONS, TARGETS, Problem
 
@@ -134,8 +134,6 @@ class SuiteScore:
     # expected evaluations to so much above the true pose's cost; None for never. Of all functions there are none: a
     # mean over them would be that of the hardest
     running_times: dict[float, float | None]
-    # their 95 % intervals over instances; None for never, and twice where there is one instance
-    running_time_ends: dict[float, tuple[float | None, float | None]]
 
 
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
@@ -180,8 +178,6 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     times = expected_running_time(reached, used)
     shown = () if function == ALL else SHOWN
     places = [int(np.flatnonzero(above == TARGETS)[0]) for above in shown]
-    rng, instances = np.random.default_rng(RNG_STREAM), [run.instance for run in runs]
-    low, high = running_time_interval(reached[:, places], used, instances, rng)
     return SuiteScore(
         method=method,
         function=function,
@@ -193,10 +189,8 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         runs=len(runs),
         above=float(np.median([run.cost - run.truth_cost for run in runs])),
         reached=float(np.isfinite(reached).mean()),
-        running_times={above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},
-        running_time_ends={above: (_finite(low[k]), _finite(high[k])) for k, above in enumerate(shown)},
+        running_times={
+            above: float(times[place]) if np.isfinite(times[place]) else None
+            for above, place in zip(shown, places, strict=True)
+        },
     )
-
-
-def _finite(value: Array | float) -> float | None:
-    return float(value) if np.isfinite(value) else None

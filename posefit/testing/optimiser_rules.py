@@ -84,9 +84,9 @@ class Case(PluginCase):
             yield proposals.copy(), costs.copy()
             optimiser.tell(proposals, costs)
 
-    def trace(self, space: Space = SPACE, evaluate: Evaluate = sphere, seed: int = 0, count: int = 6) -> list[Array]:
-        """Return the populations that a new optimiser proposes."""
-        return [proposals for proposals, _ in self.steps(self.build(space, seed), space, evaluate, count)]
+    def trace(self, seed: int = 0) -> list[Array]:
+        """Return six populations that a new optimiser proposes."""
+        return [proposals for proposals, _ in self.steps(self.build(SPACE, seed), SPACE, sphere, 6)]
 
     def best(self, space: Space, evaluate: Evaluate, seed: int, evaluations: int) -> float:
         """Return the lowest cost of a search; of a filter, in the last of ten frames with the same costs."""

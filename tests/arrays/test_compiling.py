@@ -79,15 +79,6 @@ def cut(file: Path) -> None:
     file.write_bytes(file.read_bytes()[:20])
 
 
-def garbled(file: Path) -> None:
-    file.write_bytes(b"\x80\x05garbage" * 99)
-
-
-def with_zeros(file: Path) -> None:  # what a machine without power leaves
-    content = file.read_bytes()
-    file.write_bytes(content[: len(content) // 2] + bytes(len(content) - len(content) // 2))
-
-
 def unreadable(file: Path) -> None:  # whoever reads, the administrator too
     file.unlink()
     file.symlink_to(file.name)
@@ -101,8 +92,8 @@ def with_another_bit(file: Path) -> None:
 
 def test_a_damaged_file_is_a_miss(run: Any, tmp_path: Path) -> None:
     run()
-    cases = [(damage, pattern) for damage in (emptied, cut, garbled, unreadable) for pattern in ("*.nbi", "*.nbc")]
-    for damage, pattern in (*cases, (with_zeros, "*.nbc"), (with_another_bit, "*.nbc"), (emptied, "*.nb?")):
+    cases = [(damage, pattern) for damage in (emptied, cut, unreadable) for pattern in ("*.nbi", "*.nbc")]
+    for damage, pattern in (*cases, (with_another_bit, "*.nbc"), (emptied, "*.nb?")):
         files = list((tmp_path / "cache").rglob(pattern))
         assert files
         for file in files:

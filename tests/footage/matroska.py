@@ -16,12 +16,13 @@ def _number(identity: int, value: int) -> bytes:
     return _element(identity, value.to_bytes(max(1, (value.bit_length() + 7) // 8), "big"))
 
 
-def write_matroska(path: Path, images: Sequence[Any], milliseconds: Sequence[int]) -> Path:
-    """Return the file, in which image k is shown from `milliseconds[k]` on."""
+def write_matroska(path: Path, images: Sequence[Any], milliseconds: Sequence[int], wide: int = 0) -> Path:
+    """Return the file, in which image k is shown from `milliseconds[k]` on, and stretched to be so many pixels wide."""
     height, width = images[0].shape[:2]
     head = _element(0x4282, b"matroska") + _number(0x4287, 4) + _number(0x4285, 2)
     info = _number(0x2AD7B1, 1_000_000) + _element(0x4D80, b"tests") + _element(0x5741, b"tests")
     picture = _number(0xB0, width) + _number(0xBA, height)
+    picture += _number(0x54B0, wide) + _number(0x54BA, height) if wide else b""
     track = (
         _number(0xD7, 1) + _number(0x73C5, 1) + _number(0x83, 1) + _element(0x86, b"V_MJPEG") + _element(0xE0, picture)
     )

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from posefit.footage.cameras import unit_of_heights
-from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.geometry.units import METRES, UNIT_NAMES
 from tests.cases import each
 from tests.commands import error_of, printed
-from tests.footage.conftest import NOBODY, camera, film, truth, walk
+from tests.footage.conftest import camera, truth, walk
 from tests.footage.test_footage import toml
 
 AZIMUTHS = (np.pi / 2, 0.6)
@@ -90,14 +89,3 @@ def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
     bare.write_text("K: [[200, 0, 79.5], [0, 200, 259.5], [0, 0, 1]]\n")
     with pytest.raises(ValueError, match="camera 'bare' must be of 160x120, got a centre of 79.5x259.5"):
         scene_of([source], camera=[bare])
-
-
-def test_videos_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
-    films = [
-        film(tmp_path / f"{name}.avi", [NOBODY] * 6 + truth(azimuth)[6:])
-        for name, azimuth in zip("ab", AZIMUTHS, strict=True)
-    ]
-    how, right = Extraction("mean", background="0:6"), calibration(tmp_path / "two.toml", 1.0)
-    with pytest.raises(ValueError, match="got .*: the masks show only parts of the person, or another one, or the cal"):
-        scene_of(films, camera=[right], up="y", unit="foot", extraction=how)
-    assert scene_of(films, camera=[right], up="y", extraction=how).count == 48

@@ -16,7 +16,7 @@ from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
-from posefit.silhouette.foreground import Still, mean_background, median_background, people
+from posefit.silhouette.foreground import Still, mean_background, people
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.files import arrays, csv_rows
@@ -81,15 +81,6 @@ def test_a_mean_background_is_the_mean_and_its_spread() -> None:
     np.testing.assert_allclose(still.spread, np.sqrt(200.0 / 3.0), rtol=1e-6)
     with pytest.raises(ValueError, match="at least one frame"):
         mean_background([])
-
-
-def test_a_median_background_is_not_changed_by_a_passer_by() -> None:
-    images = [np.full((4, 4, 3), 100, dtype=np.uint8) for _ in range(9)]
-    images[2][:] = 0
-    images[5][:] = 255
-    np.testing.assert_allclose(median_background(images).middle, 100.0)
-    with pytest.raises(ValueError, match="at least one frame"):
-        median_background(np.zeros((0, 2, 2, 3), dtype=np.uint8))
 
 
 def test_a_shadow_is_darker_but_has_the_grounds_colour() -> None:
@@ -292,7 +283,7 @@ def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: tuple[Path, list[Any]],
     assert np.abs(middles - true)[stored["usable"]].max() < 3.0  # pixels: the frame at its own time
 
 
-def test_landmarks_are_kept_at_their_place_in_the_whole_picture(
+def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_there(
     filmed: tuple[Path, list[Any]], segmenter: Callable[[str, Any], None]
 ) -> None:
     segmenter("box", Box)
@@ -301,6 +292,8 @@ def test_landmarks_are_kept_at_their_place_in_the_whole_picture(
     assert masks.landmarks.shape == (3, len(JOINTS), 3)
     assert not masks.landmarks[0, :, 2].any()
     np.testing.assert_array_equal(masks.landmarks[1:, 0], [[25.0, 17.0, 0.5]] * 2)
+    rows, columns = (np.flatnonzero(masks.silhouette(0).mask.any(axis=axis)) for axis in (1, 0))
+    assert (rows[0], columns[0], columns[-1]) == (30, 25, 44)  # of a part 120 pixels wide a sixth is marked
     how = Extraction("box", settings={"wrong": "landmarks"})
     with pytest.raises(BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"):
         Segmentation(Video.of(filmed[0]), how, (0, 3)).read()

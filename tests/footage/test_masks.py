@@ -10,7 +10,6 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from PIL.ImageFile import ImageFile
 from PIL.PngImagePlugin import PngInfo
 
 from posefit.footage import images
@@ -20,7 +19,6 @@ from posefit.footage.images import read_image, read_marks
 from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_masks
 from posefit.footage.source import body_of, scene_of
-from posefit.tracking.front import track
 from posefit.tracking.options import text_person
 from tests.cases import each
 from tests.commands import error_of, run
@@ -312,22 +310,6 @@ def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
     np.testing.assert_array_equal(filled(1.0), mask)
 
 
-def test_every_image_is_decoded_twice_however_often_its_mask_is_needed(
-    walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    decoded: list[str] = []
-    real = ImageFile.load
-
-    def load(image: ImageFile) -> Any:
-        decoded.extend(["image"] * bool(image.tile))  # it is loaded already without
-        return real(image)
-
-    monkeypatch.setattr(ImageFile, "load", load)
-    path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in walk])
-    track(path, out=tmp_path / "out", method="sapso@loose", evaluations=200, restarts=2, body_frames=2)
-    assert len(decoded) == 2 * len(walk)  # to count its values, and to decide by those of all
-
-
 def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[Any], tmp_path: Path) -> None:
     cameras = [camera(np.pi / 2), camera(0.6)]
     for name, count, fps in (("a", 6, 30.0), ("b", 4, 30.0), ("c", 6, 60.0)):
@@ -356,17 +338,6 @@ def test_masks_that_would_not_fit_in_memory_are_refused(
     monkeypatch.setattr("posefit.footage.masks.allowed_bytes", lambda: 6 * SIZE[0] * SIZE[1] // 8 - 1)
     with pytest.raises(ValueError, match="frames must be so few that their masks fit in .* got 6 of 160x120 pixels"):
         read(path)
-
-
-def test_pictures_come_as_opencv_decodes_them(tmp_path: Path) -> None:
-    drawn = np.random.default_rng(0).integers(0, 255, (37, 53, 3), dtype=np.uint8)
-    for image, suffixes in ((drawn, "png jpg bmp tif ppm"), (drawn[..., 0], "png jpg bmp tif pgm")):
-        for suffix in suffixes.split():
-            path = tmp_path / f"a.{suffix}"
-            assert cv2.imwrite(str(path), image)
-            for grey, flag in ((True, cv2.IMREAD_GRAYSCALE), (False, cv2.IMREAD_COLOR)):
-                wanted = cv2.imread(str(path), flag)  # libpng rounds greys down
-                np.testing.assert_allclose(read_image(path, grey=grey), wanted, rtol=0.0, atol=float(grey))
 
 
 def bomb(path: Path, side: int) -> None:
@@ -461,15 +432,3 @@ def test_masks_that_unpack_to_too_much_are_refused_by_their_shape(
         read_masks(folder, ALL)
     with pytest.raises(ValueError, match="masks: expected at most 50 million pixels a frame, got 10000x6000"):
         read_masks(np.broadcast_to(np.False_, (1, 6_000, 10_000)), ALL)
-
-
-def test_masks_are_kept_as_bits_and_chosen_frames_alone(tmp_path: Path) -> None:
-    drawn = np.random.default_rng(0).random((9, 31, 45)) < 0.5
-    for stack in (drawn, drawn * 255.0, np.asfortranarray(drawn.astype(np.uint8))):
-        np.savez_compressed(tmp_path / "a.npz", masks=stack, valid=drawn)
-        packed = read_masks(tmp_path / "a.npz", (2, 7))
-        assert packed.masks.nbytes == 5 * -(-31 * 45 // 8)
-        for k in range(5):
-            np.testing.assert_array_equal(packed.silhouette(k).mask, drawn[2 + k])
-            np.testing.assert_array_equal(packed.silhouette(k).valid, drawn[2 + k])
-        assert packed.names[0].endswith("a.npz[2]")

@@ -8,7 +8,7 @@ import numpy as np
 
 import posefit
 from posefit.footage.cleaning import people_in
-from posefit.footage.people import People, cut_out, paste, planes_of
+from posefit.footage.people import People, planes_of
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
@@ -68,16 +68,6 @@ def test_parts_that_take_turns_are_no_time_apart() -> None:
     for k in range(50):  # the other part begins in frame 2, thirty frames before the first one ends
         people.add(people_in(Silhouette.of(sides[int(k % 3 == 2 if k < 32 else k > 32)])), None)
     assert [len(person) for person in people.persons()] == [2]
-
-
-def test_a_mask_is_the_same_after_it_was_cut_out() -> None:
-    mask = np.random.default_rng(0).random((40, 50)) > 0.98
-    again = np.zeros_like(mask)
-    paste(cut_out(mask), again)
-    np.testing.assert_array_equal(again, mask)
-    nothing = np.zeros_like(mask)
-    paste(cut_out(nothing), nothing)
-    assert not nothing.any()
 
 
 def test_memory_of_noise_is_given_back() -> None:

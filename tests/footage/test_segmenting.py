@@ -11,13 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
-import posefit
 from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.cameras import yaws_of
-from posefit.footage.masks import Views
-from posefit.footage.quality import FrameQuality, apparent_sizes, disagreement, verdict
-from posefit.footage.readers import read_masks
+from posefit.footage.quality import FrameQuality, verdict
 from posefit.footage.segmentation import Extraction, Segmentation, Segmented, facings_on_the_spot
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
@@ -25,8 +22,7 @@ from posefit.geometry.camera import Camera
 from posefit.registry import Registry, registry
 from posefit.silhouette.foreground import Image, Person
 from tests.cases import each
-from tests.commands import error_of, run
-from tests.files import arrays
+from tests.commands import error_of
 from tests.footage.composites import DEMO, Kind, backgrounds, composed
 from tests.footage.conftest import Box, camera, iou, truth
 
@@ -166,19 +162,6 @@ def of(mask: Any) -> Person:
     return Person(mask, np.ones_like(mask), int(mask.sum()), 1, 0.0, False)
 
 
-def rows_of(part: Any) -> list[dict[str, Any]]:
-    """Return the rows of a figure that moves by 6 pixels a frame, of which `part` leaves a part in the mask."""
-    quality = FrameQuality(30.0)
-    return [quality.row(image, of(part(mask)), k) for k, (image, mask) in enumerate(figure(6 * k) for k in range(8))]
-
-
-def test_a_mask_that_covers_what_moves_is_usable() -> None:
-    rows = rows_of(lambda mask: mask)
-    assert all(row["usable"] for row in rows)
-    assert max(row["beside"] for row in rows) == 0.0
-    assert {row["longer_side"] for row in rows} == {60}
-
-
 def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
     def arm(mask: Any) -> Any:
         part = mask.copy()
@@ -186,7 +169,8 @@ def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
         part[:, : np.flatnonzero(mask.any(axis=0))[12]] = False
         return part
 
-    rows = rows_of(arm)
+    quality = FrameQuality(30.0)
+    rows = [quality.row(image, of(arm(mask)), k) for k, (image, mask) in enumerate(figure(6 * k) for k in range(8))]
     assert min(row["beside"] for row in rows[4:]) > 0.5
     assert not any(row["usable"] for row in rows[4:])
 
@@ -278,50 +262,19 @@ def test_the_verdict_follows_from_all_frames(
     assert result is None or text in result.text
 
 
-def views(folder: Path, azimuths: list[float], part: Any = lambda mask: mask) -> Views:
-    folder.mkdir()
-    for k, azimuth in enumerate(azimuths):
-        np.savez(folder / f"{k}.npz", masks=[part(mask) for mask in truth(azimuth)[8:16]])
-    return Views([read_masks(folder / f"{k}.npz", (None, None)) for k in range(len(azimuths))])
-
-
-def upper(mask: Any) -> Any:
-    rows = np.flatnonzero(mask.any(axis=1))
-    part = mask.copy()
-    part[rows[0] + len(rows) // 3 :] = False
-    return part
-
-
-def wrong(observed: Views, cameras: list[Camera]) -> str | None:
-    sizes = apparent_sizes(observed, cameras)
-    assert sizes is not None
-    return disagreement(*sizes, 1.75)
-
-
 def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None:
-    azimuths = [np.pi / 2, 0.6]
-    cameras = [camera(azimuth) for azimuth in azimuths]
-    assert wrong(views(tmp_path / "a", azimuths), cameras) is None
-    parts = wrong(views(tmp_path / "b", azimuths, upper), cameras)
-    assert parts is not None
-    assert parts.startswith("expected a person of 1.75 m, got masks 0.")
+    azimuths, sources = (np.pi / 2, 0.6), [tmp_path / "a.npz", tmp_path / "b.npz"]
+    cameras, masks = [camera(azimuth) for azimuth in azimuths], [truth(azimuth)[8:16] for azimuth in azimuths]
+    heads = [[mask & (np.cumsum(mask.any(axis=1)) < 25)[:, None] for mask in shown] for shown in masks]
     moved = [cameras[0], replace(cameras[1], translation=cameras[1].translation + [0.0, 1.5, 0.0])]
-    apart = wrong(views(tmp_path / "c", azimuths), moved)
-    assert apart is not None
-    assert "expected cameras that see one person, got views that pass each other by 1.5 m" in apart
-    with pytest.raises(ValueError, match=r"0: expected cameras that see one person, got views that pass"):
-        posefit.track([tmp_path / "c" / "0.npz", tmp_path / "c" / "1.npz"], camera=moved)
-
-
-def test_a_segmenter_gets_the_roi_alone_and_its_masks_are_put_there(
-    filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
-) -> None:
-    segmenter("box", Box)
-    _, masks = segmented(filmed[0], Extraction("box", roi=(40, 10, 80, 100)), (0, 4))
-    assert masks[0].shape == (120, 160)
-    rows, columns = np.flatnonzero(masks[0].any(axis=1)), np.flatnonzero(masks[0].any(axis=0))
-    assert (rows[0], columns[0], columns[-1]) == (30, 45, 57)
-    assert len(masks) == 4
+    for shown, placed, message in (
+        (heads, cameras, "expected a person of 1.75 m, got masks 0."),
+        (masks, moved, "expected cameras that see one person, got views that pass each other by 1.5 m"),
+    ):
+        for path, part in zip(sources, shown, strict=True):
+            np.savez(path, masks=part)
+        with pytest.raises(ValueError, match=message):
+            scene_of(sources, camera=placed, height=1.75)
 
 
 def test_a_segmenter_that_breaks_a_rule_is_named(
@@ -335,13 +288,6 @@ def test_a_segmenter_that_breaks_a_rule_is_named(
     ]:
         with pytest.raises(BrokenRuleError, match=message):
             segmented(filmed[0], Extraction("box", settings={"wrong": wrong}))
-
-
-def test_settings_of_a_segmenter_reach_it(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
-    for name, words in (("a", []), ("b", ["--set", "mixture.threshold=4000"])):
-        assert run("extract", filmed[0], "--frames", "14:40", *words, "--out", tmp_path / name).exit_code == 0
-    areas = [arrays(tmp_path / name / "masks.npz")["masks"].sum() for name in ("a", "b")]
-    assert areas[1] < 0.8 * areas[0]
 
 
 MIDDLE = np.array([0.0, 1.0, 0.0])

@@ -122,16 +122,13 @@ def test_instance_0_is_the_motion_as_it_is():
 def test_instances_differ_all_over_their_ranges():
     variations = [variation(number) for number in range(1, 2000)]
     assert len(set(variations)) == len(variations)
-    speed, phase, turn, start = (
-        np.array([getattr(varied, name) for varied in variations])
-        for name in ("speed", "phase", "turn_degrees", "start")
-    )
-    for values, low, high in (
-        (speed, 1.0 - SPEED, 1.0 + SPEED),
-        (phase, 0.0, 1.0),
-        (turn, -VIEW_DEGREES, VIEW_DEGREES),
-        (start, 0.0, 1.0),
+    for name, low, high in (
+        ("speed", 1.0 - SPEED, 1.0 + SPEED),
+        ("phase", 0.0, 1.0),
+        ("turn_degrees", -VIEW_DEGREES, VIEW_DEGREES),
+        ("start", 0.0, 1.0),
     ):
+        values = np.array([getattr(varied, name) for varied in variations])
         assert low <= values.min() < low + 0.01 * (high - low)
         assert high - 0.01 * (high - low) < values.max() <= high
         assert values.mean() == pytest.approx(0.5 * (low + high), abs=0.03 * (high - low))

@@ -13,13 +13,6 @@ from posefit.motion.built_in import average_skeleton
 from tests.cases import each
 
 
-def test_a_point_is_projected_by_hand() -> None:
-    camera = Camera(100, 80, [50.0, 60.0], [50.0, 40.0], np.eye(3), np.zeros(3))
-    pixels, depths = camera.project(np.array([1.0, -0.5, 2.0]))
-    assert pixels.tolist() == [50.0 * 1.0 / 2.0 + 50.0, 60.0 * -0.5 / 2.0 + 40.0]
-    assert depths == 2.0
-
-
 def test_from_the_front_the_left_hand_is_on_the_images_right() -> None:
     skeleton = average_skeleton()
     pixels, _ = Camera.around(np.zeros(3), 0.0, 4.0, (320, 240)).project(skeleton.joints(np.zeros(66)))

@@ -1,7 +1,5 @@
 """Kinematics by law and against a slow twin; bones and angles of limbs."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -15,15 +13,9 @@ from posefit.geometry.skeleton import (
     INNER,
     JOINTS,
     LIMBS,
-    MIRROR,
-    PARENTS,
-    SIDES,
     Skeleton,
     angle_index,
     angles_of,
-    both,
-    kind,
-    side,
 )
 from posefit.motion.built_in import average_skeleton
 from tests.cases import each
@@ -44,14 +36,6 @@ def slow_joints(skeleton: Skeleton, pose: Array, place: Array) -> Array:
     return chained(root, place, turns, list(skeleton.axes), list(skeleton.offsets))
 
 
-def test_a_bone_is_left_right_or_in_the_middle_and_of_a_kind() -> None:
-    named = {"lfemur": ("left", "femur"), "rhand": ("right", "hand"), "lowerback": ("middle", "lowerback")}
-    assert {name: (side(name), kind(name)) for name in named} == named
-    assert [SIDES.count(one) for one in ("left", "right", "middle")] == [10, 10, 7]
-    assert all(JOINTS[j] in (kind(name), *both(kind(name))) for j, name in enumerate(JOINTS))
-    assert [JOINTS[MIRROR[JOINTS.index(name)]] for name in ("lfemur", "rhand", "head")] == ["rfemur", "lhand", "head"]
-
-
 def test_shapes_are_checked() -> None:
     skeleton = average_skeleton()
     with pytest.raises(ValueError, match=r"poses must have shape \(..., 66\), got \(2, 65\)"):
@@ -61,15 +45,6 @@ def test_shapes_are_checked() -> None:
     with pytest.raises(ValueError, match=r"offsets must have shape \(26, 3\), got \(25, 3\)"):
         Skeleton("x", np.zeros((25, 3)), np.zeros((26, 3, 3)), ())
     assert len(BONES) == 26
-
-
-def test_parents_come_before_children_and_ends_have_no_angles() -> None:
-    assert PARENTS[0] == -1
-    assert all(0 <= parent < joint for joint, parent in enumerate(PARENTS) if joint)
-    starts = [angle_index(joint) for joint in range(1, len(JOINTS))]
-    assert sorted(start for start in starts if start >= 0) == list(range(3, ANGLES, 3))
-    ends = {"head", "lhand", "rhand", "ltoes", "rtoes"}
-    assert {JOINTS[joint + 1] for joint, start in enumerate(starts) if start < 0} == ends
 
 
 def test_free_angles_are_the_channels_and_the_root() -> None:
@@ -103,14 +78,6 @@ def test_joints_equal_the_slow_twin_whatever_the_frames_of_the_angles() -> None:
         np.testing.assert_array_equal(led.reshape(10, 27, 3), skeleton.joints(poses, places))
 
 
-def test_the_limbs_and_the_torso_are_all_bones_once() -> None:
-    torso = {"lowerback", "upperback", "thorax"}
-    assert sorted([*torso, *(bone for bones in LIMBS.values() for bone in bones)]) == sorted(BONES)
-    # a limb is one chain: each bone but the first hangs from the one before it
-    for bones in LIMBS.values():
-        assert all(JOINTS[PARENTS[JOINTS.index(b)]] == a for a, b in pairwise(bones))
-
-
 @each("name", LIMBS)
 def test_a_limbs_angles_move_all_of_its_bones_and_no_other(name: str) -> None:
     skeleton = average_skeleton()
@@ -118,13 +85,6 @@ def test_a_limbs_angles_move_all_of_its_bones_and_no_other(name: str) -> None:
     pose[angles_of(LIMBS[name])] = 0.3
     moved = np.abs(skeleton.joints(pose) - skeleton.joints(np.zeros(66))).max(axis=1) > 1e-9
     assert set(np.flatnonzero(moved[1:])) == {BONES.index(bone) for bone in LIMBS[name]}
-
-
-def test_radii_are_shares_of_the_bones_length() -> None:
-    skeleton = average_skeleton()
-    for name, shares in (("lfemur", [0.205, 0.130]), ("rfemur", [0.205, 0.130]), ("head", [0.88, 0.86])):
-        bone = BONES.index(name)
-        np.testing.assert_allclose(Body.of(skeleton).radii[bone], skeleton.lengths[bone] * np.array(shares))
 
 
 def test_a_joint_is_as_wide_as_the_widest_bone_that_meets_there() -> None:

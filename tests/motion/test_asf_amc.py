@@ -1,6 +1,5 @@
 """Acclaim files: real ones against a slow reader of the same text, small ones against numbers worked by hand."""
 
-import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,12 +71,6 @@ def amc_file(folder: Path, text: str) -> Path:
 def angles_of(motion: Motion, bone: str) -> Array:
     start = angle_index(JOINTS.index(bone))
     return np.degrees(motion.poses[:, start : start + 3])
-
-
-def clips(cmu: Path) -> list[tuple[Path, Path, int]]:
-    with (cmu / "manifest.tsv").open() as file:
-        rows = [row for row in csv.DictReader(file, delimiter="\t") if row["frames"]]
-    return [(next((cmu / row["file"]).parent.glob("*.asf")), cmu / row["file"], int(row["frames"])) for row in rows]
 
 
 def turn(x: float, y: float, z: float) -> Array:

@@ -238,17 +238,6 @@ def test_angles_are_written_without_jumps(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_bvh(tmp_path / "a.bvh", up="y").joints, motion.joints, atol=1e-6)
 
 
-def test_another_reader_has_the_same_joints(tmp_path: Path) -> None:
-    pybvh = pytest.importorskip("pybvh")
-    walk = recorded.clip("16_15").motion().frames(10, 16)
-    path = write_rig(tmp_path / "a.bvh", walk, STYLES["smpl"], 100.0)
-    motion, other = read_bvh(path), pybvh.read_bvh_file(path, world_up="+y")
-    places = 0.01 * other.node_positions()
-    for name, joint in (("L_Knee", "lfemur"), ("R_Ankle", "rtibia"), ("L_Wrist", "lradius"), ("Neck", "thorax")):
-        expected = places[:, other.node_index[name]]
-        np.testing.assert_allclose(motion.joints[:, JOINTS.index(joint)], expected, atol=1e-5)
-
-
 def test_what_comes_out_of_a_file_has_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.bvh"
     write_bvh(path, built_in.motion("walk", frames=6))

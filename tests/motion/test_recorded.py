@@ -1,42 +1,13 @@
-"""The library of recorded motions: what is stored is what was recorded, to a centimetre."""
+"""The library of recorded motions: where it comes from, whom it has, and what lies between stored poses."""
 
 import json
 from importlib.resources import files
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from posefit.cli import main
 from posefit.motion import recorded
-from tests.cases import each
-
-ROUNDED = 1e-3  # metres: what rounding 66 angles to a thousandth of a radian may move a hand by, and more
-
-
-@pytest.fixture(scope="module")
-def cmu30(cmu: Path) -> Path:
-    folder = cmu.parent / "cmu30"
-    if not folder.is_dir():
-        pytest.skip(f"no clips in {folder}")
-    return folder
-
-
-@each("subject", ["09", "135"])
-def test_a_clip_is_the_recorded_one_to_a_centimetre(cmu30: Path, subject: str) -> None:
-    with np.load(cmu30 / f"{subject}.npz") as stored:
-        start = 0
-        for name, length in zip(stored["names"].tolist(), stored["lengths"].tolist(), strict=True):
-            part = slice(start, start + length)
-            start += length
-            clip = recorded.clip(name)
-            motion = clip.motion()
-            assert (clip.subject, len(motion), motion.fps) == (subject, length, 30.0)
-            true = clip.skeleton.joints(stored["poses"][part].astype(float), stored["translations"][part].astype(float))
-            away = np.linalg.norm(clip.skeleton.joints(motion.poses, motion.translations) - true, axis=-1)
-            assert away.max() < 0.01 + ROUNDED
+from tests.commands import printed
 
 
 def test_the_files_are_small_and_say_where_they_come_from_and_open_without_pickle() -> None:
@@ -74,7 +45,7 @@ def test_people_are_chosen_by_name() -> None:
 
 
 def test_the_command_lists_what_there_is() -> None:
-    listing: dict[str, Any] = json.loads(CliRunner().invoke(main, ["motions", "--json"]).stdout)
+    listing = printed("motions")
     assert listing["recorded"][0]["name"] == "02_01"
     assert listing["recorded"][0]["seconds"] == pytest.approx(85 / 30, abs=1e-3)
     assert len(listing["recorded"]) == 216

@@ -1,11 +1,11 @@
-"""The report's figures: each has its place in a row, and its words from the one table of a track's figures."""
+"""The report's figures: each has its place in a row."""
 
 import math
 from dataclasses import replace
 
 import pytest
 
-from posefit.evaluation.measures import BASELINES, MEASURES
+from posefit.evaluation.measures import BASELINES
 from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import run_cell
 from tests.report.contests import FIRST
@@ -16,9 +16,8 @@ CELL = replace(FIRST, method="random@pca", frames=3, size=(80, 60), evaluations=
 
 @pytest.fixture(scope="module")
 def row():
-    """Return the row of a method that has a posterior, with the floor of a prior, which it has not."""
-    row = run_cell(replace(CELL, method="exemplars", evaluations=800)).row
-    return {**row, "prior_floor_degrees": run_cell(CELL).row["prior_floor_degrees"]}
+    """Return the row of a method that has a posterior."""
+    return run_cell(replace(CELL, method="exemplars", evaluations=800)).row
 
 
 def test_every_figure_has_its_place_in_a_row(row):
@@ -45,15 +44,3 @@ def test_a_row_has_how_often_the_likeliest_mode_was_right(row):
     assert all(0.0 <= share <= 1.0 for share in right)
     without = run_cell(replace(CELL, frames=2)).row
     assert (without["mode_reliability"], without["interval_mm"]) == ([], None)
-
-
-def test_titles_meanings_and_digits_are_those_of_the_measures():
-    about = {name: COLUMNS[name].as_dict() for name, column in COLUMNS.items() if column.in_tables}
-    for name, measure in {"error": "error_degrees", "lost": "lost_rate", "iou": "iou", "mpjpe": "mpjpe_mm"}.items():
-        assert about[name]["title"].startswith(MEASURES[measure].label)
-        assert about[name]["about"] == MEASURES[measure].meaning
-    assert all(column["about"] for column in about.values())
-    assert (about["lost"]["factor"], about["lost"]["digits"], about["ms"]["factor"], about["ms"]["digits"]) == (
-        100.0, 1, 1.0, 1,
-    )  # fmt: skip
-    assert [COLUMNS[name].heading for name in ("mpjpe", "lost")] == ["MPJPE (mm)", "lost"]  # a share in files

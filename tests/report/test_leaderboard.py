@@ -14,13 +14,6 @@ from tests.report.browser import ledger, result, sure
 from tests.report.contests import FIRST, baselines, contest_of_errors, contest_of_results, full, three_methods
 
 
-def test_runs_are_paired_by_instance_and_seed(tmp_path: Path) -> None:
-    contest = contest_of_errors(tmp_path, full({"worse": 2.0, "better": 1.0}))
-    assert [contest.runs.methods[m] for m in contest.methods] == ["better", "worse"]
-    assert contest.of("error").round(9).tolist() == [[[1.0, 1.01], [1.1, 1.11]], [[2.0, 2.01], [2.1, 2.11]]]
-    assert contest.left_out == 0
-
-
 def test_a_method_that_shares_too_few_runs_is_listed_last_with_its_own_runs(tmp_path: Path) -> None:
     errors = full({"a": 1.0, "b": 2.0, "late": 0.5}, instances=4)
     contest = contest_of_errors(tmp_path, {key: e for key, e in errors.items() if key[0] != "late" or key[1] == 0})
@@ -78,15 +71,6 @@ def test_rows_have_their_effect_and_how_many_tracks_lost_frames(tmp_path: Path) 
     made = [result(replace(FIRST, instance=i), 1.0, lost_rate=rate) for i, rate in rates.items()]
     (row,) = leaderboard(contest_of_results(tmp_path / "lost", made))
     assert (row["lost_tracks"], row["runs"]) == (2, 3)
-
-
-def test_pairs_have_their_effect_and_p(tmp_path: Path) -> None:
-    tests = paired_tests(contest_of_errors(tmp_path, full({"a": 1.0, "b": 2.0}, instances=3, seeds=3)))
-    assert tests is not None
-    ((first, second, *effect, p, adjusted),) = tests["pairs"]
-    assert (first, second) == (0, 1)
-    assert effect == pytest.approx([-1.0, -1.0, -1.0])  # the median of differences that are all the same
-    assert p == adjusted == pytest.approx(2.0 / 2**9)  # all nine differences have one sign, either of two
 
 
 def test_curves_start_and_end_with_the_traces(tmp_path: Path) -> None:

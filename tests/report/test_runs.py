@@ -1,9 +1,7 @@
 """The rows of a ledger as numbers: distinct names, a stable order, and nan where a row has no figure."""
 
-import json
 import random
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ from posefit.report.runs import distinct, runs_of
 from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import CellResult, TrackCell
 from posefit.sweep.ledger import Ledger
-from tests.report.browser import EVIL, ledger, result
+from tests.report.browser import ledger, result
 from tests.report.contests import FIRST
 
 SAPSO, COOLER = replace(FIRST, method="sapso@pca"), replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
@@ -57,25 +55,6 @@ def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
     )
 
 
-def test_a_grid_of_settings_has_no_two_labels_alike(tmp_path: Path) -> None:
-    plan = product(
-        [f"{name}@pca" for name in ("sapso", "pso", "cma", "random", "scipy")],
-        (0.5, 0.6, 0.7, 0.8, 0.9),
-        range(10, 60, 10),
-    )
-    variants = [
-        replace(FIRST, method=method, settings={f"{method[:-4]}.inertia": inertia, f"{method[:-4]}.particles": count})
-        for method, inertia, count in plan
-    ]
-    motions = ("walk", "run", "jacks")
-    runs = read(
-        tmp_path, *(result(replace(v, motion=m, seed=s), 1.0) for v in variants for m in motions for s in range(5))
-    )
-    assert len(runs) == 1875
-    assert len(set(runs.methods)) == 125
-    assert "pso@pca (inertia 0.6, particles 40)" in runs.methods
-
-
 def test_names_are_distinct_and_printable_whatever_they_hold() -> None:
     details = [{"version": "1", "evaluations": "2"}, {"version": "1", "evaluations": "3"}, {}, {}]
     assert distinct(["cold", "cold", "a", "a (2)"], details) == (
@@ -85,18 +64,6 @@ def test_names_are_distinct_and_printable_whatever_they_hold() -> None:
     names = distinct(["\x1b[31mred\nb", "\\x1b[31mred\\nb", "\u202e"], [{}] * 3)
     assert len(set(names)) == 3
     assert all(map(str.isprintable, names))
-
-
-def test_methods_of_one_given_name_are_told_apart_by_what_differs(tmp_path: Path) -> None:
-    cells = [
-        replace(FIRST, name="cold", method=m, evaluations=n) for m in ("a@pca", "b@pca") for n in (2440000, 2440001)
-    ]
-    runs = read(
-        tmp_path, *(result(cell, 1.0 + k) for k, cell in enumerate(cells)), lost=[(replace(cells[0], seed=3), [EVIL])]
-    )
-    assert runs.methods == tuple(f"cold (method {m}@pca, evaluations 244000{n})" for m in "ab" for n in (0, 1))
-    assert runs.failures[0]["method"] == runs.methods[0]
-    assert runs.failures[0]["reasons"][0].isprintable()
 
 
 def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -> None:
@@ -135,31 +102,6 @@ def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
     assert len(runs.data["traces"][0][0]) == 0
 
 
-def test_optional_figures_are_in_tables_if_a_row_has_them(tmp_path: Path) -> None:
-    uncertainty = {"unknown_rate": 0.25, "coverage": {"50": 0.4, "80": 0.7, "95": 0.9}, "interval_mm": None}
-    plain = result(replace(FIRST, seed=1), 1.0)
-    without, runs = read(tmp_path / "a", plain), read(tmp_path / "b", plain, result(FIRST, 1.0, **uncertainty))
-    assert [name for name in runs.table_figures if name not in without.table_figures] == ["unknown", "coverage_80"]
-    assert runs.figures["coverage_80"][runs.seed == 0].tolist() == [0.7]
-
-
-def test_modes_are_binned_by_their_probability(tmp_path: Path) -> None:
-    (bins,) = read(tmp_path, result(FIRST, 1.0, mode_reliability=[[4, 0.55, 0.25], [2, 1.0, 0.5]])).data["modes"]
-    np.testing.assert_allclose(bins[[5, 9]], [[4, 2.2, 1], [2, 2, 1]], rtol=1e-6)
-    assert not np.delete(bins, [5, 9], axis=0).any()
-
-
 def test_seeds_of_any_size_keep_every_digit(tmp_path: Path) -> None:
     runs = read(tmp_path, *(result(replace(FIRST, seed=seed), 1.0) for seed in (2**70 + 1, 2**70)))
     assert [runs.seeds[k] for k in runs.seed] == [2**70, 2**70 + 1]
-
-
-def test_failures_have_their_reasons_and_their_command(tmp_path: Path) -> None:
-    runs = read(tmp_path / "a", result(FIRST, 1.0), lost=[(SAPSO, ["slow", "slow", "dead"])])
-    (failure,) = runs.failures
-    assert (runs.failed, runs.unfinished) == ((0,), ("sapso@pca",))
-    assert (failure["name"], failure["reasons"]) == (str(SAPSO), ["slow", "dead"])
-    assert 'method = "sapso@pca"' in failure["command"]
-    assert json.dumps(runs.failures)
-    lost = [(replace(COOLER, seed=1), ["slow"])]
-    assert read(tmp_path / "b", result(SAPSO, 1.0), result(COOLER, 2.0), lost=lost).failed == (0, 1)

@@ -72,15 +72,6 @@ def test_methods_differ_in_settings_budget_and_infeasible_proposals(tmp_path: Pa
     ]
 
 
-def test_instances_that_one_method_lacks_are_named(tmp_path: Path) -> None:
-    pairs = [(m, i) for m in ("cma", "pso") for i in range(3) if (m, i) != ("pso", 1)]
-    contest = contest_in(ledger(tmp_path / "r", [search_result(cell(m, instance=10_000 + i), 5) for m, i in pairs]))
-    ((instance, methods),) = contest.missing
-    assert contest.runs.instances[instance] == "f1 in 9D, instance 10001"
-    assert [contest.runs.methods[m] for m in methods] == ["pso"]
-    assert len(contest.instances) == 2
-
-
 def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> None:
     results = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))  # 9 + 2 and 9; 9 and 9 + 1
     data = data_of(results, runs_of(results))
@@ -114,7 +105,6 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     data = data_in((tmp_path / "page.html").read_text("utf-8"))
     assert data["answer"] == lines[:3]
     assert data["failures"][0]["name"] == "pso on f1 in 9D, instance 10001, seed 3"
-    assert data["header"]["unfinished"] == ["pso"]
     assert data["baselines"] == [{"baseline": "random", "reached": pytest.approx(10.345)}]
     with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
         assert len(list(csv.DictReader(file))) == 12 + 1

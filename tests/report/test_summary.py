@@ -57,18 +57,6 @@ def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(tmp_pa
         assert text in sentences(contest_of_errors(tmp_path / str(k), errors))
 
 
-def test_too_few_runs_for_any_difference_are_reported(tmp_path: Path) -> None:
-    # of eight pairs the least p is 2 / 2^8, times ten after Holm; of nine it is half of that, and below 5 %
-    methods = dict.fromkeys("abcde", 1.0) | {"e": 2.0}
-    errors = full(methods, instances=4, seeds=2)
-    assert sentences(contest_of_errors(tmp_path / "eight", errors))[2] == (
-        "So few cannot show any difference: of 10 pairs of methods no p can be below 0.078."
-    )
-    text = sentences(contest_of_errors(tmp_path / "eleven", errors | full(methods, instances=3, seeds=3)))
-    assert text[1] == "Over 11 paired runs it is better than e."
-    assert text[2].startswith("11 paired runs are too few to tell it from b (median difference +0.00°, p = 1); c (")
-
-
 def test_names_with_commas_stand_between_semicolons() -> None:
     assert listed(["a (x 1, y 2)", "b", "c"]) == "a (x 1, y 2); b; and c"
     assert listed(["a", "b", "c"]) == "a, b and c"

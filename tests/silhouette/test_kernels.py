@@ -20,7 +20,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import FAR, NEAR
 from posefit.silhouette.sharing import parts_of, work_through
 from tests.cases import each
-from tests.silhouette.twin import TIE, body_distance, hull_distance, random_poses
+from tests.silhouette.twin import TIE, body_distance, random_poses
 
 
 def assert_equals_the_twin(body: Body, camera: Camera, pose: Array, translation: Array) -> bool:
@@ -30,19 +30,6 @@ def assert_equals_the_twin(body: Body, camera: Camera, pose: Array, translation:
     clear = np.abs(distance) > TIE
     np.testing.assert_array_equal(drawn[clear], (distance <= 0.0)[clear])
     return bool(clear.all())
-
-
-def test_the_twin_agrees_with_a_fine_sweep_of_discs() -> None:
-    rng = np.random.default_rng(0)
-    x, y = rng.uniform(-5.0, 15.0, (2, 400))
-    for _ in range(8):
-        first, second = rng.uniform(0.0, 10.0, (2, 2))
-        r0, r1 = rng.uniform(0.2, 3.0, 2)
-        t = np.linspace(0.0, 1.0, 20_001)[:, None]
-        swept = np.hypot(x - (first[0] + t * (second - first)[0]), y - (first[1] + t * (second - first)[1])) - (
-            r0 + t * (r1 - r0)
-        )
-        np.testing.assert_allclose(hull_distance(x, y, first, second, r0, r1), swept.min(axis=0), atol=2e-3)
 
 
 def test_a_body_is_cut_by_any_image_and_the_near_plane_and_both_focal_lengths_count(body: Body, camera: Camera) -> None:

@@ -93,7 +93,6 @@ def test_one_seed_or_fewer_than_eight_runs_give_no_interval():
         (np.ones((2, 0, 3)), {}, r"errors must have shape \(methods, instances, seeds\), got \(2, 0, 3\)"),
         ([[[1.0, np.nan]]], {}, "errors must be finite, got 1 that are not"),
         (np.ones((1, 2, 2)), {"resamples": 99}, "resamples must be at least 100, got 99"),
-        (np.ones((1, 2, 2)), {"level": 95}, "level must lie between 0 and 1, got 95"),
     ],
 )
 def test_invalid_errors_and_settings_are_refused(errors, settings, message):

@@ -8,7 +8,6 @@ from posefit.statistics.profiles import (
     expected_running_time,
     hits,
     performance_profile,
-    running_time_interval,
 )
 from tests.cases import each
 
@@ -37,23 +36,6 @@ def test_expected_running_time_counts_what_failed_runs_used():
     assert expected_running_time(evaluations, [50, 60]).tolist() == [15.0, 100.0, np.inf]
     # a run hits after 30 of its 100 evaluations with probability 1/4: 3 failures of 100 on average, then 30
     assert expected_running_time([[30.0]] + [[np.inf]] * 3, [100] * 4).tolist() == [330.0]
-
-
-def test_the_interval_of_a_running_time_is_that_of_resampled_clusters():
-    rng = np.random.default_rng(2)
-    hit = rng.gamma(2.0, 20.0, (24, 2))
-    hit[hit > 60.0] = np.inf
-    clusters, used = np.repeat(np.arange(8), 3), np.full(24, 60.0)
-    ends = running_time_interval(hit, used, clusters, np.random.default_rng(0))
-    resampled = []
-    for _ in range(2000):  # one resample after another, in words
-        rows = np.concatenate([np.flatnonzero(clusters == one) for one in rng.integers(8, size=8)])
-        resampled.append(expected_running_time(hit[rows], used[rows]))
-    assert np.allclose(ends, np.quantile(resampled, [0.025, 0.975], axis=0), rtol=0.06)
-    low, high = running_time_interval([[10.0]] + [[np.inf]] * 3, [40.0] * 4, range(4), np.random.default_rng(0))
-    assert np.isinf(high[0])  # three of ten resamples have no hit
-    assert low[0] < expected_running_time([[10.0]] + [[np.inf]] * 3, [40.0] * 4)[0]
-    assert np.isnan(running_time_interval([[1.0], [2.0]], [5.0, 5.0], [7, 7], np.random.default_rng(0))).all()
 
 
 def test_a_profile_counts_runs_within_each_level():

@@ -145,13 +145,6 @@ def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken
         assert score.above == np.median([one.cost - one.truth_cost for one in runs[way]])
 
 
-def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not() -> None:
-    cells = list(Plan.of(tomllib.loads(PLAN)))
-    assert {(cell.function, cell.dimension) for cell in cells} == {(1, 9), (1, 24), (7, 24)}
-    assert len(cells) == len({cell.key for cell in cells}) == 3 * 2 * 2
-    assert {cell.evaluations for cell in cells if cell.dimension == 24} == {240}
-
-
 def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> None:
     runs = {
         (run.method, run.function, run.dimension, run.instance): run for run in map(search_run, Ledger(results).rows())
@@ -174,15 +167,11 @@ def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> Non
     assert together.reached == pytest.approx(np.mean([score.reached for score in others]))
 
 
-def test_the_ledger_is_a_table_and_a_report(results: Path, tmp_path: Path) -> None:
+def test_the_ledger_is_a_table(results: Path) -> None:
     table = Ledger(results).frame()
     assert len(table) == 12
     assert set(table["function"]) == {1, 7}
     assert set(table["settings"]) == {"", "population_size=20"}
-    done = run("report", results, "--out", tmp_path / "page.html")
-    assert done.exit_code == 0, done.stderr
-    assert " % of all targets reached " in done.stdout.splitlines()[0]
-    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
 @each(

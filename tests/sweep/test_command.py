@@ -81,18 +81,6 @@ def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) ->
     assert [cell["done"] for cell in listed["cells"]] == [True] * 8
 
 
-def test_a_preview_of_many_cells_fits_a_screen(plan: Path) -> None:
-    methods = [f"{name}@pca" for name in ("random", "pso", "sapso", "cma", "annealed", "particle")]
-    plan.write_text(f'[product]\nmethods = {methods}\nmotions = ["walk"]\nseeds = 900\n')
-    done = run("sweep", plan, "--dry-run")
-    assert done.exit_code == 0, done.stderr
-    method, motion, seed, last = done.stdout.splitlines()
-    assert method.split(maxsplit=1) == ["method", ", ".join(f"900 x {one}" for one in methods)]
-    assert motion.split(maxsplit=1) == ["motion", "5,400 x walk"]
-    assert seed.endswith(", 6 x 10, 6 x 11, and 888 other values")
-    assert last.startswith("5,400 cells, 5,400 of them to run, ")
-
-
 def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path, tmp_path: Path) -> None:
     plan.write_text('[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nframes = 1\nevaluations = 80\n')
     words, out = ["sweep", plan, "--out", tmp_path / "out", "--workers", 1], tmp_path / "out"

@@ -7,7 +7,6 @@ import pytest
 
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
-from posefit.sweep.plan import Plan
 from tests.cases import each
 
 SPEC = {"method": "sapso@pca", "motion": "walk", "frames": 2, "size": [160, 120]}
@@ -15,18 +14,6 @@ SPEC = {"method": "sapso@pca", "motion": "walk", "frames": 2, "size": [160, 120]
 
 def cell(**fields: Any) -> TrackCell:
     return cell_of({**SPEC, **fields})
-
-
-def test_cells_with_less_knowledge_have_keys_of_their_own_however_they_are_made() -> None:
-    known = [{}, {"yaw_off_degrees": 25}, {"yaw_off_degrees": 180}, {"body_off_percent": 10}]
-    cells = [cell(**fields) for fields in known]
-    assert len({made.key for made in cells}) == len(known)
-    assert cells[1].spec["yaw_off_degrees"] == 25.0
-    product = {"methods": ["sapso@pca"], "motions": ["walk"], "seeds": [0]}
-    for fields, made in zip(known, cells, strict=True):
-        entry = {"instance": 0, **fields}  # of fields that are checked by themselves
-        plan = Plan.of({"defaults": {"frames": 2, "size": [160, 120]}, "product": {**product, "instances": [entry]}})
-        assert [planned.key for planned in plan] == [made.key]
 
 
 def yaw(**fields: Any) -> float:

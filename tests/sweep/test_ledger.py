@@ -1,7 +1,6 @@
 """A ledger keeps every row, whatever becomes of the process that writes it; a strange file is one line."""
 
 import json
-import os
 import signal
 import sqlite3
 import subprocess
@@ -74,11 +73,8 @@ SPEC = cells(1)[0].spec
     ("column", "change", "reason"),
     [
         ("row", {"cost": "low"}, "cost must be a number that a cell can measure, got 'low'"),
-        ("row", {"cost": 10**400}, "cost must be a number"),
         ("row", {"cost": float("nan")}, "finite numbers"),
-        ("row", {"error_degrees": {"mean": "x"}}, "error_degrees must be"),
         ("row", {"trace": {"evaluations": [1, 1], "cost": [2, 1]}}, "trace must be rising evaluations"),
-        ("row", {"trace": {"evaluations": [1], "cost": []}}, "trace must be rising evaluations"),
         ("row", {"joint_errors_mm": [0.0] * 26}, "joint_errors_mm must be 27 numbers"),
         ("row", {"warnings": "none"}, "warnings must be"),
         ("row", {"warnings": ["\ud800"]}, "whole characters"),
@@ -167,16 +163,6 @@ def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
             opened(folder / FILE)
 
 
-def test_a_second_driver_is_refused_in_a_line_that_names_the_first(tmp_path: Path) -> None:
-    path = tmp_path / "results" / FILE
-    with Writer(path) as first:
-        first.plan(cells(1))
-        with pytest.raises(ValueError, match=rf"got one that process {os.getpid()} of .* drives; --shard I/N"):
-            Writer(path)
-        assert len(Ledger(path)) == 0  # which anybody may read
-    Writer(path).close()
-
-
 HOLD = """
 import sys, time
 from posefit.sweep.ledger import Writer
@@ -191,7 +177,7 @@ def test_a_driver_that_was_killed_holds_nothing(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", HOLD, str(path)], cwd=ROOT, stdout=subprocess.PIPE) as held:
         assert held.stdout is not None
         assert held.stdout.readline() == b"open\n"
-        with pytest.raises(ValueError, match=f"process {held.pid} of"):
+        with pytest.raises(ValueError, match=f"got one that process {held.pid} of .* drives; --shard I/N"):
             Writer(path)
         held.send_signal(signal.SIGKILL)
         held.wait()

@@ -107,12 +107,6 @@ class AsksForMore(Sound, breaks="budget"):
         self.population = np.tile(self.population[:1], (1000, 1))
 
 
-class DoublesItsPopulation(Sound, breaks="box order"):
-    def ask(self) -> Array:
-        self.population = np.tile(self.population, (2, 1))
-        return super().ask()
-
-
 class DrawsInSecret(Sound, breaks="evaluations"):
     """Draws poses of its own in every tell, which no budget counts."""
 
@@ -421,13 +415,6 @@ class ChangesTheMask(Holds, breaks="one_frame_each"):
     def frame(self, observation: Any) -> Frame:
         observation.silhouettes[0].mask[:] = True
         return super().frame(observation)
-
-
-class GivesFramesTwice(Holds, breaks="one_frame_each"):
-    def track(self, observations: Any, rng: Any) -> Any:
-        for frame in super().track(observations, rng):
-            yield frame
-            yield frame
 
 
 class ExitsInTrack(Holds, breaks="one_frame_each"):

@@ -58,15 +58,6 @@ def test_the_checks_go_on_after_one_that_ended_the_process_until_another_fails_a
     assert report.results[-1].detail == "not run: dtype and dimensions fail for one cause"
 
 
-@pytest.mark.usefixtures("installed")
-def test_a_plugin_that_exits_fails_the_check_and_says_where() -> None:
-    ran = posefit("check", "optimiser", "exits-in-tell", "--only", "dtype", "--json")
-    assert ran.returncode == 1
-    (result,) = json.loads(ran.stdout)["results"]
-    assert result["detail"] == "it must not end the program, got SystemExit: 0"
-    assert result["traceback"].splitlines()[-2].strip() == "sys.exit(0)"
-
-
 def test_a_name_that_two_plugins_register_is_not_checked_before_one_has_another(
     monkeypatch: Any, tmp_path: Path
 ) -> None:
