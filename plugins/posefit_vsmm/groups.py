@@ -1,33 +1,20 @@
-"""Groups of models, which switch between each other, and the most probable one. VSMM steps 4 and 5.
-
-A TOML file (Interpretation V1) holds `stay`, a table `groups` of names and their models, and a table `neighbours` of
-models and those that they change into. It may hold a table `activities` of names and their models: the labels of
-frames. Groups are numbered as in their file: the rules of step 7 speak of the first, the second and the third.
-"""
+"""Groups of models, which switch between each other, and the most probable one. VSMM steps 4 and 5."""
 
 from collections.abc import Collection, Mapping, Sequence
-from importlib.resources import files
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.errors import InputError
-from posefit.fitting.check import one_of
-from posefit.reading import parsed_toml, quoted, read_text
-
-SIZE_LIMIT = 100_000  # bytes
-TABLES = ("groups", "neighbours", "activities")
 
 
 class Topology(NamedTuple):
     """Groups of models (model sets), in the order in which they are numbered, and a digraph of models' neighbours."""
 
     groups: Mapping[str, tuple[str, ...]]
-    neighbours: Mapping[str, tuple[str, ...]]
-    activities: Mapping[str, tuple[str, ...]]  # each model is in one at least
-    stay: float
+    neighbours: Mapping[str, tuple[str, ...]]  # which models each changes into
+    activities: Mapping[str, tuple[str, ...]]  # the labels of frames, and their models
+    stay: float  # how probable it is that a model goes on; the rest is shared among its neighbours
 
     def transition(self, models: Sequence[str]) -> Array:
         """Return how probable each of some models (r, r) is after each: `stay`, the rest among its neighbours there.
@@ -54,30 +41,27 @@ def most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], prob
     return max(sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name]))
 
 
-def read_topology(path: str | Path, known: Collection[str]) -> Topology:
-    """Return the topology of a TOML file, "" for the package's own. Raises ValueError naming a file that is none."""
-    label = str(path) or "groups.toml"
-    try:
-        text = read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / label).read_text("utf-8")
-        values = {"activities": {}, **parsed_toml(text)}
-    except FileNotFoundError:
-        raise InputError(f"{label}: expected a file of groups, got none") from None
-    except ValueError as error:
-        raise InputError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
-    if set(values) != {"stay", *TABLES}:
-        raise InputError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
-    stay = values["stay"]
-    if not isinstance(stay, float) or not 0.0 < stay < 1.0:
-        raise InputError(f"{label}: stay must be a number between 0 and 1, got {quoted(stay)}")
-    for key in TABLES:
-        if not isinstance(values[key], dict) or not all(isinstance(models, list) for models in values[key].values()):
-            raise InputError(f"{label}: {key} must be a table of lists of models, got {quoted(values[key])}")
-    tables = [{name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in TABLES]
-    groups, neighbours, activities = tables
-    if not groups or not all(groups.values()):
-        raise InputError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
-    used = {*neighbours}.union(*groups.values())
-    for model in used.union(*neighbours.values(), *activities.values()):
-        one_of(f"{label}: a model", model, known)
-    activities |= {model: (model,) for model in known if not any(model in models for models in activities.values())}
-    return Topology(groups, {model: neighbours.get(model, ()) for model in used}, activities, stay)  # VSMM 4
+# Interpretation V1. The rules of step 7 speak of the first, the second and the third group.
+TOPOLOGY = Topology(
+    groups={  # VSMM 4
+        "G1": ("stiff-walk", "walk", "arms-out"),
+        "G2": ("arms-out", "jacks", "jump"),
+        "G3": ("jacks", "jump", "squat"),
+    },
+    neighbours={
+        "stiff-walk": ("walk", "arms-out"),
+        "walk": ("stiff-walk", "arms-out"),
+        "arms-out": ("stiff-walk", "walk", "jacks", "jump"),
+        "jacks": ("arms-out", "jump", "squat"),
+        "jump": ("arms-out", "jacks", "squat"),
+        "squat": ("jacks", "jump"),
+    },
+    activities={
+        "walk": ("stiff-walk", "walk"),
+        "arms-out": ("arms-out",),
+        "jacks": ("jacks",),
+        "jump": ("jump",),
+        "squat": ("squat",),
+    },
+    stay=0.92,
+)

@@ -13,7 +13,7 @@ from posefit.fitting.check import choices, positive
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
-from posefit_vsmm.groups import most_probable, read_topology
+from posefit_vsmm.groups import TOPOLOGY, most_probable
 from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import JointFilter, Rules, default_rules, patent_rules
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
@@ -65,7 +65,7 @@ class TrackFilter:
         task, library, variant = tracker.task, tracker.library, VARIANTS[tracker.variant]
         self._task, self._rng = task, rng
         models = library.models.fitted_to(task.body.skeleton, variant.fps or task.fps, tracker.process_noise)
-        self.switching = Switching(models, tracker.topology, variant.form, tracker.structure)
+        self.switching = Switching(models, TOPOLOGY, variant.form, tracker.structure)
         self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
         self._cameras = JointCameras(task.body, task.cameras, self._dependent, variant.rules(), tracker.joint_noise)
         self._imputes = variant.imputes
@@ -209,7 +209,6 @@ class VSMM:
     Settings:
         variant: "default", or the "patent"'s letter. Interpretations V4 to V6, V8, V9, V11, V14 and V15.
         structure: "variable", one group at a time and two while it changes; "all" models always, a plain IMM.
-        groups: path of a TOML file of groups and neighbours; "" is the package's own. Step 4, Interpretation V1.
         process_noise (Q): of the models, as a multiple of their residuals' covariance, above 0. Interpretation V7.
         joint_noise (R): of the detected joints, as a multiple of their variances, above 0. Interpretation V7.
         recovery: whether a lost pose is estimated again and a lost limb sought all around; by default yes, and no in
@@ -220,7 +219,6 @@ class VSMM:
     _: KW_ONLY
     variant: Literal["default", "patent"] = "default"
     structure: Structure = "variable"
-    groups: str = ""
     process_noise: float = 1.0
     joint_noise: float = 1.0
     recovery: bool | None = None
@@ -230,7 +228,6 @@ class VSMM:
         positive("process_noise", self.process_noise)
         positive("joint_noise", self.joint_noise)
         self.library = library(VARIANTS[self.variant].shrunk_to)
-        self.topology = read_topology(self.groups, self.library.models.names)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.evaluation.measures import MEASURES, Measure, Measures, Spread
 from posefit.fitting import metrics
-from posefit.fitting.prior import Prior
+from posefit.fitting.prior import Latents
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
@@ -62,7 +62,7 @@ def unseen(table: Table) -> set[int]:
 
 
 def evaluated(
-    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array | None, beta: float, clock: Array
+    scene: Scene, frames: Sequence[Frame], prior: Latents | None, training: Array | None, beta: float, clock: Array
 ) -> tuple[Table, Measures]:
     """Return a column for each figure of a frame, and what the whole track is worth.
 
@@ -109,7 +109,7 @@ def evaluated(
 
 
 def _errors(
-    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array | None, beta: float
+    scene: Scene, frames: Sequence[Frame], prior: Latents | None, training: Array | None, beta: float
 ) -> tuple[Table, dict[str, Any]]:
     if scene.truth is None:
         return {}, {}

@@ -96,7 +96,7 @@ class Tilt:
     high: Array  # (2,)
 
     @classmethod
-    def of(cls, prior: Prior, motions: Sequence[Motion], share: float, margin: float) -> Self:
+    def of(cls, prior: Latents, motions: Sequence[Motion], share: float, margin: float) -> Self:
         """Learn from the poses of one motion or more.
 
         The range holds a `share` of the residuals of each of the two angles, and `margin` radians more to either side.

@@ -11,7 +11,7 @@ from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
 from posefit.fitting.check import at_least, between, choices, one_of, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
-from posefit.fitting.prior import Prior, Tilt
+from posefit.fitting.prior import Latents, Tilt
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace, Translation
 from posefit.fitting.start import modes_apart, start_in
@@ -174,7 +174,7 @@ class Prediction:
                 at_least(name, value, 0.0)
         whole("relocalise_gap", self.relocalise_gap, 0)
 
-    def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
+    def tilted(self, prior: Latents, training: Sequence[Motion]) -> Tilt | None:
         """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""
         if (self.tilt or ("box" if self.variant == "paper" else "learned")) == "box" or not training:
             return None
@@ -187,7 +187,7 @@ class Predictor:
     A `tilt` that was learned from the task's training before is not learned again.
     """
 
-    def __init__(self, task: Task, prior: Prior, prediction: Prediction, tilt: Tilt | None = None) -> None:
+    def __init__(self, task: Task, prior: Latents, prediction: Prediction, tilt: Tilt | None = None) -> None:
         self._task, self._prior, self._prediction = task, prior, prediction
         self._tilt = tilt or prediction.tilted(prior, task.training)
         reach = np.radians(prediction.root_range_degrees)
@@ -270,7 +270,7 @@ class SynthesisTracker:
     """
 
     task: Task
-    prior: Prior
+    prior: Latents
     make: Callable[[Space, np.random.Generator], Optimiser]
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from traceback import extract_tb
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import BudgetError, Optimiser
-from posefit.fitting.prior import Prior
-from posefit.geometry.skeleton import Skeleton
+from posefit.fitting.prior import Latents
 from posefit.silhouette.drawn import PoseCount
 
 FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
@@ -118,14 +117,9 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
 class CheckedPrior:
     """A prior that has learned; an error in it names it, whichever plugin called it."""
 
-    def __init__(self, prior: Prior, name: str) -> None:
+    def __init__(self, prior: Latents, name: str) -> None:
         self._prior, self._name = prior, name
         self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
-
-    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn from joint angles (T, 63), and return itself."""
-        CheckedPrior.__init__(self, self._call("fit", angles, skeleton), self._name)
-        return self
 
     def transform(self, angles: Array) -> Any:
         """Return the latents (n, m) of joint angles (n, 63)."""
@@ -146,7 +140,7 @@ class CheckedPrior:
             raise _broken_by(self._name, method, error) from error
 
 
-def check_prior(prior: Prior, training: Array, name: str) -> None:
+def check_prior(prior: Latents, training: Array, name: str) -> None:
     """Raise BrokenRuleError, which begins with `name`, where a prior's range or answers are wrong.
 
     `training` (T, 63) are the joint angles that it has learned from.

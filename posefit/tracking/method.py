@@ -13,7 +13,7 @@ from posefit.fitting.box import Space
 from posefit.fitting.check import one_of
 from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
-from posefit.fitting.prior import Prior
+from posefit.fitting.prior import Latents, Prior
 from posefit.fitting.tracker import (
     RELOCALISE_GAP,
     Frame,
@@ -82,7 +82,7 @@ class Method:
     """A method ready to track: its prior has learned, and `build` makes a tracker of a task."""
 
     name: str
-    prior: Prior | None  # None for a tracker that is a plugin itself
+    prior: Latents | None  # which has learned; None for a tracker that is a plugin itself
     settings: dict[str, dict[str, Any]]
     looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
     relocalise_gap: int  # frames of a gap in footage after which it relocalises, 0 for never

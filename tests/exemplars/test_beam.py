@@ -36,14 +36,6 @@ def beam(states: list[int], yaws: list[float], totals: list[float] | None = None
     return Beam(np.array(states), np.array(yaws), np.array(totals or [0.0] * many), where)
 
 
-def steps_to(
-    exemplars: Exemplars, before: Beam, beam: Beam, root: Array | None = None, max_turn: float = np.inf
-) -> Array:
-    """Return the costs (n, m) of steps between two beams, before a camera at x = 3."""
-    camera = np.array([3.0, 1.0, 0.0])
-    return transition_costs(exemplars, before, beam, STEP._replace(max_turn=max_turn), root, camera)
-
-
 def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Array:
     """Return what a step from each state to each pose costs (n, K), pair by pair, without a turn."""
     costs = np.full((len(before), len(exemplars)), np.inf)
@@ -124,25 +116,8 @@ def test_a_root_strays_more_easily_along_the_line_of_sight() -> None:
     assert root_deviation_costs(place, along, None)[0] == pytest.approx(np.log(1.0 + 4.5))
 
 
-@each("root", [None, np.array([0.0, 0.01, 0.04])])
-def test_steps_between_beams_cost_what_the_twin_says_and_a_jump_at_most(small: Exemplars, root: Array | None) -> None:
-    before = beam([3, 11, 25], [0.1, 6.2, 2.0], [0.0, 2.5, 1.0])
-    after = beam([4, 12, 26, 3], [0.15, -0.1, 2.1, 0.1], places=np.full((4, 3), 0.02))
-    _, turned, ways = small.continuation(before.states, SECONDS)
-    twin = costs_of_steps(small, before, root)[:, after.states]
-    for i in range(3):
-        for j in range(4):
-            twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEP.turn) ** 2
-            if root is None:
-                place = before.places[i] + about_vertical(ways[i : i + 1], before.yaws[i : i + 1])
-                camera = np.array([3.0, 1.0, 0.0])
-                twin[i, j] += root_deviation_costs(after.places[j : j + 1], place, camera)[0]
-    costs = steps_to(small, before, after, root)
-    np.testing.assert_allclose(costs, np.minimum(twin, JUMP_COST), rtol=1e-3, atol=1e-3)
-    assert costs[0, 0] < 8.0 < JUMP_COST == costs.max()
-
-
 def test_turns_beyond_the_fastest_cost_more_than_a_jump(small: Exemplars) -> None:
-    costs = steps_to(small, beam([3], [0.0]), beam([30] * 4, [0.0, 0.2, 0.3, np.pi + 0.1]), max_turn=0.25)[0]
+    after = beam([30] * 4, [0.0, 0.2, 0.3, np.pi + 0.1])
+    costs = transition_costs(small, beam([3], [0.0]), after, STEP._replace(max_turn=0.25))[0]
     excess = np.array([0.0, 0.0, 0.05, np.pi - 0.35])
     np.testing.assert_allclose(costs, JUMP_COST + FAST_TURN_COST * excess, rtol=1e-9)

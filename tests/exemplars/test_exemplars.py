@@ -10,12 +10,10 @@ from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit_exemplars.exemplars import (
     MIN_FRAME_DISTANCE,
-    Coding,
     Exemplars,
     Tiles,
     about_vertical,
     exemplars_of,
-    facing_joints,
     mirror_image,
 )
 from posefit_exemplars.kernels import DIMENSIONS, frames_apart, nearest_codes
@@ -24,30 +22,10 @@ from tests.cases import each
 SKELETON = average_skeleton()
 
 
-def test_distances_of_codes_are_those_of_joints_and_never_greater() -> None:
-    coding = Coding.of(SKELETON, [facing_joints(SKELETON, built_in.motion("walk-a", frames=30).poses)])
-    for name, least in (("walk-a", 0.005), ("walk-b", 0.02)):  # the training clip, and another one
-        poses = built_in.motion(name, frames=30).poses
-        codes = coding.of_poses(poses)
-        assert codes.shape == (30, DIMENSIONS)
-        joints = facing_joints(SKELETON, poses).reshape(30, 27, 3)
-        for i, j in ((0, 1), (0, 15), (7, 22)):
-            true = np.sqrt(((joints[i] - joints[j]) ** 2).sum(axis=-1).mean())
-            assert true - least < np.linalg.norm(codes[i] - codes[j]) < true + 1e-6
-
-
 def test_similar_frames_are_kept_once_and_ends_of_clips_always() -> None:
     codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32)
     assert frames_apart(codes, np.float32(1.0)).tolist() == [0, 3, 4, 6]
     assert frames_apart(codes[:2], np.float32(1.0)).tolist() == [0, 1]
-
-
-def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> None:
-    assert sorted(two.members.tolist()) == list(range(len(two)))
-    away = np.linalg.norm(two.codes[:, None] - two.codes[two.centres], axis=-1)
-    np.testing.assert_allclose(away[np.arange(len(two)), two.groups], away.min(axis=1), atol=1e-6)
-    for group in range(len(two.centres)):
-        assert (two.groups[two.members[two.starts[group] : two.starts[group + 1]]] == group).all()
 
 
 def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
@@ -101,16 +79,6 @@ def test_a_mirror_image_is_the_reflection_of_every_joint() -> None:
     twice = mirror_image(image)
     np.testing.assert_allclose(twice.poses, walk.poses, atol=1e-9)
     np.testing.assert_allclose(twice.translations, walk.translations, atol=1e-12)
-
-
-def test_poses_are_drawn_by_the_square_root_of_the_size_of_their_group(two: Exemplars) -> None:
-    # three groups, of 1, 4 and 16 poses: drawn as 1 to 2 to 4, all poses of a group as often
-    made = replace(two, members=np.arange(21)[::-1], starts=np.array([0, 16, 20, 21]))
-    drawn = made.draw(70_000, np.random.default_rng(0))
-    counts = np.bincount(drawn, minlength=21)
-    assert counts[0] == pytest.approx(10_000, rel=0.05)
-    np.testing.assert_allclose(counts[1:5], 5_000, rtol=0.06)
-    np.testing.assert_allclose(counts[5:], 2_500, rtol=0.08)
 
 
 def test_no_motion_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""The costs of a frame, and the posterior and mirror costs that a frame reports."""
+"""The costs of a frame, the posterior and mirror costs that it reports, and poses fitted to its contours."""
 
 import math
 from dataclasses import replace
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit.fitting.contours import fitted, precisions
 from posefit.fitting.tracker import Observation
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
@@ -15,7 +16,7 @@ from posefit.motion.built_in import average_skeleton
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.calibration import evidence, recalibrated, stored_calibration
+from posefit_exemplars.calibration import recalibrated, stored_calibration
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
@@ -31,16 +32,7 @@ def samples(spread: float) -> Posterior:
 
 def recalibration(cost: float, usable: bool = True) -> Recalibration:
     frame_costs: Any = SimpleNamespace(skeleton=SKELETON, camera_count=1, usable=usable)
-    corrections = recalibrated(samples(0.1), STILL, cost, frame_costs).recalibration
-    assert corrections is not None
-    return corrections
-
-
-def test_the_evidence_of_an_error_is_cost_spread_and_cameras() -> None:
-    one, two = (evidence(SKELETON, samples(0.1), STILL, 5.0, cameras) for cameras in (1, 2))
-    assert (one[0], one[1], one[3], two[3]) == (1.0, math.log(5.0), 0.0, 1.0)
-    assert evidence(SKELETON, samples(0.3), STILL, 5.0, 1)[2] > one[2]
-    assert np.isfinite(evidence(SKELETON, samples(0.0), STILL, 0.0, 1)).all()
+    return recalibrated(samples(0.1), STILL, cost, frame_costs).recalibration
 
 
 def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> None:
@@ -78,7 +70,6 @@ def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evalua
     sampled, others = walk.track(samples=4), walk.track(samples=5)
     for frame, other, observation in zip(sampled[:2], others, observations, strict=False):
         np.testing.assert_array_equal(frame.pose, other.pose)
-        assert frame.posterior is not None
         assert len(frame.posterior) == 4
         assert frame.posterior.coherent
         expected = FrameCosts(walk.task, observation).mirror_costs(frame.pose, frame.translation)
@@ -86,8 +77,6 @@ def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evalua
     assert len(sampled[2].details["mirror_costs"]) == 0
     assert sampled[2].evaluations == 1
     for frame in sampled:
-        assert frame.posterior is not None
-        assert frame.posterior.recalibration is not None
         assert frame.posterior.recalibration.sharpness == stored_calibration().sharpness
 
 
@@ -103,3 +92,13 @@ def test_the_depth_is_unknown_where_one_camera_alone_shows_the_person() -> None:
     ):
         task, observation = replace(walk.task, cameras=cameras), replace(walk.observations[0], silhouettes=silhouettes)
         np.testing.assert_array_equal(FrameCosts(task, observation).camera_position, position)
+
+
+def test_without_a_contour_a_pose_goes_to_its_mean(walker: Walk) -> None:
+    poses, places = walker.motion.poses[:5], walker.motion.translations[:5]
+    means = poses + 0.1 * walker.motion.skeleton.free
+    contours = FrameCosts(walker.task, replace(walker.observations[0], silhouettes=EMPTY)).contours(places[0])
+    precision = precisions(np.radians(8.0), 0.003)
+    moved, shifted = fitted(walker.task.body, contours, (poses, places), means, precision, (0.09,))
+    np.testing.assert_allclose(moved, means, atol=1e-9)
+    np.testing.assert_allclose(shifted, places, atol=1e-12)

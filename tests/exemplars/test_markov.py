@@ -9,7 +9,7 @@ import pytest
 from posefit.arrays import Array
 from posefit_exemplars.markov import FrameStates, SampledPaths, frame_states, mean_near, state_weights
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
-from posefit_exemplars.tracker import SIMILAR_DISTANCE, state_distances
+from posefit_exemplars.tracker import state_distances
 from tests.cases import each
 
 
@@ -27,20 +27,6 @@ def test_weights_are_finite_where_a_jump_costs_a_thousand() -> None:
         weights = state_weights(frames[:count])
         assert np.isfinite(weights).all()
         assert weights.sum() == pytest.approx(1.0)
-
-
-def test_the_mean_is_of_states_similar_to_the_path() -> None:
-    poses = np.zeros((3, 66))
-    poses[:, 5] = [0.0, 0.1, 2.0]
-    places = np.array([[0.0, 1.0, 0.0], [0.3, 1.0, 0.0], [9.0, 9.0, 9.0]])
-    codes = np.array([[0.0], [SIMILAR_DISTANCE], [100.0]], dtype=np.float32)
-    pose, place = mean_near(0, np.array([0.2, 0.4, 0.4]), state_distances(codes, codes[0], np.zeros(3)), poses, places)
-    share = 0.4 * np.exp(-0.5) / (0.2 + 0.4 * np.exp(-0.5))
-    assert pose[5] == pytest.approx(0.1 * share)
-    np.testing.assert_allclose(place, [0.3 * share, 1.0, 0.0])
-    # a state on the path counts even where it has no weight
-    pose, place = mean_near(2, np.array([0.5, 0.5, 0.0]), state_distances(codes, codes[2], np.zeros(3)), poses, places)
-    np.testing.assert_allclose([*pose, *place], [*poses[2], *places[2]])
 
 
 def test_sampled_paths_similar_to_the_likeliest_are_moved_to_the_reported_pose() -> None:
@@ -86,18 +72,6 @@ def test_means_of_yaws_go_the_short_way_round() -> None:
     assert np.degrees(pose[0]) == pytest.approx(179.0 + 2.0 * other / (1.0 + other))
     poses = np.insert(poses, 1, np.pi * np.eye(66)[0], axis=0)
     assert np.cos(smoothed_pose(poses, np.zeros((3, 3)), 1, 1.5)[0][0]) == pytest.approx(-1.0)
-
-
-def test_the_weights_are_gaussian() -> None:
-    poses, places = np.zeros((5, 66)), np.eye(5, 3)
-    poses[2] = 1.0
-    share = np.exp(-0.5 * (np.arange(-2, 3) / 1.5) ** 2)
-    pose, place = smoothed_pose(poses, places, 2, 1.5)
-    assert pose[0] == pytest.approx(share[2] / share.sum())
-    np.testing.assert_allclose(place, share[:3] / share.sum())
-    # at an end as few frames count on the other side
-    np.testing.assert_array_equal(smoothed_pose(poses, places, 0, 1.5)[0], poses[0])
-    np.testing.assert_array_equal(smoothed_pose(poses, places, 2, 0.0)[0], poses[2])
 
 
 def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_always() -> None:

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import posefit
 from posefit.arrays import Array
-from posefit.cli import main
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
@@ -75,29 +73,6 @@ def test_an_interrupted_track_is_continued(walker: Walk, seed: int) -> None:
     assert walker.errors_mm(rest, 12).max() < 100.0
 
 
-@each(
-    ("setting", "message"),
-    [
-        ("spread=0", "spread must be above 0, got 0"),
-        ("temperature=nan", "temperature must be above 0, got nan"),
-        ("lag=-1", "lag must be at least 0, got -1"),
-    ],
-)
-def test_a_wrong_setting_is_refused_in_one_line(setting: str, message: str) -> None:
-    result = CliRunner().invoke(main, ["track", "walk", "--method", "exemplars", "--set", f"exemplars.{setting}"])
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert line.startswith("posefit: ")
-    assert message in line
-
-
-def test_a_yaw_away_from_the_known_one_costs_more() -> None:
-    yaws = np.radians([10.0, 55.0, 77.5, 100.0, -170.0, 370.0])
-    expected = WRONG_YAW_COST * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0])
-    np.testing.assert_allclose(yaw_costs(yaws, np.radians(10.0)), expected, atol=1e-12)
-    np.testing.assert_array_equal(yaw_costs(yaws, None), np.zeros(6))
-
-
 @each("lag", [0, 2, 15, 40])
 def test_a_pose_is_reported_lag_frames_later(walker: Walk, lag: int) -> None:
     taken = 0
@@ -153,11 +128,6 @@ def test_the_budget_holds_with_pictures_of_any_size_and_any_number_of_cameras(
     assert walk.errors_mm(frames).max() < 300.0
 
 
-def test_too_small_a_budget_is_refused(walker: Walk) -> None:
-    with pytest.raises(ValueError, match="evaluations must be at least 715 for exemplars, got 714"):
-        walker.track(evaluations=714)
-
-
 QUICK: dict[str, Any] = {"evaluations": 2440, "smoothing": 0.0}
 
 
@@ -178,3 +148,10 @@ def test_a_sampled_path_is_one_movement(walker: Walk) -> None:
     turns = np.abs(wrapped(np.diff(yaws, axis=0)))
     assert np.median(turns) < np.radians(5.0)
     assert float(np.mean(turns > np.radians(30.0))) < 0.05
+
+
+def test_a_yaw_away_from_the_known_one_costs_more() -> None:
+    yaws = np.radians([10.0, 55.0, 77.5, 100.0, -170.0, 370.0])
+    expected = WRONG_YAW_COST * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0])
+    np.testing.assert_allclose(yaw_costs(yaws, np.radians(10.0)), expected, atol=1e-12)
+    np.testing.assert_array_equal(yaw_costs(yaws, None), np.zeros(6))

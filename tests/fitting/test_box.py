@@ -127,7 +127,7 @@ def test_moving_to_another_box_keeps_the_pose() -> None:
 def test_a_population_has_a_whole_number_of_proposals() -> None:
     for count in (-1, 0, 2.5, True):
         with pytest.raises(InputError, match="^count must be .*at least 1, got "):
-            draw_population(Toy(3), np.random.default_rng(0), count)  # type: ignore[arg-type]
+            draw_population(Toy(3), np.random.default_rng(0), count)
 
 
 def test_what_cannot_be_drawn_around_an_infeasible_mean_is_the_copy_of_a_feasible_draw() -> None:

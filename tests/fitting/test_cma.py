@@ -1,7 +1,5 @@
 """CMA-ES: our strategy and the library cmaes agree on the same proposals; `cma` at the sides of its box, round a circle."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from cmaes import CMA
@@ -14,100 +12,33 @@ from posefit.testing.toy import Toy, shell
 from tests.cases import each
 
 
-class Draws(np.random.Generator):
-    """A generator with the name that the library has for normal draws."""
-
-    def randn(self, dimensions: int) -> Array:
-        return self.standard_normal(dimensions)
-
-
-def pair(d: int, population: int, seed: int = 0) -> tuple[Strategy, Any]:
-    """Return our strategy and the library's, at the same place with the same spread."""
-    rng = np.random.default_rng(seed)
-    mean, spread = rng.normal(0.0, 0.1, d), rng.uniform(0.05, 0.5, d)
-    size = float(np.sqrt((spread**2).mean()))
-    theirs = CMA(mean.copy(), size, population_size=population, cov=np.diag((spread / size) ** 2))
-    return Strategy(mean, spread, population), theirs
-
-
-def assert_equal_states(ours: Strategy, theirs: Any) -> None:
-    pairs = [
-        (ours.mean, theirs._mean),
-        (ours.covariance, theirs._C),
-        (ours.step_path, theirs._p_sigma),
-        (ours.path, theirs._pc),
-        (np.array([ours.sigma]), np.array([theirs._sigma])),
-    ]
-    for mine, other in pairs:
-        np.testing.assert_allclose(mine, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
-
-
-def learn(ours: Strategy, theirs: Any, proposals: Array, costs: Array) -> bool:
-    """Have both learn a generation; return whether they have ended."""
-    ours.learn(proposals, costs)
-    theirs.tell(list(zip(proposals, costs.tolist(), strict=True)))
-    assert_equal_states(ours, theirs)
-    assert ours.ended() == theirs.should_stop()
-    return ours.ended()
-
-
 @each("ties", [False, True])
 @each("sizes", [(1, 5), (2, 6), (2, 7), (9, 10), (9, 40), (28, 13), (28, 40)])
 def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) -> None:
     d, population = sizes
     rng = np.random.default_rng(d)
-    ours, theirs = pair(d, population)
-    valley = rng.normal(size=(d, d))
+    mean, spread, valley = rng.normal(0.0, 0.1, d), rng.uniform(0.05, 0.5, d), rng.normal(size=(d, d))
+    size = float(np.sqrt((spread**2).mean()))
+    ours = Strategy(mean, spread, population)
+    theirs = CMA(mean.copy(), size, population_size=population, cov=np.diag((spread / size) ** 2))
     for _ in range(250):
         proposals = ours.sample(rng, population)
         costs = ((proposals @ valley) ** 2).sum(axis=1)
-        if learn(ours, theirs, proposals, np.round(2.0 * costs) / 2.0 if ties else costs):
+        costs = np.round(2.0 * costs) / 2.0 if ties else costs
+        ours.learn(proposals, costs)
+        theirs.tell(list(zip(proposals, costs.tolist(), strict=True)))
+        for mine, other in (
+            (ours.mean, theirs._mean),
+            (ours.covariance, theirs._C),
+            (ours.step_path, theirs._p_sigma),
+            (ours.path, theirs._pc),
+            (ours.sigma, theirs._sigma),
+        ):
+            np.testing.assert_allclose(mine, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+        assert ours.ended() == theirs.should_stop()
+        if ours.ended():
             return
     assert d > 2
-
-
-@each("d", [1, 2, 9])
-def test_both_learn_the_same_from_moved_proposals_and_random_costs(d: int) -> None:
-    rng = np.random.default_rng(d)
-    ours, theirs = pair(d, 8)
-    for _ in range(60):
-        proposals = np.clip(ours.sample(rng, 8), -0.2, 0.2)
-        if learn(ours, theirs, proposals, rng.choice([1e15, -1e15, 3.0, rng.random()], 8)):
-            return
-
-
-@each("d", [1, 2, 9, 28])
-def test_both_draw_the_same_from_the_same_normal_numbers(d: int) -> None:
-    ours, theirs = pair(d, 12)
-    theirs._rng = Draws(np.random.PCG64(7))
-    np.testing.assert_allclose(ours.sample(np.random.default_rng(7), 12), [theirs.ask() for _ in range(12)], rtol=1e-12)
-
-
-@each(
-    "changes",
-    [
-        {},
-        {"sigma": 1e-13, "mean": np.zeros(3)},
-        {"sigma": 1e-10, "mean": np.zeros(3)},
-        {"sigma": 1e-13, "mean": np.zeros(3), "path": np.array([0.0, 9.0, 0.0])},
-        {"sigma": 1e-13, "mean": np.zeros(3), "path": np.array([0.0, -9.0, 0.0])},
-        {"sigma": 1e5},
-        {"mean": np.full(3, 1e16)},
-        {"mean": np.array([0.0, 0.0, 1e16])},
-        {"covariance": np.diag([1.0, 1.0, 1e-20])},
-        {"covariance": np.diag([1.0, 1.0, 1e-30])},
-        {"covariance": np.diag([1.0, 1.0, -1e-17])},
-    ],
-)
-def test_both_end_where_nothing_changes_or_all_diverges(changes: dict[str, Any]) -> None:
-    ours, theirs = pair(3, 7)
-    names = {"sigma": "_sigma", "mean": "_mean", "path": "_pc", "covariance": "_C"}
-    for name, value in changes.items():
-        setattr(ours, name, value if name == "sigma" else value.copy())
-        setattr(theirs, names[name], value if name == "sigma" else value.copy())
-    ours.decompose()
-    assert ours.ended() == theirs.should_stop()
-    np.testing.assert_allclose(ours.covariance, theirs._C, rtol=1e-12, atol=1e-25)
 
 
 def test_what_leaves_the_box_is_drawn_again_before_it_is_moved_to_its_side() -> None:
@@ -158,3 +89,10 @@ def test_what_is_moved_is_moved_towards_the_best_of_the_last_generation() -> Non
         proposals, costs = optimiser.ask(), np.random.default_rng(seed).random(10)
         optimiser.tell(proposals, costs)
         np.testing.assert_array_equal(optimiser.home, proposals[costs.argmin()])
+
+
+def test_an_eigenvalue_that_rounding_makes_negative_becomes_a_small_one() -> None:
+    strategy = Strategy(np.zeros(3), np.ones(3), 7)
+    strategy.covariance = np.diag([1.0, 1.0, -1e-17])
+    strategy.decompose()
+    np.testing.assert_allclose(strategy.covariance, np.diag([1.0, 1.0, 1e-8]), atol=1e-15)

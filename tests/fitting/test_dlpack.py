@@ -4,12 +4,10 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
 import posefit
-import posefit_envs
 from posefit.errors import InputError
 from posefit.fitting.dlpack import as_numpy
 from tests.cases import each
@@ -60,22 +58,3 @@ def test_an_array_that_is_traced_or_needs_a_gradient_is_refused() -> None:
         with pytest.raises(InputError, match="neither traced by jit or vmap"):
             traced(jax.numpy.zeros((2, 9)))
     assert problem.evaluations == 0
-
-
-@each("name", LIBRARIES)
-def test_vector_environments_take_any_array_and_give_it_by_gymnasiums_wrapper(name: str) -> None:
-    library = import_module(name)
-    wrappers = pytest.importorskip("gymnasium.wrappers.vector")
-    pytest.importorskip("array_api_compat")
-    gym.register_envs(posefit_envs)
-
-    def first_step(wrap: bool) -> Any:
-        env = gym.make_vec("posefit/FitImage-v0", num_envs=2)
-        wrapped = wrappers.ArrayConversion(env, env_xp=np, target_xp=library) if wrap else env
-        wrapped.reset(seed=0)
-        return wrapped.step(library.zeros(env.action_space.shape))
-
-    plain, converted = first_step(False), first_step(True)
-    for expected, values in zip(plain[:2], converted[:2], strict=True):
-        assert type(values) is type(library.zeros(1))
-        assert np.allclose(expected, np.from_dlpack(values), atol=1e-6)

@@ -55,21 +55,6 @@ def test_factors_multiply_what_they_name() -> None:
     np.testing.assert_allclose(wide[BONES.index("thorax")], 1.1)
 
 
-def test_proportions_have_the_published_spreads_and_correlations() -> None:
-    np.testing.assert_array_equal(shape.PROPORTIONS_CORRELATION, shape.PROPORTIONS_CORRELATION.T)
-    np.testing.assert_array_equal(np.diag(shape.PROPORTIONS_CORRELATION), 1.0)
-    assert np.linalg.eigvalsh(COVARIANCE).min() > 0.0
-    thighs, shanks, torso, girth = (
-        NAMES.index(name) for name in ("thighs length", "shanks length", "torso length", "torso girth")
-    )
-    assert COVARIANCE[thighs, thighs] == pytest.approx(0.049**2 + 0.01**2)
-    assert COVARIANCE[thighs, torso] == pytest.approx(-0.67 * 0.049 * 0.044)
-    assert COVARIANCE[shanks, torso] == pytest.approx(-0.59 * 0.044 * 0.044)
-    assert not COVARIANCE[0, 1:].any()
-    assert COVARIANCE[girth, girth] == pytest.approx(0.3**2)
-    assert np.count_nonzero(COVARIANCE[girth]) == 1
-
-
 def test_a_length_that_is_measured_moves_those_that_go_with_it() -> None:
     thighs, weight, log_length = NAMES.index("thighs length"), 2000.0, 0.08
 

@@ -1,6 +1,7 @@
 """Modes of first poses, their projection onto a prior's latents, and populations that are drawn from several."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -8,7 +9,7 @@ import posefit
 from posefit.fitting.box import Start, draw_population
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.fitting.start import MODE_RADIUS, MODE_SPREAD, modes_apart, start_in
+from posefit.fitting.start import MODE_SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
 from posefit.testing.toy import Toy
@@ -41,14 +42,6 @@ def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
         np.testing.assert_allclose(drawn[rows].std(axis=0), spread, atol=error)
 
 
-def test_poses_near_each_other_are_one_mode_with_the_sum_of_their_weights() -> None:
-    both = weighted([5, 5, 5], [0.0, 0.05, np.pi], [1.0, 3.0, 4.0])
-    modes = modes_apart(WALK.skeleton, both)
-    assert sorted(weight for weight, _ in modes) == [0.5, 0.5]
-    assert sorted(len(mode) for _, mode in modes) == [1, 2]
-    assert 0.1 < MODE_RADIUS < 0.4  # a body that is turned by half a circle is farther from itself
-
-
 def problem_of(row: int, turn: float) -> PoseProblem:
     """Return the problem whose silhouette is of one of the walker's poses, turned."""
     body = posefit.Body.of(WALK.skeleton)
@@ -78,21 +71,12 @@ def test_a_mode_is_around_its_pose_that_costs_least() -> None:
     np.testing.assert_allclose(SPACE.decode(start.mean[None])[0][0, 0], WALK.poses[5, 0], atol=1e-9)
 
 
-class Knows:
-    """Guesses one pose; the ten lines that any model of silhouettes needs."""
-
-    def __init__(self, task: Task) -> None:
-        self.task = task
-
-    def posterior(self, observation: Observation) -> Posterior | None:
-        return weighted([5], [1.0], [1.0])
-
-
 def test_nothing_is_guessed_where_the_pose_is_known_or_nothing_shows() -> None:
     body = posefit.Body.of(WALK.skeleton)
     camera = posefit.Camera.framing(WALK.joints[0], body.joint_radii(), 0.0, (64, 48))
     observation = Observation([posefit.Silhouette.of(np.ones((48, 64)))])
-    task = Task(body, [camera], 100, None, np.zeros(3), start=Knows)
+    guess = SimpleNamespace(posterior=lambda observation: weighted([5], [1.0], [1.0]))
+    task = Task(body, [camera], 100, None, np.zeros(3), start=lambda task: guess)
     ((weight, mode),) = guessed_modes(task, observation)
     assert (weight, len(mode)) == (1.0, 1)
     assert not guessed_modes(replace(task, first_pose=WALK.poses[0, 3:]), observation)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from posefit import minimise
-from posefit.fitting.optimiser import BudgetError
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
 from posefit.silhouette.drawn import count_poses
 from posefit.testing.toy import Toy, sphere
@@ -75,12 +74,3 @@ def test_an_empty_population_ends_a_search_and_is_a_mistake_where_it_is_the_firs
     for first in (checked, CheckedOptimiser(answers, Toy(9), "it")):
         with pytest.raises(BrokenRuleError, match="it: ask must return a first population of one proposal or more"):
             first.ask()
-
-
-def test_a_population_that_no_budget_holds_is_named() -> None:
-    checked = CheckedOptimiser(
-        Answers(np.zeros((100_000, 9))), Toy(9), "optimiser 'bad' of posefit-bad 1.0", evaluations=2440
-    )
-    message = "^optimiser 'bad' of posefit-bad 1.0: evaluations must hold one population of 100000, got 2440$"
-    with pytest.raises(BudgetError, match=message):
-        minimise(sphere, checked, 2440)

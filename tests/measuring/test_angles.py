@@ -1,20 +1,17 @@
 """Clinical angles of whole bodies: zero where a person stands, one sign for both sides; and files for other programs."""
 
 import importlib
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from posefit.arrays import Array
-from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS
+from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.measuring.angles import COLUMNS, NEAR_POLE, clinical_angles
 from posefit.measuring.c3d import MAX_EVENTS, write_c3d
 from posefit.measuring.centres import CENTRES, PLACES, joint_centres
 from posefit.measuring.gait import Gait, Step, gait_of
-from posefit.measuring.segments import bone_rotations
 from posefit.measuring.tables import STEP_COLUMNS, write_angles, write_gait, write_trc
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import write_amc
@@ -40,28 +37,9 @@ def test_the_centres_are_where_bones_meet() -> None:
     motion = built_in.motion("walk", frames=3)
     centres = joint_centres(motion)
     assert tuple(centres) == CENTRES
-    for name, joint in (
-        ("left_hip", "lhipjoint"),
-        ("left_knee", "lfemur"),
-        ("right_ankle", "rtibia"),
-        ("right_shoulder", "rclavicle"),
-        ("left_elbow", "lhumerus"),
-        ("left_wrist", "lradius"),
-    ):
-        np.testing.assert_array_equal(centres[name], motion.joints[:, JOINTS.index(joint)])
+    np.testing.assert_array_equal(centres["left_knee"], motion.joints[:, JOINTS.index("lfemur")])
     assert len(set(PLACES)) == len(JOINTS)
     assert PLACES[JOINTS.index("lowerback")] == "lumbar"  # not of the left side
-    assert PLACES[JOINTS.index("lfoot")] == "left_ball"
-
-
-def test_bones_turn_with_the_joints() -> None:
-    motion = built_in.motion("jacks", frames=5)
-    turned = bone_rotations(motion.skeleton, motion.poses)
-    joints = motion.skeleton.joints(motion.poses)
-    for bone, above in (("lfemur", "lhipjoint"), ("rradius", "rhumerus"), ("head", "upperneck"), ("lhand", "lwrist")):
-        j = JOINTS.index(bone)
-        expected = joints[:, j] - joints[:, JOINTS.index(above)]
-        np.testing.assert_allclose(turned[:, j] @ motion.skeleton.offsets[j - 1], expected, atol=1e-9)
 
 
 def test_legs_are_at_zero_where_they_stand_straight() -> None:
@@ -147,13 +125,6 @@ def walk() -> Motion:
     return recorded.clip("02_01").motion()
 
 
-def rigid(points: Array) -> bool:
-    """Return whether every bone has one length in all frames, to 0.1 mm."""
-    bones = points[:, 1:] - points[:, list(PARENTS[1:])]
-    lengths = np.linalg.norm(bones, axis=2)
-    return bool((np.nanmax(lengths, axis=0) - np.nanmin(lengths, axis=0) < TENTH).all())
-
-
 def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
     ezc3d = pytest.importorskip("ezc3d")
     write_c3d(tmp_path / "walk.c3d", walk, BLANK, gait_of(walk))
@@ -170,7 +141,6 @@ def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
     residuals = read["data"]["meta_points"]["residuals"][0].T
     assert (residuals[known] == 0.0).all()
     assert (residuals[~known] == -1.0).all()
-    assert rigid(metres)
 
 
 def test_a_c3d_has_the_events_of_gait(walk: Motion, tmp_path: Path) -> None:
@@ -207,24 +177,14 @@ def test_a_long_c3d_counts_its_frames_and_its_events(walk: Motion, tmp_path: Pat
 
 def test_a_trc_is_what_a_plain_reader_reads(walk: Motion, tmp_path: Path) -> None:
     write_trc(tmp_path / "walk.trc", walk, BLANK)
-    lines = [line.split("\t") for line in (tmp_path / "walk.trc").read_text().split("\n")]
-    assert dict(zip(lines[1], lines[2], strict=True))["NumMarkers"] == "27"
-    names = [name for name in lines[3][2:] if name]
-    assert names == list(PLACES)
-    expected = walk.joints
-    points = np.full(expected.shape, np.nan)
-    for line in lines[6:]:
-        if line == [""]:
-            continue
-        k = int(line[0]) - 1
-        assert float(line[1]) == pytest.approx(k / 30.0, abs=1e-6)
-        for column, value in enumerate(line[2:]):
-            if value:
-                points[k, column // 3, column % 3] = float(value)
-    assert {int(k) for k in np.flatnonzero(np.isnan(points).all(axis=(1, 2)))} == BLANK
-    known = [k for k in range(len(walk)) if k not in BLANK]
-    np.testing.assert_allclose(points[known], expected[known], atol=TENTH)
-    assert rigid(points)
+    lines = (tmp_path / "walk.trc").read_text().splitlines()
+    assert dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))["NumMarkers"] == "27"
+    assert lines[3].split() == ["Frame#", "Time", *PLACES]
+    table, expected = np.genfromtxt(lines[6:], delimiter="\t"), walk.joints.reshape(len(walk), -1)
+    np.testing.assert_array_equal(table[:, 0], np.arange(1, len(walk) + 1))
+    np.testing.assert_allclose(table[:, 1], np.arange(len(walk)) / 30.0, atol=1e-6)
+    expected[[*BLANK]] = np.nan
+    np.testing.assert_allclose(table[:, 2:], expected, atol=TENTH)
 
 
 def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
@@ -239,20 +199,18 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
         node = next(one for one in read.nodes if one.name == named[name])  # begins where the bone begins
         points[:, joint] = nodes[:, read.node_index[node.children[0].name]]
     np.testing.assert_allclose(points, walk.joints, atol=TENTH)
-    assert rigid(points)
 
 
 def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion, tmp_path: Path) -> None:
     write_angles(tmp_path / "angles.csv", walk, BLANK)
-    rows, expected = csv_rows(tmp_path / "angles.csv"), clinical_angles(walk.skeleton, walk.poses)
-    assert list(rows[0]) == ["frame", "seconds", *COLUMNS]
-    assert len(rows) == len(walk)
-    for k, row in enumerate(rows):
-        assert (row["frame"], float(row["seconds"])) == (str(k), pytest.approx(k / 30.0, abs=1e-6))
-        for name in COLUMNS:
-            written = float(row[name]) if row[name] else np.nan
-            value = np.nan if k in BLANK else expected[name][k]
-            assert written == pytest.approx(value, abs=1e-3, nan_ok=True)
+    table, count = np.genfromtxt(tmp_path / "angles.csv", delimiter=",", names=True), len(walk)
+    assert table.dtype.names == ("frame", "seconds", *COLUMNS)
+    np.testing.assert_array_equal(table["frame"], np.arange(count))
+    np.testing.assert_allclose(table["seconds"], np.arange(count) / 30.0, atol=1e-6)
+    for name, values in clinical_angles(walk.skeleton, walk.poses).items():
+        np.testing.assert_allclose(
+            table[name], np.where(np.isin(np.arange(count), [*BLANK]), np.nan, values), atol=1e-3
+        )
 
 
 def test_angles_of_recorded_people_do_not_jump() -> None:
@@ -316,12 +274,3 @@ def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:
     assert float(rows[1]["strike_seconds"]) == pytest.approx(gait.steps[1].strike_seconds, abs=1e-6)
     write_gait(tmp_path / "dance.csv", NO_WALK)
     assert csv_rows(tmp_path / "dance.csv") == []
-
-
-def test_a_gait_is_json(walk: Motion) -> None:
-    gait, none = (json.loads(json.dumps(each.as_dict())) for each in (gait_of(walk), NO_WALK))
-    assert (gait["walk"], gait["why"], gait["steps"]) == (True, None, 3)
-    names = ("cadence", "speed", "step_length", "stride_length", "step_width", "stance_share", "why_no_lengths")
-    foot = {"steps": 0, **dict.fromkeys(("step_seconds", "step_length", "stride_length", "stance_share"))}
-    sides = {"left": foot, "right": foot}
-    assert none == {"walk": False, "why": "it is a dance", "steps": 0, **dict.fromkeys(names), **sides}

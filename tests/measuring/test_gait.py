@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.geometry.skeleton import BONES, JOINTS
+from posefit.geometry.skeleton import BONES
 from posefit.measuring.events import gait_events, low_pass
 from posefit.measuring.gait import Gait, backwards_warning, gait_of, stride_curves, walks_backwards
 from posefit.motion import built_in, recorded
-from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit.output.text import gait_line, table
 from tests.cases import each
@@ -35,32 +34,6 @@ def test_walks_of_real_people_are_as_published(name: str) -> None:
     low, high = (90.0, 0.80, 0.45, 0.94, 0.0, 0.58), (138.0, 1.82, 0.93, 1.85, 0.25, 0.70)
     values = np.array(figures(gait), dtype=float)
     assert ((low < values) & (values < high)).all(), values
-
-
-@each("clip", ["02_01", "16_15"])
-def test_events_are_near_those_of_a_slow_twin(cmu: Path, clip: str) -> None:
-    # O'Connor et al. 2007: the middle of the foot falls fastest just before it strikes and rises fastest at toe off
-    folder = cmu / clip[:2]
-    motion = read_clip(folder / f"{clip[:2]}.asf", folder / f"{clip}.amc", fps=120.0)
-    events = gait_events(motion.resampled(30.0))
-    joints = motion.joints
-    off_by: dict[str, list[float]] = {"strike": [], "off": []}
-    for side, letter in (("left", "l"), ("right", "r")):
-        height = joints[:, [JOINTS.index(f"{letter}tibia"), JOINTS.index(f"{letter}toes")], 1].mean(axis=1)
-        smooth = [np.mean(height[max(0, k - 3) : k + 4]) for k in range(len(height))]
-        rising = [(smooth[k + 1] - smooth[k - 1]) * 60.0 for k in range(1, len(smooth) - 1)]
-        around = {k: rising[k - 10 : k + 11] for k in range(10, len(rising) - 10)}
-        lows = [(k + 1) / 120.0 for k, near in around.items() if rising[k] == min(near) < -0.25]
-        tops = [(k + 1) / 120.0 for k, near in around.items() if rising[k] == max(near) > 0.25]
-        for strike in events.strikes[side] / 30.0:
-            off_by["strike"].append(min((low - strike for low in lows), key=abs))
-        for off in events.offs[side] / 30.0:
-            off_by["off"].append(min((top - off for top in tops), key=abs))
-    assert len(off_by["strike"]) >= 4
-    assert len(off_by["off"]) >= 4
-    # the heel is farthest ahead a little before it is on the ground
-    assert all(0.02 < seconds < 0.06 for seconds in off_by["strike"])
-    assert all(abs(seconds) < 0.025 for seconds in off_by["off"])
 
 
 def test_thirty_frames_a_second_are_as_good_as_120() -> None:
@@ -180,16 +153,6 @@ def test_of_who_walks_in_one_place_times_alone_are_known(
     )
 
 
-@each("name", WALKS)
-def test_recorded_walks_before_a_camera_that_turns_keep_their_cadence(name: str) -> None:
-    motion = recorded.clip(name).motion()
-    still = motion.translations.copy()
-    still[:, [0, 2]] = still[0, [0, 2]]
-    gait = gait_of(replace(motion, translations=still))
-    assert gait.cadence == pytest.approx(gait_of(motion).cadence, abs=1.0)
-    assert gait.step_length is None
-
-
 def test_a_stride_of_the_knee_is_that_between_two_strikes() -> None:
     motion = walker(fps=100.0)
     bent = np.zeros(motion.poses.shape)
@@ -253,7 +216,6 @@ def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> No
     gait = json.loads((out / "summary.json").read_text())["gait"]
     assert gait == tracked.summary["gait"]
     assert gait["walk"] is True
-    assert tracked.truth is not None
     true = gait_of(tracked.truth)
     assert gait["cadence"] == pytest.approx(true.cadence, abs=3.0)
     assert gait["speed"] == pytest.approx(true.speed, abs=0.05)

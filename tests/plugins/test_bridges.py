@@ -1,6 +1,5 @@
 """Problems in other tools: each tool's own loop and checker runs on them, with the costs and the trace of a plain loop."""
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -12,11 +11,10 @@ from posefit.suites.problem import Problem
 
 ROOT = Path(__file__).parents[2]
 SENT = ROOT / "docs" / "contributions"
-PATHS = os.pathsep.join(map(str, (ROOT, ROOT / "plugins")))
 
 
 def problem(function: int = 1, **more: object) -> Problem:
-    return posefit.suite("posefit-2026.3", function, 10_000, 9, **more)  # type: ignore[arg-type]
+    return posefit.suite("posefit-2026.3", function, 10_000, 9, **more)
 
 
 def check(searched: Problem, proposals: Iterable[object], costs: Iterable[float]) -> None:

@@ -18,14 +18,9 @@ def angles(*names: str) -> Array:
     return np.concatenate([built_in.motion(name).poses[:, 3:] for name in names])
 
 
-def floor(prior: Any, poses: Array) -> float:
-    return float(np.degrees(np.abs(prior.inverse_transform(prior.transform(poses)) - poses)).mean())
-
-
 def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
     skeleton = built_in.average_skeleton()
     prior = Full().fit(angles("walk-a"), skeleton)
-    assert skeleton.limits is not None
     # .asf of CMU: the thigh's rx lies in -160 to 20 degrees, and lfemur is the third inner joint
     assert (np.degrees(skeleton.limits[3, 0]), np.degrees(skeleton.limits[3, 1])) == pytest.approx((-160.0, 20.0))
     assert np.degrees([prior.low[0], prior.high[0]]) == pytest.approx([-160.0, 20.0])
@@ -74,17 +69,6 @@ def test_the_same_poses_have_the_same_clusters_and_fewer_than_asked_are_centres_
     centres, reach = clusters_of(np.repeat([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]], 4, axis=0), 5, 1.0)
     assert {tuple(centre) for centre in centres} == {(0.0, 0.0), (1.0, 0.0), (0.0, 2.0)}
     assert reach == 0.0
-
-
-def test_a_linear_transformer_is_inverted_as_scikit_learn_does_it() -> None:
-    from sklearn import decomposition
-
-    poses = angles("walk-a", "walk-b")
-    prior = Transformed(variant="PCA", components=5).fit(poses)
-    theirs = decomposition.PCA(5, random_state=0).fit(poses)
-    latents = prior.transform(poses)
-    np.testing.assert_allclose(latents, theirs.transform(poses), atol=1e-12)
-    np.testing.assert_allclose(prior.inverse_transform(latents), theirs.inverse_transform(latents), atol=1e-12)
 
 
 def test_a_loose_prior_reaches_what_its_components_do_not() -> None:
@@ -137,3 +121,14 @@ def test_mistakes_in_settings_are_named() -> None:
             kind(**settings)
     with pytest.raises(ValueError, match="angles must hold at least 7 frames, got 3"):
         PCA().fit(np.zeros((3, 63)))
+
+
+def test_a_linear_transformer_is_inverted_as_scikit_learn_does_it() -> None:
+    from sklearn import decomposition
+
+    poses = angles("walk-a", "walk-b")
+    prior = Transformed(variant="PCA", components=5).fit(poses)
+    theirs = decomposition.PCA(5, random_state=0).fit(poses)
+    latents = prior.transform(poses)
+    np.testing.assert_allclose(latents, theirs.transform(poses), atol=1e-12)
+    np.testing.assert_allclose(prior.inverse_transform(latents), theirs.inverse_transform(latents), atol=1e-12)

@@ -70,16 +70,6 @@ def test_without_training_there_is_one_line() -> None:
             registry().offer("prior", name).factory().fit(np.zeros((3, 63)))
 
 
-def test_a_mask_says_where_the_root_is() -> None:
-    task, motion, observations = scene()
-    pose, place, observation = motion.poses[0], motion.translations[0], observations[0]
-    assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)  # known
-    unknown = Observation(observation.silhouettes)
-    moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])
-    assert np.linalg.norm(moved - place) < 0.08  # a pixel of 120 rows is 3 cm
-    assert drawn == 1
-
-
 def test_a_pose_is_moved_to_the_contours_of_its_masks() -> None:
     task, motion, observations = scene()
     free = np.flatnonzero(task.body.skeleton.free)
@@ -108,3 +98,13 @@ def test_a_camera_that_knows_nothing_does_not_count() -> None:
         part = replace(task, cameras=[task.cameras[0]] * cameras)
         costs += [costs_of(part, views, pose, place)[0], frame_of(part, views, pose[0], place[0], 0).cost]
     assert len(set(costs)) == 1
+
+
+def test_a_mask_says_where_the_root_is() -> None:
+    task, motion, observations = scene()
+    pose, place, observation = motion.poses[0], motion.translations[0], observations[0]
+    assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)  # known
+    unknown = Observation(observation.silhouettes)
+    moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])
+    assert np.linalg.norm(moved - place) < 0.08  # a pixel of 120 rows is 3 cm
+    assert drawn == 1

@@ -53,7 +53,7 @@ def paint(image: Any, person: Any, shadow: Any) -> Any:
 
 
 class WrongBackground(Sound):
-    background = np.zeros((3, 3), dtype=np.uint8)  # type: ignore[assignment]
+    background = np.zeros((3, 3), dtype=np.uint8)
 
 
 class Swallows(Sound):

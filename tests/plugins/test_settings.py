@@ -25,7 +25,7 @@ def factory(
     sharp: bool = False,
     limit: float | None = None,
     reach: tuple[float, float] = (1.0, 2.0),
-    anything=None,  # type: ignore[no-untyped-def]
+    anything=None,
 ) -> None: ...
 
 
@@ -95,7 +95,7 @@ def test_an_unknown_annotation_accepts_everything() -> None:
     assert accepts("SomeType", 3)
     assert accepts(list[int], [1])
 
-    def stringly(space, rng, *, a: "Missing" = 1): ...  # type: ignore[no-untyped-def, name-defined]  # noqa: F821
+    def stringly(space, rng, *, a: "Missing" = 1): ...  # noqa: F821
 
     assert [one.name for one in settings_of(stringly)] == ["a"]
 

@@ -1,14 +1,11 @@
 """The vsmm tracker on what goes wrong: nothing to see, pieces, borders, wrong files; and whole, by name."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from posefit.cli import main
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
 from posefit.fitting.tracker import Frame, Observation, Task
@@ -20,16 +17,12 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
 from posefit_vsmm import tracker
-from posefit_vsmm.groups import most_probable, read_topology
-from posefit_vsmm.motion import library as library_of_models
-from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.state import AT, ENDS, ERROR, encode
+from posefit_vsmm.groups import TOPOLOGY, most_probable
 from posefit_vsmm.switching import Switching
 from posefit_vsmm.tracker import MAX_BLIND_FRAMES, VSMM
 from tests.cases import each
 
 SIZE = (200, 240)
-NAMES = ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
 
 
 def seen(name: str = "jacks-b", frames: int = 40, azimuth: float = 0.1) -> tuple[Task, list[Observation]]:
@@ -138,44 +131,10 @@ def test_what_is_no_person_is_no_reason_to_fail() -> None:
     assert iou(frames)[:6].mean() > 0.5
 
 
-@each(
-    ("text", "message"),
-    [
-        ('stay = 0.9\n[groups]\na = ["wlak"]\n[neighbours]\n', "a model must be one of stiff-walk, .*, got 'wlak'"),
-        ('stay = 0.9\n[groups]\na = ["walk"]\n[neighbours]\nfly = []\n', "a model must be one of .*, got 'fly'"),
-        ('stay = 1.5\n[groups]\na = ["walk"]\n[neighbours]\n', "stay must be a number between 0 and 1, got 1.5"),
-        ("stay = 0.9\n[groups]\n[neighbours]\n", "groups must hold at least one group of at least one model"),
-        ("stay = ", "expected TOML"),
-    ],
-)
-def test_a_file_of_groups_that_is_wrong_is_named(tmp_path: Path, text: str, message: str) -> None:
-    file = tmp_path / "groups.toml"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=message) as caught:
-        read_topology(file, NAMES)
-    assert str(caught.value).startswith(str(file))
-
-
 def test_an_activity_is_as_probable_as_its_models_together() -> None:
-    topology, models = read_topology("", NAMES), ("stiff-walk", "walk", "jacks")
-    assert most_probable(topology.activities, models, np.array([0.3, 0.3, 0.4])) == "walk"
-    assert most_probable(topology.activities, models, np.array([0.2, 0.2, 0.6])) == "jacks"
-
-
-@each(
-    ("method", "setting", "message"),
-    [
-        ("vsmm", "structure=some", "structure must be"),
-        ("vsmm", "joint_noise=0", "joint_noise must be above 0, got 0"),
-        ("vsmm", "groups=no.toml", "no.toml: expected a file of groups, got none"),
-        ("vsmm:letter", "structure=all", "variant must be one of default, patent, got 'letter'"),
-    ],
-)
-def test_a_senseless_setting_is_one_line_and_status_2(method: str, setting: str, message: str) -> None:
-    family = method.partition(":")[0]
-    result = CliRunner().invoke(main, ["track", "walk", "--method", method, "--set", f"{family}.{setting}"])
-    assert result.exit_code == 2
-    assert message in result.output.splitlines()[-1]
+    models = ("stiff-walk", "walk", "jacks")
+    assert most_probable(TOPOLOGY.activities, models, np.array([0.3, 0.3, 0.4])) == "walk"
+    assert most_probable(TOPOLOGY.activities, models, np.array([0.2, 0.2, 0.6])) == "jacks"
 
 
 @each("settings", [{"structure": "all"}, {"variant": "patent"}, {"variant": "patent", "recovery": True}])
@@ -232,35 +191,3 @@ def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch
         hidden_joints += int(hidden.sum())
     assert hidden_joints >= 17
     assert any((points >= 1000.0).any() for points in measured) is (variant == "patent")
-
-
-def test_a_detection_that_is_too_far_off_counts_as_an_end_without_a_limb() -> None:
-    task, observations = seen(frames=1)
-    motion = built_in.motion("jacks-b", frames=1)
-    state = encode(motion.poses, motion.translations)[0]
-    cameras = tracker.JointCameras(task.body, task.cameras, library_of_models().dependent)
-    hand = int(ENDS[AT["left hand"], 0])
-    pixels = cameras.project(task.cameras[0], state[None])[0][0, AT["left hand"]]
-    measured = []
-    for away in (0.0, 60.0):  # pixels that a landmark is off
-        landmarks = np.zeros((1, 27, 3))
-        landmarks[0, hand] = [*(pixels + away), 1.0]
-        views = [lines_of(observations[0].silhouettes[0].mask)]
-        measured += cameras.detect(views, state, 1e-6 * np.eye(ERROR), landmarks)
-    near, far = measured
-    assert near.confidence[AT["left hand"]] == 1.0
-    assert far.confidence[AT["left hand"]] == 0.0
-    assert far.unassigned == near.unassigned + 1
-
-
-def test_a_limb_is_sought_all_around_once_it_was_missing_for_some_frames() -> None:
-    task, _ = seen(frames=1)
-    followed = tracker.TrackFilter(VSMM(task), np.random.default_rng(0))
-    followed._missing = dict.fromkeys(("left hand", "right hand", "left foot", "right foot"), 0)
-    confidence = np.ones(17)
-    confidence[AT["left hand"]] = 0.0
-    missing = tracker.JointMeasurement(np.zeros((17, 2)), confidence, np.ones((17, 2)), 1)
-    for measured in (missing, missing._replace(unassigned=0), missing):  # no end is left over: the limb is hidden
-        for frame in range(1, tracker.MISSING_FRAMES + 1):
-            extra = followed._missing_variances([measured])
-            assert extra.any() == (frame == tracker.MISSING_FRAMES and measured.unassigned == 1)

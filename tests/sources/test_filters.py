@@ -86,13 +86,8 @@ def test_beta_has_an_answer_where_no_share_can_be_had() -> None:  # DEUTSCHER200
 def annealed(particles: Array, **settings: float) -> Annealed:
     """Return a filter of one layer more than has been told, with these particles."""
     layers = int(settings.pop("layers", 2))
-    made = Annealed(
-        Toy(particles.shape[1]),
-        np.random.default_rng(0),
-        evaluations=layers * len(particles),
-        layers=layers,
-        **settings,
-    )  # type: ignore[arg-type]
+    budget = layers * len(particles)
+    made = Annealed(Toy(particles.shape[1]), np.random.default_rng(0), evaluations=budget, layers=layers, **settings)
     made._particles = particles
     return made
 

@@ -1,4 +1,4 @@
-"""One test for each equation of Hansen's tutorial, 2016: by hand, by law, or against the formula in matrices."""
+"""One test for each equation of Hansen's tutorial, 2016: by hand, by law, or in matrices; and Auger and Hansen 2005."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.fitting.cma import Strategy, constants, default_population_size
+from posefit.fitting.cma import CMAES, Strategy, constants, default_population_size
+from posefit.testing.toy import Toy, sphere
 
 # Six proposals in two dimensions, worked by hand. mu = 3 and ln 3.5 - ln i is:
 RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
@@ -104,17 +105,15 @@ def test_eq_42_the_mean_moves_by_a_step_size_times_the_step() -> None:  # HANSEN
 
 def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() -> None:  # HANSEN2016 (43)
     one = learnt()
-    rates = EIGHT
-    fresh = np.sqrt(rates.c_sigma * (2.0 - rates.c_sigma) * rates.mu_eff) * one.root @ one.step
-    np.testing.assert_allclose(one.after.step_path, (1.0 - rates.c_sigma) * one.before["step_path"] + fresh, rtol=1e-10)
+    fresh = np.sqrt(EIGHT.c_sigma * (2.0 - EIGHT.c_sigma) * EIGHT.mu_eff) * one.root @ one.step
+    np.testing.assert_allclose(one.after.step_path, (1.0 - EIGHT.c_sigma) * one.before["step_path"] + fresh, rtol=1e-10)
 
 
 def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> None:  # HANSEN2016 (44)
     for far in (0.0, 2.0):
         one = learnt(far=far)
-        rates = EIGHT
-        share = np.linalg.norm(one.after.step_path) / rates.chi
-        grown = float(one.before["sigma"]) * np.exp(rates.c_sigma / rates.d_sigma * (share - 1.0))
+        share = np.linalg.norm(one.after.step_path) / EIGHT.chi
+        grown = float(one.before["sigma"]) * np.exp(EIGHT.c_sigma / EIGHT.d_sigma * (share - 1.0))
         assert one.after.sigma == pytest.approx(grown, rel=1e-12)
         assert (one.after.sigma > one.before["sigma"]) == (share > 1.0)
 
@@ -122,15 +121,13 @@ def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> 
 def test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long() -> None:  # HANSEN2016 (h_sigma)
     near, far = learnt(), learnt(far=5.0)
     assert (heeded(near), heeded(far)) == (1.0, 0.0)
-    c_c = EIGHT.c_c
-    np.testing.assert_allclose(far.after.path, (1.0 - c_c) * far.before["path"], rtol=1e-12)
+    np.testing.assert_allclose(far.after.path, (1.0 - EIGHT.c_c) * far.before["path"], rtol=1e-12)
 
 
 def test_eq_45_the_covariances_path_adds_the_step() -> None:  # HANSEN2016 (45)
     one = learnt()
-    rates = EIGHT
-    fresh = heeded(one) * np.sqrt(rates.c_c * (2.0 - rates.c_c) * rates.mu_eff) * one.step
-    np.testing.assert_allclose(one.after.path, (1.0 - rates.c_c) * one.before["path"] + fresh, rtol=1e-10)
+    fresh = heeded(one) * np.sqrt(EIGHT.c_c * (2.0 - EIGHT.c_c) * EIGHT.mu_eff) * one.step
+    np.testing.assert_allclose(one.after.path, (1.0 - EIGHT.c_c) * one.before["path"] + fresh, rtol=1e-10)
 
 
 def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -> None:  # HANSEN2016 (46)
@@ -286,3 +283,15 @@ def test_b_3_a_search_ends_where_nothing_changes_any_more_or_it_diverges() -> No
     assert fixed.ended()
     thin.lengths = np.array([1e-15, 1.0])  # ConditionCov
     assert thin.ended()
+
+
+def test_a_search_that_stagnates_starts_again_with_twice_the_population() -> None:  # AUGER2005 (restart)
+    optimiser = CMAES(Toy(3), np.random.default_rng(0))
+    sizes = []
+    for _ in range(400):
+        proposals = optimiser.ask()
+        sizes.append(len(proposals))
+        optimiser.tell(proposals, sphere(proposals))
+    assert sizes[0] == 7
+    assert set(sizes) >= {7, 14, 28}
+    assert sorted(sizes) == sizes

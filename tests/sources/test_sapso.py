@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from scipy.stats import ks_2samp
 
 from posefit import SearchSpace, Silhouette, Start, minimise
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.box import draw_population
+from posefit.fitting.prior import Components
 from posefit.fitting.tracker import Prediction, Predictor, SynthesisTracker
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -24,32 +27,21 @@ from posefit.testing.toy import Toy
 from posefit.testing.tracker_rules import scene
 from posefit_priors.pca import PCA
 from posefit_reproduce.sapso.letter import LetterSAPSO, velocity_limits
-from posefit_swarm.sapso import SAPSO, fly, inertia_at, limited
+from posefit_swarm.sapso import SAPSO, Rows, fly, inertia_at, limited, redrawn
 
 
-class Line:
+class Line(Components):
     """A prior of one latent, the first joint angle; feasible unless it lies in a gap."""
 
-    def __init__(self, gap: tuple[float, float] | None = None) -> None:
-        self.low, self.high, self.gap = np.array([-1.0]), np.array([1.0]), gap
-
-    def fit(self, angles: Array, skeleton: object = None) -> "Line":
-        assert angles.shape[1] == 63
-        return self
-
-    def transform(self, angles: Array) -> Array:
-        return angles[:, :1]
-
-    def inverse_transform(self, latents: Array) -> Array:
-        return np.column_stack([latents, np.zeros((len(latents), 62))])
+    def __init__(self, gap: tuple[float, float] = (np.inf, -np.inf)) -> None:
+        super().__init__(np.zeros(63), np.eye(1, 63), np.array([-1.0]), np.array([1.0]))
+        self.gap = gap
 
     def feasible(self, latents: Array) -> Any:
-        if self.gap is None:
-            return np.ones(len(latents), dtype=bool)
         return (latents[:, 0] <= self.gap[0]) | (latents[:, 0] >= self.gap[1])
 
 
-def line_space(gap: tuple[float, float] | None = None, start: Start | None = None) -> SearchSpace:
+def line_space(gap: tuple[float, float] = (np.inf, -np.inf), start: Start | None = None) -> SearchSpace:
     return SearchSpace(Line(gap), np.zeros(3), np.ones(3), np.zeros(3), start=start)
 
 
@@ -67,9 +59,6 @@ class Fixed(np.random.Generator):
 @pytest.fixture(scope="module")
 def walk() -> Array:
     return np.concatenate([built_in.motion(style).poses[:, 3:] for style in ("walk-a", "walk-b", "walk-c")])
-
-
-# Section 2
 
 
 def test_the_skeleton_has_27_joints_and_66_angles() -> None:
@@ -161,9 +150,6 @@ def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None: 
     assert (np.isinf(low[:3]) & np.isinf(high[:3])).all()  # they are those of x_s, and not of the root
 
 
-# Section 3
-
-
 def moved(
     *, r1: float = 0.25, r2: float = 0.5, omega: float = 0.5, x: float = 0.1, v: float = 0.2, **changed: Any
 ) -> tuple[float, float]:
@@ -193,18 +179,6 @@ def test_a_periodic_coordinate_moves_the_short_way_round() -> None:
     velocity, position = moved(v=0.0, r1=0.0, r2=0.5, x=0.9, gbest=-0.9, wrapping=1)
     assert velocity == pytest.approx(0.2)
     assert position == pytest.approx(-0.9)
-
-
-def test_every_particle_and_dimension_has_draws_of_its_own() -> None:  # Interpretation S8
-    # the draws are in the order they are asked for: all of the pulls to personal bests, then all to the swarm's
-    position, velocity, best = (np.array([[0.1, 0.0], [0.2, -0.1]]) * scale for scale in (1.0, 0.5, 2.0))
-    swarm = SAPSO(Toy(2), np.random.default_rng(0), population_size=2, inertia=0.5, alpha=1.0)
-    swarm.x, swarm.v, swarm.pbest, swarm.pbest_cost = position, velocity, best, np.array([1.0, 2.0])
-    rand, rows = np.arange(0.1, 0.9, 0.1), np.array([1, 0])
-    swarm.rng = Fixed(*rand)
-    r1, r2 = rand.reshape(2, 2, 2)
-    expected = 0.5 * velocity[rows] + 2.0 * r1 * (best - position)[rows] + 2.0 * r2 * (best[0] - position[rows])
-    np.testing.assert_allclose(swarm.step(rows), [expected, position[rows] + expected])
 
 
 def test_c1_and_c2_are_2_and_section_5_sets_the_rest() -> None:
@@ -377,6 +351,42 @@ def test_a1_2c_to_the_letter_a_velocity_beyond_its_limits_is_redrawn_and_not_mov
     assert redrawn.mean() == pytest.approx(0.075, abs=0.005)
 
 
+FEASIBLE = 0.3  # share of steps that are allowed
+
+
+def stepped(count: int, redraws: int, feasible: float = FEASIBLE) -> tuple[Array, Array]:
+    """Return velocities and positions (n, 2) of particles at -1 whose first coordinate must be below `feasible`."""
+    rng = np.random.default_rng(3)
+
+    def step(rows: Rows) -> tuple[Array, Array]:
+        moved = rng.random((len(rows), 2))
+        return moved + 1.0, moved
+
+    def allowed(_: Array, moved: Array) -> NDArray[np.bool_]:
+        return np.asarray(moved[:, 0] < feasible)
+
+    return redrawn(np.full((count, 2), -1.0), step, allowed, redraws)
+
+
+def test_what_is_drawn_again_has_the_distribution_of_what_is_allowed() -> None:  # Interpretation S7
+    velocity, position = stepped(3000, 100)
+    np.testing.assert_allclose(velocity, position + 1.0)  # both are of the same draw
+    assert position[:, 0].max() < FEASIBLE
+    uniform = np.random.default_rng(4).random((3000, 2)) * [FEASIBLE, 1.0]
+    for k in range(2):
+        assert ks_2samp(position[:, k], uniform[:, k]).pvalue > 0.01
+
+
+def test_a_particle_is_redrawn_as_often_as_asked_and_then_stays_at_rest() -> None:  # Interpretation S7
+    for redraws, failing in [(1, 0.49), (4, 0.16807), (10, 0.019773)]:
+        velocity, position = stepped(4000, redraws)
+        stays = position[:, 0] == -1.0
+        deviation = np.sqrt(failing * (1.0 - failing) / 4000)
+        assert stays.mean() == pytest.approx(failing, abs=3.5 * deviation)  # 0.7^(1 + redraws)
+        np.testing.assert_array_equal(velocity[stays], 0.0)
+        np.testing.assert_array_equal(position[stays], -1.0)
+
+
 def test_a_wall_of_the_box_stops_a_coordinate_there_and_no_other() -> None:  # Interpretation S7
     velocity, position = fly(Toy(3), np.array([[0.9, -0.9, 0.5]]), np.array([[0.2, -0.05, 0.1]]))
     np.testing.assert_allclose(velocity, [[0.0, -0.05, 0.1]])
@@ -411,9 +421,6 @@ def test_s11_a_refused_move_keeps_its_velocity() -> None:
     swarm.tell(swarm.ask(), np.array([50.0]))
     np.testing.assert_array_equal(swarm.x, 0.0)
     np.testing.assert_allclose(swarm.v, inertia_at(1, 2, 0.9) * before)
-
-
-# Section 4
 
 
 def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> None:
@@ -493,13 +500,9 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
     assert made[0].space.start is None  # frame 1 is an estimation
     starts = [optimiser.space.start for optimiser in made[1:]]
     for start, step, last in zip(starts, steps, latents, strict=False):
-        assert start is not None
         assert start.velocity[3] == pytest.approx(step)
         assert start.mean[3] == pytest.approx(last)
         assert start.spread[3] == pytest.approx(max(2.0 * abs(step), 0.05))  # Interpretation S5
-
-
-# Section 5
 
 
 def test_eq_8_is_the_mean_absolute_difference_of_66_angles() -> None:  # SAPSO (8)

@@ -1,7 +1,7 @@
 """A walk, a tracker whose frames are given, and the track and the page that it leads to."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion import built_in
-from posefit.motion.motion import Motion
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.progress import Progress
 from posefit.silhouette.cost import areas
@@ -35,11 +34,6 @@ def walk(frames: int, views: Sequence[float] = (45.0,), size: tuple[int, int] = 
     return synthetic(built_in.motion("walk", frames=frames), views, size, [], (None, None))
 
 
-def truth_of(scene: Scene) -> Motion:
-    assert scene.truth is not None
-    return scene.truth
-
-
 def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observation) -> Frame:
     """Return the frame of a tracker that estimates a pose."""
     views = zip(scene.cameras, observation.silhouettes, strict=True)
@@ -49,7 +43,7 @@ def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observa
 
 def exact_frames(scene: Scene, **values: Any) -> list[Frame]:
     """Return frames of the true poses, without posteriors."""
-    truth = truth_of(scene)
+    truth = scene.truth
     each = zip(truth.poses, truth.translations, scene.observations, strict=False)
     return [replace(frame_of(scene, *estimate), **values) for estimate in each]
 
@@ -68,24 +62,13 @@ def uncertain_frames(
     return frames
 
 
-@dataclass(frozen=True)
-class FixedTracker:
-    """A tracker that yields the frames it was made with."""
-
-    frames: Sequence[Frame]
-    first: int = 0
-
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        for k, _ in enumerate(observations, self.first):
-            yield self.frames[k]
-
-
 def tracked(scene: Scene, frames: Sequence[Frame], recorder: Recorder | None = None) -> Track:
     """Return the track of a scene whose tracker yields just these frames, with its files where there is a folder."""
 
     def follow(_: object, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         resumed = len(task.before) if len(task.before) > 1 else 0  # a single one is what a track is begun with
-        return FixedTracker(frames, resumed).track(observations, rng)
+        for k, _ in enumerate(observations, resumed):
+            yield frames[k]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(method.Method, "follow", follow)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from posefit.arrays import Array
 from posefit.fitting import contour_kernels as kernels
 from posefit.fitting.contours import MaskContours, contour_squares, distances_outside
 from posefit.fitting.shape import NAMES, SPREAD, Shape, shaped
@@ -13,7 +14,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
@@ -25,16 +26,6 @@ from posefit.tracking.smoothing.smooth import smooth
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
-from tests.tracking.contour_twin import (
-    BONE_STARTS,
-    COUNT,
-    STEP,
-    cone_distance,
-    drawn_body,
-    moved_bodies,
-    pull_of_view,
-    pulled,
-)
 
 CAMERA = Camera.around(np.array([0.0, 0.9, 0.0]), 0.4, 4.0, (200, 200))
 
@@ -72,6 +63,70 @@ def distance(motion: Motion, truth: Motion) -> float:
 
 def average_shape(scene: Scene) -> Shape:
     return Shape(scene.body, np.ones(len(NAMES)), np.zeros(len(NAMES)), 0.0)
+
+
+# A slow twin of the kernels: difference quotients of all numbers of a drawn body.
+
+STEP = 1e-5
+BONE_STARTS = np.array(PARENTS[1:])
+COUNT = 2 * len(JOINTS) + 2 * len(BONES)  # of a drawn body: pixels of joints, then radii of bones
+
+
+def cone_distance(x: float, y: float, points: Array, radii: Array) -> tuple[float, float, float, float]:
+    """Return how far a point is outside the cone of two discs, at which share of it, and its normal."""
+    cones, discs = np.empty((1, 8)), np.empty((1, 3))
+    kernels.write_cones(np.zeros(1, int), np.asarray(points), np.asarray(radii)[None], cones, discs)
+    distance, *others = kernels.cone_distance(x, y, cones[0])
+    return distance, *others
+
+
+def drawn_body(body: Body, camera: Camera, joints: Array) -> Array:
+    """Return where joints (27, 3) are in the picture, and how wide the bones' ends (106,), in pixels."""
+    pixels, far = camera.project(joints)
+    metres = np.sqrt(camera.focal.prod()) / far
+    radii = np.column_stack([metres[BONE_STARTS] * body.radii[:, 0], metres[1:] * body.radii[:, 1]])
+    return np.concatenate([pixels.ravel(), radii.ravel()])
+
+
+def pulled(numbers: Array, mask: kernels.Contour, scale: float) -> tuple[Array, Array]:
+    """Return half the second derivatives (106, 106) and half the gradient (106,) by the numbers of a drawn body."""
+    centres, radii = numbers[: 2 * len(JOINTS)].reshape(-1, 2), numbers[2 * len(JOINTS) :].reshape(-1, 2)
+    blocks, forces = np.zeros((len(BONES), 6, 6)), np.zeros((len(BONES), 6))
+    kernels.add_pulls(
+        BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), mask, scale, blocks, forces
+    )
+    curves, slopes = np.zeros((COUNT, COUNT)), np.zeros(COUNT)
+    for b, parent in enumerate(BONE_STARTS):
+        rows = [2 * parent, 2 * parent + 1, 2 * b + 2, 2 * b + 3, *(2 * (len(JOINTS) + b) + np.arange(2))]
+        curves[np.ix_(rows, rows)] += blocks[b]
+        slopes[rows] += forces[b]
+    return curves, slopes
+
+
+def pull_of_view(view: MaskContours, k: int, here: Array, there: Array, reach: float) -> tuple[Array, Array]:
+    """Return half the second derivatives (n, n) and half the gradient (n,) by n parameters, in frame k.
+
+    The drawn body's numbers are `here` (106,), and `there` (n, 106) where each parameter is off by `STEP`.
+    """
+    root = view.metres[k]
+    points = view.points[view.starts[k] : view.starts[k + 1]]
+    points = np.ascontiguousarray(points)
+    mask = kernels.Contour(view.fields[k], view.corners[k], view.sizes[k], points, view.step)
+    curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
+    deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
+    worth = 1.0 / (root**3 * kernels.CORRELATION_LENGTH * deviation)
+    ways = (there - here).T / STEP
+    return worth * ways.T @ curves @ ways, worth * ways.T @ slopes
+
+
+def moved_bodies(body: Body, camera: Camera, pose: Array, place: Array) -> tuple[Array, Array]:
+    """Return a drawn body's numbers (106,), and those (69, 106) of bodies whose place or an angle is off by `STEP`."""
+    steps = STEP * np.eye(3 + len(pose))
+    numbers = [
+        drawn_body(body, camera, body.skeleton.joints((pose + step[3:])[None], (place + step[:3])[None])[0])
+        for step in (np.zeros(3 + len(pose)), *steps)
+    ]
+    return numbers[0], np.array(numbers[1:])
 
 
 @each("radii", [(5.0, 2.0), (2.0, 5.0), (3.0, 3.0), (30.0, 2.0), (1.0, 40.0)])
@@ -212,7 +267,6 @@ def test_limbs_become_as_thick_as_the_persons_and_the_height_stays() -> None:
     scene, truth = footage(girth=1.25)
     average = average_shape(scene)
     _, shape = fitted(scene, estimate_of(truth, 2.0), average)
-    assert shape is not None
     factors = dict(zip(NAMES, shape.factors, strict=True))
     expected = {"thighs girth": 1.25, "torso girth": 1.25, "shanks girth": 1.0}
     assert {name: factors[name] for name in expected} == pytest.approx(expected, abs=0.1)
@@ -220,7 +274,6 @@ def test_limbs_become_as_thick_as_the_persons_and_the_height_stays() -> None:
     spread = dict(zip(NAMES, shape.spread / SPREAD, strict=True))  # as a share of people's
     assert 0.0 < spread["thighs girth"] < 0.5 < spread["neck length"] < 1.0
     _, shape = fitted(scene, truth, replace(average, height=scene.body.stature))
-    assert shape is not None
     assert shape.body.stature == pytest.approx(scene.body.stature)
 
 
@@ -263,7 +316,6 @@ def test_a_long_track_is_fitted_in_windows(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(contours, "CONTOUR_OVERLAP", 6)
     assert distance(fitted(scene, estimate)[0], whole) < 0.1 * distance(estimate, whole)
     motion, shape = fitted(scene, estimate, replace(average_shape(scene), height=scene.body.stature))
-    assert shape is not None
     assert distance(motion, whole) < 0.5 * distance(estimate, whole)
     assert motion.skeleton is shape.body.skeleton
 
@@ -300,13 +352,10 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     ]
     (_, alone, none), (_, both, shape) = (smooth(scene, frames, each, 0.5) for each in (None, average_shape(scene)))
     assert none is None
-    assert shape is not None
     costs = [np.mean([frame.cost for frame in each]) for each in (both, alone)]
     assert costs[0] < 0.7 * costs[1]
     assert shape.cost == pytest.approx(costs[0])
     moved, pose, known = both[0].posterior, both[0].pose, alone[0].posterior
-    assert moved is not None
-    assert known is not None
     assert known.recalibration is moved.recalibration is sure
     np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
     apart = estimate.translations[1] - estimate.translations[0]

@@ -36,7 +36,6 @@ def test_a_track_goes_on_as_if_it_had_not_ended_too_early(method: str, tmp_path:
     if method == "sapso":  # vsmm begins with new particles
         np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
     for before, after in zip(whole.frames, resumed.frames, strict=True):
-        assert after.cpu_seconds is not None
         assert after.details.keys() == before.details.keys()
     first, again = (track.frames[0].details.get("probabilities", 0.0) for track in (whole, resumed))
     np.testing.assert_array_equal(first, again)

@@ -25,7 +25,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.lookup import Lookup
 from tests.cases import each
 from tests.testing import planted
-from tests.tracking.scenes import frame_of, truth_of, walk
+from tests.tracking.scenes import frame_of, walk
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
@@ -65,7 +65,7 @@ def test_restarts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_who
     size: tuple[int, int], rows: int
 ) -> None:
     scene = walk(5, [90.0], size)
-    motion, task = truth_of(scene), Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
+    motion, task = scene.truth, Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
     views: list[tuple[int, float]] = []
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -103,6 +103,14 @@ def test_too_few_frames_for_a_build_are_reported(tmp_path: Path, count: int, bod
     assert (track.log.build is None) == message.startswith("no build")
 
 
+def with_one_camera_late(scene: Scene, late: int) -> tuple[Silhouette, list[Observation]]:
+    """Return a mask in which nothing is known, and the observations of a scene: the first `late` have one like it."""
+    unknown = Silhouette.of(*np.zeros((2, *scene.observations[0].silhouettes[0].mask.shape), dtype=bool))
+    shown = [scene.observations[k] for k in range(scene.count)]
+    blind = [replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in shown[:late]]
+    return unknown, [*blind, *shown[late:]]
+
+
 def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int) -> list[tuple[list[int], float]]:
     """Return the numbers and the rate of the frames that builds of so many frames are fitted to."""
     task = task_of(scene, TrackOptions(evaluations=80, translation="known"), [built_in.motion("walk")])
@@ -112,7 +120,7 @@ def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int
         rows = [next(k for k, other in enumerate(observations) if other is observation) for observation in chosen]
         calls.append((rows, task.fps))
         areas = np.zeros((len(scene.cameras), 3), np.int64)
-        return iter([Frame(truth_of(scene).poses[0], scene.anchor, 0.0, areas, 0)] * len(rows))
+        return iter([Frame(scene.truth.poses[0], scene.anchor, 0.0, areas, 0)] * len(rows))
 
     for count in counts:
         fitted_build(task, replace(scene, observations=observations), follow, count, None, 0)
@@ -125,11 +133,7 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
     thirds, all_of_them = frames_of_builds(scene, observations, 10, 11)
     assert thirds == (list(range(0, 30, 3)), scene.fps / 3)
     assert all_of_them == (list(range(11)), scene.fps)
-    unknown = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
-    observations = [scene.observations[k] for k in range(40)]
-    observations[:10] = [
-        replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in observations[:10]
-    ]
+    unknown, observations = with_one_camera_late(scene, 10)
     few, many = frames_of_builds(scene, observations, 5, 11)  # too many for those that come after
     assert few[0] == [10, 13, 16, 19, 22]
     assert many[0] == list(range(11))
@@ -150,13 +154,9 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
 @each(("late", "restarts"), [(10, 0), (20, 0), (20, 1)])
 def test_a_build_that_begins_late_looks_for_the_pose_again(late: int, restarts: int) -> None:
     scene = walk(50, [0.0, 90.0], (80, 60))
-    unknown = Silhouette.of(*np.zeros((2, 60, 80), dtype=bool))
-    observations = [scene.observations[k] for k in range(50)]
-    observations[:late] = [
-        replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in observations[:late]
-    ]
-    frame = Frame(truth_of(scene).poses[40], scene.anchor, 0.0, np.zeros((2, 3), np.int64), 0)
-    first = replace(frame, pose=truth_of(scene).poses[0])
+    _, observations = with_one_camera_late(scene, late)
+    frame = Frame(scene.truth.poses[40], scene.anchor, 0.0, np.zeros((2, 3), np.int64), 0)
+    first = replace(frame, pose=scene.truth.poses[0])
     task = task_of(scene, TrackOptions(evaluations=80, translation="known"), [built_in.motion("walk")])
     task = replace(task, yaw=0.5, first_pose=first.pose[3:], before=(first,))
     starts: list[tuple[float | None, tuple[Frame, ...]]] = []

@@ -13,7 +13,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.output import picture
-from posefit.output.drawing import BOTH, FAINTEST, MISSED, OTHER, draw_body, opacities, width_of, wrapped
+from posefit.output.drawing import BOTH, MISSED, OTHER, width_of, wrapped
 from posefit.output.picture import LABEL_HEIGHT, PANEL, Painter, curve
 from posefit.uncertainty.modes import Mode, Posterior
 from tests.cases import each
@@ -45,34 +45,6 @@ def painted(
 def pixels(image: Any, colour: tuple[int, int, int], close: int = 0) -> int:
     """Return how many pixels have a colour, or nearly."""
     return int((np.abs(image.astype(int) - np.array(colour)).max(axis=2) <= close).sum())
-
-
-def test_a_bone_is_as_solid_as_the_less_sure_of_its_ends() -> None:
-    radii = np.zeros(len(JOINTS))
-    radii[JOINTS.index("lfoot")] = 0.175  # halfway from 5 to 30 cm
-    radii[JOINTS.index("rhand")] = 2.0
-    solid = dict(zip(JOINTS[1:], opacities(radii), strict=True))
-    assert solid.pop("lfoot") == solid.pop("ltoes") == pytest.approx(0.5)
-    assert solid.pop("rhand") == FAINTEST
-    assert set(solid.values()) == {1.0}
-    assert opacities(np.full(len(JOINTS), np.nan)).tolist() == [1.0] * 26
-
-
-def test_what_lies_behind_shows_through_a_faint_body(scene: Scene, frame: Frame) -> None:
-    camera = scene.cameras[0]
-    behind = np.random.default_rng(0).integers(0, 255, (camera.height, camera.width, 3)).astype(np.uint8)
-    images = {}
-    for solid in (None, 0.0, 0.25, 1.0):
-        images[solid] = behind.copy()
-        colours = None if solid is None else np.full(26, solid)
-        draw_body(images[solid], scene.body, camera, frame.pose, frame.translation, colours)
-    drawn = images[None]
-    np.testing.assert_array_equal(images[0.0], behind)
-    np.testing.assert_array_equal(images[1.0], drawn)
-    # what one bone alone covers is three parts of what was there; where several lie, there is more of them
-    mixed = 0.25 * drawn + 0.75 * behind
-    assert (np.abs(images[0.25] - mixed).max(axis=2) <= 1.0)[(drawn != behind).any(axis=2)].mean() > 0.3
-    assert (images[0.25] != drawn).any()
 
 
 def test_an_unsure_limb_fades_on_the_masks_and_beside_them(scene: Scene, frame: Frame) -> None:

@@ -22,40 +22,21 @@ from posefit.evaluation.trust import (
     sentence,
     signs_against,
     stance_spread,
-    training_distances,
     trust_line,
     trust_of,
 )
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
-from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS
 from posefit.silhouette.mask import Silhouette
 from tests.cases import each
-from tests.tracking.scenes import exact_frames, tracked, truth_of, viewed, walk
+from tests.tracking.scenes import exact_frames, tracked, viewed, walk
 
 ALL = np.ones(60, dtype=bool)
-FINE: dict[str, Any] = {
-    "frames": 100,
-    "size_ratio": 1.0,
-    "size_m": 1.8,
-    "height_m": 1.8,
-    "depth_scatter": 0.01,
-    "foot_share": 0.9,
-    "stance_spread_m": 0.01,
-    "explained": 0.95,
-    "lost": 0.0,
-    "unknown": 0.05,
-    "interval_mm": 90.0,
-    "training_mm": 40.0,
-    "frontal": 0.2,
-    "held": 0.0,
-    "cropped": 0.0,
-    "iou": 0.88,
-    "acceleration": 6.0,
-}
+FINE: dict[str, Any] = {name: sign.limits[0] if sign.limits else 90.0 for name, sign in SIGNS.items()}
+FINE |= {"frames": 100, "size_m": 1.8, "height_m": 1.8}
 
 
 def test_the_longer_side_of_a_mask_is_that_of_its_bounding_box() -> None:
@@ -217,19 +198,9 @@ def test_masks_cropped_to_the_person_are_the_reason() -> None:
     assert "cuts the mask above and below in 100% of the frames: masks cropped" in trust.against[0]
 
 
-def test_poses_are_as_far_from_motions_as_from_the_nearest_pose_or_its_mirror_image() -> None:
-    motion = truth_of(walk(30))
-    turned = replace(motion, poses=mirrored_poses(motion.skeleton, motion.poses) + np.eye(1, 66))
-    distances = training_distances(motion.skeleton, motion.poses[:3], [turned])
-    assert distances[0] == pytest.approx(0.0, abs=1e-9)
-    assert 0.0 < distances[1] < 0.05  # only every second pose of 30 a second counts
-    assert distances[2] == pytest.approx(0.0, abs=1e-9)
-    assert np.isinf(training_distances(motion.skeleton, motion.poses[:3], [])).all()
-
-
 def test_a_track_by_one_camera_is_doubtful_far_from_what_was_learned() -> None:
     scene = walk(30)
-    motion = truth_of(scene)
+    motion = scene.truth
     assert trusted(scene, training=[motion]).grade == "good"
     bent = replace(motion, poses=motion.poses + 0.1 * (np.arange(66) >= 3))  # radians, at every joint
     trust = trusted(scene, training=[bent])
@@ -270,5 +241,4 @@ def test_the_sentence_stands_on_top_of_every_output_where_the_truth_is_unknown(t
     assert str(tracked(replace(scene, truth=None), exact_frames(scene))).splitlines()[0] == expected
     assert f'"verdict":"{expected} The method does not report' in page.read_text("utf-8").replace('": "', '":"')
     image = cv2.imread(str(tmp_path / "unknown" / "summary.png"))
-    assert image is not None
     assert (image[8:32].max(axis=2) > 200).any()  # of the sentence's letters

@@ -17,7 +17,7 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit_reproduce.experiment import Arrays, Run
 from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
-from posefit_vsmm.groups import read_topology
+from posefit_vsmm.groups import TOPOLOGY
 from posefit_vsmm.motion import library
 
 TUNED = 5  # films on which defaults were chosen
@@ -25,7 +25,7 @@ WARM_UP = 3  # frames that are tracked beforehand, so that no time includes comp
 LABELS = ("walk", "arms-out", "jacks", "squat", "jump")  # of the film's activities; a jump is none of them
 DETAILS = ("lost", "joints", "confidence", "filter_seconds", "detection_seconds")  # of frames that are stored
 MODELS = library().models.names
-GROUPS = tuple(read_topology("", MODELS).groups.items())
+GROUPS = tuple(TOPOLOGY.groups.items())
 METHODS: dict[str, TrackOptions] = {
     "default": TrackOptions(method="vsmm"),
     "patent": TrackOptions(method="vsmm:patent"),
