@@ -10,8 +10,6 @@ import re
 import shutil
 from pathlib import Path
 
-import architecture
-
 from generator import angles, commands, environments, equations, figures, joints, python, settings
 
 DOCS = Path(__file__).parents[1]
@@ -25,12 +23,8 @@ _PART = re.compile(r"(<!-- from the code: \w+ -->\n).*?(<!-- end -->)", re.DOTAL
 
 
 def pages() -> dict[str, str]:
-    """Return the text of every file in the repository that is made from the code, wholly or in part.
-
-    Raises ValueError where packages import each other in a circle.
-    """
-    parts = {name: _with_part((DOCS / name).read_text("utf-8"), make()) for name, make in PARTS.items()}
-    return {**parts, "pictures/architecture.svg": architecture.drawing()}
+    """Return the text of every page in the repository of which a part is made from the code."""
+    return {name: _with_part((DOCS / name).read_text("utf-8"), make()) for name, make in PARTS.items()}
 
 
 def write() -> None:

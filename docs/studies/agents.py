@@ -27,11 +27,12 @@ from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
-from posefit_reproduce.jobs import each
-from table import LEVEL, RESAMPLES, WORKERS, earlier, kept, markdown
+from table import WORKERS, drawn_means, markdown, measured, quantiles
 
 NAME = "posefit_envs:posefit/FitImage-v0"
 HELD_OUT = 10_000  # the first instance of the test split
+INSTANCES, SEEDS, STEPS = 200, 3, 270_000
+TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
 VARIANTS: dict[str, dict[str, Any]] = {
     "walks": {},
     "runs": {"motion": "run"},
@@ -43,23 +44,17 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "damaged masks": {"noise": {"holes": 0.3, "shadow": 0.5}},
     "another body": {"mismatch_percent": 10.0},
 }
-INSTANCES, SEEDS, STEPS = 200, 3, 270_000
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
-CONSTANTS = ("uniform", "the box's middle", "training mean", "the truth, projected")
+CONSTANTS = ("uniform", "the truth, projected")
 LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
-STARTED, STARTED_BUDGET, STARTED_SPREAD = (
-    "PPO, then cma",
-    200,
-    0.1,
-)  # CMA-ES that starts from the best of PPO's proposals
+# CMA-ES that starts from the best of PPO's proposals
+STARTED, STARTED_BUDGET, STARTED_SPREAD = "PPO, then cma", 200, 0.1
 ENVIRONMENTS, ROLLOUT, BATCH, EPOCHS = 64, 16, 256, 6
 LEARNING_RATE, LOG_DEVIATION = 1.5e-3, -1.6
 SHOWN = (12, 16)  # height and width of the pictures that networks take
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
 CLONING_STEPS, CLONED_LOG_DEVIATION = 30_720, -2.3  # before PPO goes on, from where it draws nearer to the means
-LOOKS = 6  # at the held-out costs while PPO learns
-CURVE_INSTANCES = 100
 WHITE = (255, 255, 255)
 
 Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
@@ -72,7 +67,6 @@ class Training(NamedTuple):
     agent: str
     budget: int
     seed: int
-    instances: int
 
 
 def check_learners() -> None:
@@ -89,10 +83,10 @@ def made(training: Training, count: int, **arguments: Any) -> Any:
     return TransformObservation(env, lambda pictures: pictures * mask)
 
 
-def episodes(policy: Policy, training: Training, count: int, proposals: int = MAX_EVALUATIONS) -> tuple[Array, Array]:
-    """Return the actions (k, n, d) and costs (k, n) of an episode on each of the first held-out instances."""
-    env = made(training, count, max_evaluations=proposals)
-    pictures, _ = env.reset(seed=0, options={"instance": list(range(HELD_OUT, HELD_OUT + count))})
+def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array, Array]:
+    """Return the actions (k, n, d) and costs (k, n) of an episode on each held-out instance."""
+    env = made(training, INSTANCES, max_evaluations=proposals)
+    pictures, _ = env.reset(seed=0, options={"instance": TESTED})
     actions, costs = [], []
     for _ in range(proposals):
         actions.append(np.clip(policy(pictures), -1.0, 1.0))
@@ -103,15 +97,15 @@ def episodes(policy: Policy, training: Training, count: int, proposals: int = MA
 
 def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return a row: the best costs on held-out instances, the proposals, and what the training took."""
-    start_time, row = process_time(), training._asdict() | {"curve": [], "proposals": None}
+    start_time, row = process_time(), training._asdict()
     if training.agent in (*SEARCHES, STARTED):
         row["costs"] = searched(training, start)
         return row | {"cpu_seconds": round(process_time() - start_time, 1)}
     learns = training.agent in LEARNERS
-    policy = trained(training, row["curve"]) if learns else constant(training)
+    policy = trained(training) if learns else constant(training)
     row["cpu_seconds"] = round(process_time() - start_time, 1)
     count = MAX_EVALUATIONS if learns or training.agent == "uniform" else 1
-    actions, costs = episodes(policy, training, training.instances, count)
+    actions, costs = episodes(policy, training, count)
     row["costs"] = costs.min(axis=0).tolist()
     if learns:
         row |= {"proposals": actions.round(4).tolist(), "proposal_costs": costs.round(2).tolist()}
@@ -120,23 +114,19 @@ def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[s
 
 def constant(training: Training) -> Policy:
     """Return the policy of a reference that does not look."""
-    rng, env = np.random.default_rng(training.seed), made(training, training.instances)
-    d = env.single_action_space.shape[0]
+    rng, env = np.random.default_rng(training.seed), made(training, INSTANCES)
     if training.agent == "uniform":
-        return lambda pictures: rng.uniform(-1.0, 1.0, (len(pictures), d))
-    if training.agent == "the box's middle":
-        return lambda pictures: np.zeros((len(pictures), d))
-    first = HELD_OUT if training.agent == "the truth, projected" else 0
-    env.reset(options={"instance": list(range(first, first + training.instances))})
+        return lambda _: rng.uniform(-1.0, 1.0, env.action_space.shape)
+    env.reset(options={"instance": TESTED})
     truths = np.array([episode.truth for episode in env.unwrapped.episodes])
-    return lambda _: truths if first else np.repeat(truths.mean(axis=0, keepdims=True), len(truths), axis=0)
+    return lambda _: truths
 
 
 def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
     """Return the costs that an optimiser reaches on the held-out instances, blindly or from a row's proposals."""
     name = "cma" if training.agent == STARTED else training.agent
-    env, factory = made(training, training.instances), registry().optimiser(name)
-    env.reset(options={"instance": list(range(HELD_OUT, HELD_OUT + training.instances))})
+    env, factory = made(training, INSTANCES), registry().optimiser(name)
+    env.reset(options={"instance": TESTED})
     few = {"population_size": training.budget} if training.budget < 40 else {}  # one population of sapso
     settings, costs = planned(factory, few, training.budget), []
     for number, problem in enumerate(env.unwrapped.problems):
@@ -164,34 +154,18 @@ def ppo(vector: Any, seed: int) -> Any:
     )  # fmt: skip
 
 
-def trained(training: Training, curve: list[Any]) -> Policy:
-    """Return the policy of a learner, the mean of its distribution; `curve` gets its held-out costs on the way."""
-    from stable_baselines3.common.callbacks import BaseCallback
-
+def trained(training: Training) -> Policy:
+    """Return the policy of a learner, the mean of its distribution."""
     model = ppo(to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed)
-
-    def act(pictures: Any) -> Array:
-        return np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
-
-    start_time, learning = process_time(), training.budget
+    learning = training.budget
     if "cloning" in training.agent:
         steps = min(CLONING_STEPS, training.budget)
         cloned(model, made(training, ENVIRONMENTS), steps)
         model.policy.log_std.data.fill_(CLONED_LOG_DEVIATION)
         learning -= steps
-
-    class Looking(BaseCallback):  # type: ignore[misc]
-        def _on_rollout_start(self) -> None:
-            if self.num_timesteps >= learning * len(curve) // LOOKS:
-                cost = episodes(act, training, CURVE_INSTANCES)[1].min(axis=0).mean()
-                curve.append([training.budget - learning + self.num_timesteps, cost, process_time() - start_time])
-
-        def _on_step(self) -> bool:
-            return True
-
     if learning:
-        model.learn(learning, callback=Looking())
-    return act
+        model.learn(learning)
+    return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
 
 
 def cloned(model: Any, env: Any, steps: int) -> None:
@@ -210,7 +184,7 @@ def cloned(model: Any, env: Any, steps: int) -> None:
                 truths[infos["_truth"]] = infos["truth"][infos["_truth"]]
         inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
         answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
-        for rows in [part for _ in range(EPOCHS) for part in torch.randperm(length).split(BATCH)]:
+        for rows in [part for _ in range(EPOCHS) for part in torch.split(torch.randperm(length), BATCH)]:
             means = model.policy.get_distribution(inputs[rows]).distribution.mean
             model.policy.optimizer.zero_grad()
             (means - answers[rows]).square().sum(dim=1).mean().backward()
@@ -237,7 +211,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         proposals = {STARTED: f"8 + {budget}", "uniform": "8"}.get(agent, "8" if agent in LEARNERS else "1")
         steps, cpu = f"{budget:,}", f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
         training = [steps, cpu, str(len(group))] if agent in LEARNERS else ["", "", ""]
-        low, high = interval(costs)
+        low, high = quantiles(drawn_means(costs))
         equal = [equivalent(blind[name], float(costs.mean())) for name in SEARCHES]
         cells.append([agent, proposals, *training, f"{costs.mean():.1f}", f"{low:.1f} to {high:.1f}", *equal])
     heads = ["", "proposals", "steps", "CPU s", "seeds", "cost", "95 % interval", "as SAPSO", "as CMA-ES"]
@@ -255,21 +229,11 @@ def equivalent(blind: Mapping[int, float], cost: float) -> str:
     return f"{np.exp(np.interp(-cost, costs, np.log(budgets))):,.0f}"
 
 
-def interval(costs: Array) -> tuple[float, float]:
-    """Return the ends of the 95 % interval of the mean of costs (seeds, instances), by a bootstrap of both."""
-    rng = np.random.default_rng(0)
-    seeds = rng.integers(len(costs), size=(RESAMPLES, len(costs)))
-    columns = rng.integers(costs.shape[1], size=(RESAMPLES, costs.shape[1]))
-    means = [costs[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)]
-    low, high = np.quantile(means, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
-    return float(low), float(high)
-
-
 def picture(row: Mapping[str, Any], path: str) -> None:
     """Write the picture of a row's eight proposals, with their costs, where their best cost is the median."""
     import cv2
 
-    instance = int(np.argsort(row["costs"])[row["instances"] // 2])
+    instance = int(np.argsort(row["costs"])[INSTANCES // 2])
     env = gym.make(NAME, **VARIANTS[row["variant"]], render_mode="rgb_array")
     env.reset(options={"instance": HELD_OUT + instance})
     panels = []
@@ -286,12 +250,11 @@ def picture(row: Mapping[str, Any], path: str) -> None:
 @click.option("--agent", "agents", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
 @click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
 @click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
-@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
 @click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
 @click.option("--picture", "drawn", metavar="FILE", help="A PNG of the first PPO's eight proposals.")
 @WORKERS
 def main(
-    names: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int,
+    names: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int,
     rows: str | None, drawn: str | None, workers: int | None,
 ) -> None:  # fmt: skip
     check_learners()
@@ -299,26 +262,21 @@ def main(
         raise InputError("--picture must come with the agent PPO")
     turns = []
     for variant in names or ("walks",):
-        turns += [Training(variant, agent, 0, 0, instances) for agent in CONSTANTS]
-        turns += [Training(variant, agent, budget, 0, instances) for agent in SEARCHES for budget in BUDGETS]
+        turns += [Training(variant, agent, 0, 0) for agent in CONSTANTS]
+        turns += [Training(variant, agent, budget, 0) for agent in SEARCHES for budget in BUDGETS]
         turns += [
-            Training(variant, name, min(steps, CLONING_STEPS) if name == "cloning" else steps, seed, instances)
+            Training(variant, name, min(steps, CLONING_STEPS) if name == "cloning" else steps, seed)
             for seed in range(seeds)
             for name in agents or LEARNERS
         ]
-    done = earlier(rows, turn_of)
-    jobs = {turn: partial(row_of, turn) for turn in turns if turn not in done}
-    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
-    started = {
-        Training(turn.variant, STARTED, STARTED_BUDGET, turn.seed, instances): done[turn]
-        for turn in turns
-        if turn.agent == "PPO"
-    }
-    for turn, start in started.items():
-        done.setdefault(turn, row_of(turn, start))
+    done = measured({turn: partial(row_of, turn) for turn in turns}, rows, turn_of, workers)
+    for turn in turns:
+        if turn.agent == "PPO":
+            started = Training(turn.variant, STARTED, STARTED_BUDGET, turn.seed)
+            done[started] = row_of(started, done[turn])
     for variant in names or ("walks",):
-        click.echo(f"\n{variant}, {instances} held-out instances\n")
-        for line in table([done[turn] for turn in (*turns, *started) if turn.variant == variant]):
+        click.echo(f"\n{variant}, {INSTANCES} held-out instances\n")
+        for line in table([row for turn, row in done.items() if turn.variant == variant]):
             click.echo(line)
     if drawn is not None:
         picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)

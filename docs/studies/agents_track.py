@@ -16,32 +16,24 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation
 
-from agents import (
-    ENVIRONMENTS,
-    HELD_OUT,
-    MAX_EVALUATIONS,
-    SEARCHES,
-    SHOWN,
-    STEPS,
-    check_learners,
-    equivalent,
-    interval,
-    ppo,
-)
+from agents import ENVIRONMENTS, HELD_OUT, SEARCHES, SHOWN, STEPS, check_learners, ppo
 from posefit import minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import to_sb3_vec_env
+from posefit_envs.fit import MAX_EVALUATIONS
 from posefit_envs.track import FRAMES
 from posefit_reproduce.jobs import each
-from table import WORKERS, bar, markdown
+from table import WORKERS, bar, drawn_means, markdown, quantiles
 
 NAME = "posefit_envs:posefit/Track-v0"
 STACKED = 4  # the latest pictures that the agent sees
 BUDGETS = (8, 40, 100, 200)  # evaluations of a frame, of blind searches
 SEEDS, INSTANCES = 2, 100
+TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
+SHOWN_FRAMES = {"of first frames": slice(1), "of the fourth to sixth": slice(3, 6), "of last ones": slice(-1, None)}
 DIMENSIONS = 9  # of a proposal
 
 
@@ -54,10 +46,10 @@ def stacked(count: int) -> tuple[Any, Any]:
     return vector, VecFrameStack(vector, STACKED)
 
 
-def committed(act: Callable[[Any], Array], count: int) -> Array:
-    """Return the costs (n, frames) that a policy commits in the first held-out tracks."""
-    vector, env = stacked(count)
-    vector.set_options({"instance": list(range(HELD_OUT, HELD_OUT + count))})
+def committed(act: Callable[[Any], Array]) -> Array:
+    """Return the costs (n, frames) that a policy commits in the held-out tracks."""
+    vector, env = stacked(INSTANCES)
+    vector.set_options({"instance": TESTED})
     pictures, costs = env.reset(), []
     for step in range(1, FRAMES * MAX_EVALUATIONS + 1):
         pictures, _, _, infos = env.step(act(pictures))
@@ -73,10 +65,11 @@ def trained(seed: int, steps: int) -> Callable[[Any], Array]:
     return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0])
 
 
-def searched(name: str, budget: int, count: int) -> Array:
-    """Return the costs (n, frames) that an optimiser commits in the first held-out tracks."""
-    env, factory = gym.make_vec(NAME, count, evaluations_per_frame=2, errors=False), registry().optimiser(name)
-    env.reset(options={"instance": list(range(HELD_OUT, HELD_OUT + count))})
+def searched(name: str, budget: int) -> Array:
+    """Return the costs (n, frames) that an optimiser commits in the held-out tracks."""
+    env: Any = gym.make_vec(NAME, INSTANCES, evaluations_per_frame=2, errors=False)
+    factory = registry().optimiser(name)
+    env.reset(options={"instance": TESTED})
     few = {"population_size": budget} if budget < 40 else {}  # one population of sapso
     settings, costs = planned(factory, few, budget), []
     for frame in range(FRAMES):
@@ -90,15 +83,15 @@ def searched(name: str, budget: int, count: int) -> Array:
     return np.array(costs).T
 
 
-def row_of(agent: str, budget: int, seed: int, steps: int, count: int) -> dict[str, Any]:
+def row_of(agent: str, budget: int, seed: int, steps: int) -> dict[str, Any]:
     """Return the costs (n, frames) that an agent or a search commits, and the CPU seconds until it can."""
     start = process_time()
     if agent in SEARCHES:
-        return {"costs": searched(agent, budget, count), "cpu_seconds": process_time() - start}
+        return {"costs": searched(agent, budget), "cpu_seconds": process_time() - start}
     rng = np.random.default_rng(seed)
-    policy = trained(seed, steps) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (count, DIMENSIONS))
+    policy = trained(seed, steps) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
     cpu = process_time() - start
-    return {"costs": committed(policy, count), "cpu_seconds": cpu}
+    return {"costs": committed(policy), "cpu_seconds": cpu}
 
 
 def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) -> Iterator[str]:
@@ -106,32 +99,28 @@ def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) ->
     groups: dict[tuple[str, int], list[Mapping[str, Any]]] = {}
     for (agent, budget, _), row in done.items():
         groups.setdefault((agent, budget), []).append(row)
-    costs = {key: np.array([row["costs"] for row in group]) for key, group in groups.items()}  # (seeds, n, frames)
-    blind = {name: {budget: float(costs[name, budget].mean()) for budget in BUDGETS} for name in SEARCHES}
     cells = []
     for (agent, budget), group in groups.items():
         cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
         training = [f"{steps:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
-        all_costs = costs[agent, budget]
-        low, high = interval(all_costs.mean(axis=2))
-        figures = [f"{all_costs.mean():.1f}", f"{low:.1f} to {high:.1f}", f"{all_costs[..., 0].mean():.1f}"]
-        equal = [equivalent(blind[name], float(all_costs.mean())) if agent == "PPO" else "" for name in SEARCHES]
-        cells.append([agent, f"{budget:,}", *training, *figures, *equal])
-    heads = ["", "evaluations a frame", "steps", "CPU s", "seeds", "cost", "95 % interval", "of first frames"]
-    yield from markdown([*heads, "as SAPSO", "as CMA-ES"], cells)
+        costs = np.array([row["costs"] for row in group])  # (seeds, n, frames)
+        low, high = quantiles(drawn_means(costs.mean(axis=2)))
+        shown = [f"{costs[..., frames].mean():.1f}" for frames in SHOWN_FRAMES.values()]
+        cells.append([agent, f"{budget:,}", *training, f"{costs.mean():.1f}", f"{low:.1f} to {high:.1f}", *shown])
+    heads = ["", "evaluations a frame", "steps", "CPU s", "seeds", "cost", "95 % interval", *SHOWN_FRAMES]
+    yield from markdown(heads, cells)
 
 
 @click.command(cls=Command, help=__doc__)
 @click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings.")
 @click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
-@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
 @WORKERS
-def main(seeds: int, steps: int, instances: int, workers: int | None) -> None:
+def main(seeds: int, steps: int, workers: int | None) -> None:
     check_learners()
     turns = [("uniform", MAX_EVALUATIONS, 0)]
     turns += [(name, budget, 0) for name in SEARCHES for budget in BUDGETS]
     turns += [("PPO", MAX_EVALUATIONS, seed) for seed in range(seeds)]
-    jobs = {turn: partial(row_of, *turn, steps, instances) for turn in turns}
+    jobs = {turn: partial(row_of, *turn, steps) for turn in turns}
     done = each(jobs, workers, bar)
     for line in table({turn: done[turn] for turn in turns}, steps):
         click.echo(line)

@@ -289,7 +289,7 @@ def measured(folder: Path, shot: Shot) -> dict[str, Any]:
     for number, camera in enumerate(true):
         rim, shadow = RIM * rng.standard_normal(), int(rng.integers(1000)) if rng.random() < 0.5 else None
         masks = [damaged(who.mask(camera, k), shadow, rim, rng) for k in range(len(who.motion))]
-        marks = {"landmarks": landmarks_of(who.motion, camera, rng)} if shot.landmarks else {}
+        marks: dict[str, Any] = {"landmarks": landmarks_of(who.motion, camera, rng)} if shot.landmarks else {}
         paths.append(folder / f"{shot.name}-{number}.npz")
         np.savez_compressed(paths[-1], masks=np.array(masks), fps=np.array(who.motion.fps), **marks)
     row: dict[str, Any] = {**shot._asdict(), "name": shot.name, "frames": len(who.motion)}

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import click
 import numpy as np
 
+from posefit.cli.output import Command
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Task
 from posefit.footage.scene import rendered, synthetic
@@ -22,7 +23,7 @@ from posefit.motion import built_in
 from posefit.tracking.defaults import BODY_FRAMES
 from posefit.tracking.initialise import fitted_build
 from posefit.tracking.method import prepare
-from posefit.tracking.options import TrackOptions
+from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit_reproduce.jobs import each
 from table import WORKERS, bar
 
@@ -50,7 +51,6 @@ LIMBS = {
     "thigh": ("lfemur",),
     "shank": ("ltibia",),
     "upper arm": ("lhumerus",),
-    "forearm": ("lradius",),
     "forearm and hand": ("lradius", "lwrist", "lhand"),
 }
 PARTS = ("stature", *LIMBS)
@@ -85,7 +85,7 @@ def _percent_off(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
     height = true.stature if setup.stature else None
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
     training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
-    task = Task(start, scene.cameras, options.budget, scene.yaw, scene.anchor, setup.translation, training=training)
+    task = Task(start, scene.cameras, EVALUATIONS, scene.yaw, scene.anchor, setup.translation, training=training)
     shape, _ = fitted_build(task, scene, prepare(options, task).follow, BODY_FRAMES, height, seed)
     return _off(shape.body, true), _off(start, true)
 
@@ -97,7 +97,7 @@ def _off(body: Body, true: Body) -> list[float]:
     return [100.0 * abs(length / other - 1.0) for length, other in zip(lengths, others, strict=True)]
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @WORKERS
 def main(workers: int | None) -> None:
     for line in builds_lines(workers):

@@ -1,11 +1,12 @@
 """Recorded clips of people who are not in the library, and their tracks; other studies share them."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from posefit.footage.scene import Scene
 from posefit.motion.clips import training_clips, training_motions
 from posefit.settings import settings_text
-from posefit.sweep.cell import TrackCell
+from posefit.sweep.cell import ALL_AROUND, TrackCell
 from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
@@ -107,6 +108,22 @@ Views = tuple[float, ...]
 SIDES: tuple[Views, ...] = ((0.0,), (45.0,), (90.0,), (135.0,), (180.0,))
 PAIRS: tuple[Views, ...] = ((0.0, 90.0), (45.0, 135.0))
 FOUR: Views = (0.0, 90.0, 180.0, 270.0)
+
+OFF_PERCENT = 10.0  # that bones and radii of another body are off at most: five per cent, root mean square
+DAMAGE = {"holes": 0.3, "blobs": 0.3, "jitter": 0.3, "dropped": 0.1}
+CHANGES: dict[str, Mapping[str, Any]] = {
+    "first yaw unknown": {"yaw_off_degrees": ALL_AROUND},
+    "translation aligned": {"translation": "aligned"},
+    "aligned, first yaw unknown": {"translation": "aligned", "yaw_off_degrees": ALL_AROUND},
+    "body 5 % off": {"body_off_percent": OFF_PERCENT},
+    "damaged silhouettes": {"corruption": DAMAGE},
+    "all of these": {
+        "translation": "aligned",
+        "yaw_off_degrees": ALL_AROUND,
+        "body_off_percent": OFF_PERCENT,
+        "corruption": DAMAGE,
+    },
+}
 
 
 def cell_fields(clip: Clip, views: Views, frames: int, **fields: Any) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.video import Video, VideoWriter
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import HALF
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import BONES, JOINTS, MIRROR, PARENTS, kind
@@ -448,8 +447,6 @@ TREADMILL = 4.0  # metres to either side, that are walked on the spot
 class Situation:
     """Actors and cameras; who is followed is the first actor."""
 
-    name: str
-    views: int
     actors: Sequence[Actor]
     cameras: Sequence[Camera] = field(repr=False)
 
@@ -476,22 +473,13 @@ SHOWS = {
 }
 
 
-def check_situation(name: str, views: int) -> None:
-    """Return nothing. Raises ValueError where there is no situation of that name, or none for so many cameras."""
-    if name not in SHOWS:
-        raise InputError(f"situation must be one of {', '.join(SHOWS)}, got {name!r}")
-    if views not in PLACES:
-        raise InputError(f"views must be one of {', '.join(map(str, PLACES))}, got {views}")
-
-
 def situation(name: str, views: int, seed: int) -> Situation:
-    """Return a situation before so many cameras. Raises ValueError where there is none of that name or number."""
-    check_situation(name, views)
+    """Return a situation before so many cameras."""
     rng = np.random.default_rng([seed, views])
     turned = rng.uniform(-8.0, 8.0) + 90.0 * (name == "towards")  # degrees, so that no side view is exactly one
     target = np.array([0.0, HEIGHT, 0.0])
     cameras = [Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS) for degrees in PLACES[views]]
-    return Situation(name, views, _actors(name, views, seed), cameras)
+    return Situation(_actors(name, views, seed), cameras)
 
 
 def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
@@ -560,42 +548,28 @@ def _lasting(actor: Actor, count: int) -> Actor:
     return replace(actor, motion=whole, present=present)
 
 
-BEFORE = 20  # frames of the empty place that a background is learned from, where one is given
+def film(
+    situation: Situation, plates: Sequence[Plate], seed: int, folder: Path
+) -> tuple[list[Path], NDArray[np.bool_]]:
+    """Return the videos that are written to a folder, one a camera, and what is seen of the first actor.
 
-
-@dataclass(frozen=True, eq=False)
-class Filmed:
-    """What was written of a situation, and the truth of it."""
-
-    videos: list[Path]
-    calibration: Path
-    first: int  # the frame of the videos that is the situation's first
-    masks: NDArray[np.bool_] = field(repr=False)  # (views, T, height, width): what is seen of the first actor
-
-
-def film(situation: Situation, plates: Sequence[Plate], seed: int, empty_first: bool, folder: Path) -> Filmed:
-    """Return what is written to a folder: a video a camera, with the empty place first if asked for, and the truth.
+    That is a mask for each frame and camera, (views, T, height, width).
 
     `plates` are the empty pictures of each camera.
     """
     rng = np.random.default_rng([seed, 4])
-    first = BEFORE if empty_first else 0
     videos, masks = [], []
     fps = situation.actors[0].motion.fps
     for number, (camera, behind) in enumerate(zip(situation.cameras, plates, strict=True)):
         path = folder / f"camera-{number + 1}.mp4"
         seen: list[Mask] = []
         with VideoWriter(path, fps, (camera.width, camera.height)) as writer:
-            for k in range(first):
-                writer.write(sensed(behind.frame(k), k, rng))
             for k, (people, mask) in enumerate(_frames(situation, camera, behind)):
-                writer.write(sensed(composited(behind.frame(first + k), camera, people), first + k, rng))
+                writer.write(sensed(composited(behind.frame(k), camera, people), k, rng))
                 seen.append(mask)
         videos.append(path)
         masks.append(np.stack(seen))
-    calibration = folder / "cameras.toml"
-    calibration.write_text(calibration_text(situation.cameras), encoding="utf-8")
-    return Filmed(videos, calibration, first, np.stack(masks))
+    return videos, np.stack(masks)
 
 
 def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tuple[list[Posed], Mask]]:
@@ -610,18 +584,3 @@ def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tup
         masks = true_masks(camera, people)
         there = bool(situation.actors[0].present[k])
         yield people, masks[0] if there else np.zeros((camera.height, camera.width), dtype=bool)
-
-
-def calibration_text(cameras: Sequence[Camera]) -> str:
-    """Return the text of a calibration file, as Pose2Sim and Sports2D write it."""
-    told = []
-    for number, camera in enumerate(cameras, 1):
-        (fx, fy), (cx, cy) = camera.focal, camera.centre - HALF
-        vector = cv2.Rodrigues(camera.rotation)[0].reshape(3)
-        told.append(
-            f'[camera{number}]\nname = "camera{number}"\nsize = [{camera.width}.0, {camera.height}.0]\n'
-            f"matrix = [[{fx}, 0.0, {cx}], [0.0, {fy}, {cy}], [0.0, 0.0, 1.0]]\n"
-            f"distortions = [0.0, 0.0, 0.0, 0.0]\nrotation = {vector.tolist()}\n"
-            f"translation = {camera.translation.tolist()}\nfisheye = false\n"
-        )
-    return "\n".join(told)

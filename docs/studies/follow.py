@@ -1,9 +1,9 @@
-"""The cost of following a person with the library: seconds before the first frame, milliseconds a frame, memory."""
+"""The cost of following a person with the library: milliseconds a frame, memory, and a step of a fit."""
 
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import replace
+from time import process_time
 from timeit import repeat
 
 import click
@@ -24,50 +24,31 @@ from posefit_exemplars.hypotheses import CONTINUED_REACHES, KNOWN_SHIFT, START_T
 
 CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
 POSES = 40  # of a call, by which the effort of a step is measured
-STABLE = 100  # frames after which memory should grow no more
 
 
 def follow_figures(frames: int) -> dict[str, float]:
     """Return what following so many frames takes on one thread, with the library of everybody else.
 
-    `library_s` is reading the library, `states_s` making a tracker's states of it; `ms` is the CPU time of a frame, and
-    `slowest_ms` that of the slowest one; `mb` is the process's peak memory after 100 frames, and `mb_end` at the end.
-    `step_poses` is how many costs of poses take as long as a step of a fit.
+    `ms` is the CPU time of a frame, and `mb` the process's peak memory. `step_poses` is how many costs of poses take as
+    long as a step of a fit.
     """
-    began = time.process_time()
-    others = recorded.clips(without=[recorded.clip(CLIP).subject])
-    library = time.process_time() - began
-    training = [clip.motion() for clip in others]
+    training = [clip.motion() for clip in recorded.clips(without=[recorded.clip(CLIP).subject])]
     scene = synthetic(recorded.clip(CLIP).motion(), (45.0,), (320, 240), [], (None, None))
     task = replace(task_of(scene, TrackOptions(translation="aligned", evaluations=EVALUATIONS), training), yaw=None)
-    began = time.process_time()
-    with threadpool_limits(1):
-        tracker = registry().offer("tracker", "exemplars").factory(task)
-    states = time.process_time() - began
 
     def observations(count: int) -> Iterator[Observation]:
         last = scene.count - 1
         for k in range(count):
             yield scene.observations[last - abs(k % (2 * last) - last)]
 
-    cpu_seconds, stable_mb = [], 0.0
     with threadpool_limits(1):
+        tracker = registry().offer("tracker", "exemplars").factory(task)
         list(tracker.track(observations(2), np.random.default_rng(0)))  # loads what is compiled
-        for frame in tracker.track(observations(frames), np.random.default_rng(0)):
-            cpu_seconds.append(frame.cpu_seconds)
-            if len(cpu_seconds) <= STABLE:
-                stable_mb = _peak_mb()
-    milliseconds = 1e3 * np.array(cpu_seconds)
-    return {
-        "frames": frames,
-        "library_s": library,
-        "states_s": states,
-        "ms": float(milliseconds.mean()),
-        "slowest_ms": float(milliseconds.max()),
-        "mb": stable_mb,
-        "mb_end": _peak_mb(),
-        "step_poses": _step_poses(task, scene),
-    }
+        began = process_time()
+        for _ in tracker.track(observations(frames), np.random.default_rng(0)):
+            pass
+        seconds = process_time() - began
+        return {"ms": 1e3 * seconds / frames, "mb": _peak_mb(), "step_poses": _step_poses(task, scene)}
 
 
 def _step_poses(task: Task, scene: Scene) -> float:
@@ -81,7 +62,7 @@ def _step_poses(task: Task, scene: Scene) -> float:
         lambda: fitted(task.body, contours, (poses, places), poses, weights, CONTINUED_REACHES),
         lambda: frame_costs.full(poses, places),
     )
-    fit, cost = (min(repeat(job, number=1, repeat=20)) for job in jobs)
+    fit, cost = (min(repeat(job, number=1, repeat=20, timer=process_time)) for job in jobs)
     return fit / len(CONTINUED_REACHES) / cost
 
 

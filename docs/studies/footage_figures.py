@@ -11,7 +11,6 @@ What belongs to a film is looked up in the layouts of KTH's actions (Schuldt, La
 of the sets may be passed on, and none was at hand; HumanEva's calibrations are read as its own Matlab code does.
 """
 
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,8 +21,8 @@ import click
 import cv2
 import numpy as np
 
-from posefit.cli.options import EXTRACTION, FRAMES, JSON, options, track_flags
-from posefit.cli.output import Command, progress
+from posefit.cli.options import EXTRACTION, FRAMES, options, track_flags
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
@@ -138,7 +137,7 @@ def filmed_scene(recording: Recording, frames: Range = (None, None), **view: Any
     return replace(scene, name=recording.name), start
 
 
-def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed: int) -> dict[str, Estimates]:
+def estimates_of(scene: Scene, training: Sequence[Motion]) -> dict[str, Estimates]:
     """Return the poses of all frames by the paper's methods, and of a few images each by itself. Sections 5.3, 5.4.
 
     The first yaw of a track is unknown, with restarts, and every yaw of an image; as in the paper no build is fitted
@@ -146,13 +145,13 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     """
     estimates: dict[str, Estimates] = {}
     for name in TRACKED:
-        how = TrackOptions(**options_of(name, training, iterations), seed=seed, smooth=False, body_frames=0)
+        how = TrackOptions(**options_of(name, training, ITERATIONS), smooth=False, body_frames=0)
         track = track_scene(replace(scene, yaw=None), training, completed(how, scene.truth))
         estimates[name] = dict(enumerate(track.frames))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
     images = {k: replace(scene.observations[k], yaw=None) for k in chosen}
-    single = estimate_images(scene, images, training, OURS, iterations, seed)
+    single = estimate_images(scene, images, training, OURS, ITERATIONS, 0)
     return {SINGLE: dict(zip(chosen, single, strict=True)), **estimates}
 
 
@@ -199,11 +198,11 @@ def _square(image: Any, silhouette: Silhouette) -> Image:
     return square
 
 
-def table_of(name: str, film: dict[str, Any]) -> Table:
+def table_of(name: str, figures: dict[str, dict[str, float]]) -> Table:
     """Return what is known of a film's estimates, without a truth."""
     rows = [
         [LABELS[method], *(str(row[key]) for key in ("frames", "usable")), f"{row['iou']:.3f}", f"{row['cost']:.2f}"]
-        for method, row in film["estimates"].items()
+        for method, row in figures.items()
     ]
     return Table(name, ["method", "frames", "usable", "IoU with the mask", "cost (4)"], rows)
 
@@ -211,23 +210,16 @@ def table_of(name: str, film: dict[str, Any]) -> Table:
 @click.command(cls=Command)
 @click.argument("films", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--activity", type=click.Choice(["walk", "run"]), help="What films show whose names do not say it.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all random numbers.")
-@click.option("--iterations", type=click.IntRange(1), default=ITERATIONS, show_default=True, help="T of a search.")
 @CLIPS
-@click.option(
-    "--out", required=True, metavar="DIR", help="New folder for report.json and the pictures of both figures."
-)
-@options((FRAMES, *track_flags("height"), *EXTRACTION, JSON))
+@click.option("--out", required=True, metavar="DIR", help="New folder for the tables and the pictures of both figures.")
+@options((FRAMES, *track_flags("height"), *EXTRACTION))
 def main(
     films: tuple[Path, ...],
     activity: Activity | None,
-    seed: int,
-    iterations: int,
     clips: str | None,
     out: str,
     frames: Range,
     height: float | None,
-    as_json: bool,
     **extraction: Any,
 ) -> None:
     """Figures 8 and 10 of Acta Automatica Sinica 38(5), on real films.
@@ -237,40 +229,24 @@ def main(
     """
     how = {"method": extraction.pop("extraction"), **extraction}
     view = {"height": height, "extraction": Extraction(**{name: how[name] for name in how if how[name] is not None})}
-    rows: dict[str, Any] = {}
     recordings = [recording_of(film) for film in films]
     for recording in recordings:
         if recording.activity is None and activity is None:
             raise InputError(f"--activity must be given for films that do not say it, such as {recording.film}")
     motions = paper_motions(clips, FRAMES_OF_THE_PAPER)
     with new_folder(out) as folder:
-        for recording in progress(iter(recordings), len(recordings), unit="film"):
+        for recording in recordings:
             shows = recording.activity or activity
             scene, first = filmed_scene(recording, frames, **view)
-            estimates = estimates_of(scene, motions[shows].training, iterations, seed)
-            rows[recording.name] = {
-                "activity": shows,
-                "frames": [first, first + scene.count],
-                "camera": scene.placing,
-                "warnings": list(scene.warnings),
-                "estimates": {name: figures_of(each, scene) for name, each in estimates.items()},
-            }
+            estimates = estimates_of(scene, motions[str(shows)].training)
+            table = table_of(recording.name, {name: figures_of(each, scene) for name, each in estimates.items()})
+            (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
+            head = f"{recording.name}: {shows}, frames {first} to {first + scene.count - 1}, camera {scene.placing}"
+            click.echo("\n".join([f"{head}\n\n{table}\n", *scene.warnings]))
             shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
             for figure, each in (("figure-8", single), ("figure-10", estimates)):
                 image = picture(scene, each, shown, first)
                 cv2.imwrite(str(folder / f"{figure}-{recording.name}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 85])
-            table = table_of(recording.name, rows[recording.name])
-            (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
-        report = {"seed": seed, "iterations": iterations, "films": rows}
-        (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    if as_json:
-        click.echo(json.dumps(report))
-        return
-    for name, film in rows.items():
-        first, stop = film["frames"]
-        click.echo(f"{name}: {film['activity']}, frames {first} to {stop - 1}, camera {film['camera']}\n")
-        click.echo("\n".join([f"{table_of(name, film)}\n", *film["warnings"]]))
-    click.echo(f"written to {out}")
 
 
 if __name__ == "__main__":

@@ -9,15 +9,15 @@ conditioning, and in what decides where a descent has ended.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from importlib.util import find_spec
 from typing import Any
 
 import click
 import cv2
 import numpy as np
-from scipy.stats import rankdata
+from scipy.stats import spearmanr
 
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.files import check_new
 from posefit.fitting.box import draw_population
 from posefit.fitting.cma import Strategy, default_population_size
@@ -27,38 +27,26 @@ from posefit.suites.running import run_on
 from posefit_reproduce.jobs import each
 from table import WORKERS, bar, markdown
 
-METHODS = ("random", "cma", "scipy", "pso", "sapso", "annealed")  # scipy: differential evolution
+METHODS = ("cma", "scipy", "pso", "sapso", "annealed")  # scipy: differential evolution
 BUDGETS = (10, 100, 1000, 10_000)  # evaluations for each dimension
+INSTANCES = 8  # of each function
 BBOB = (1, 2, 3, 6, 8, 10, 13, 15, 16, 17, 21, 24)
 POINTS, DESCENTS, LONGEST = 1000, 10, 1000  # random points; descents, and their evaluations for each dimension
-NEAR, STEP, FINE = 0.01, 0.1, 0.001  # half-sides a coordinate: near the optimum; a step; one that may change nothing
+NEAR, STEP = 0.01, 0.1  # half-sides a coordinate: near the optimum; a step
 DESCENT = 0.2  # half-sides a coordinate, of a descent's first step
 ROUNDS, REACH = 8, 2.0 ** np.arange(-4.0, 4.01, 0.5)  # of `conditioning`, and how much an axis may change in one
 WAY = np.linspace(0.0, 1.0, 101)[:, None]
 TILE, WINDOW, ACROSS = 220, 1.3, 3  # pixels of a slice; how far it goes, in distances to the next basin; in a row
 
 Cost = Callable[[Array], Array]
-Shares = dict[str, list[float]]  # of targets, by method, after each budget
-Key = tuple[str, int, int, int]  # suite, function, dimension, instance
-HEADS = {  # of the features, with how they are written
-    "dimension": ("d", "{:.0f}"),
-    "infeasible": ("infeasible", "{:.0%}"),
-    "conditioning": ("conditioning", "{:,.0f}"),
-    "elsewhere": ("end elsewhere", "{:.0%}"),
-    "basins": ("basins", "{:.0f}"),
-    "interaction": ("interaction", "{:.2f}"),
-    "ruggedness": ("ruggedness", "{:.2f}"),
-    "rises": ("rises", "{:.1%}"),
-    "flat": ("flat", "{:.0%}"),
-    "distance": ("distance", "{:.2f}"),
-    "noise": ("noise", "{:.2f}"),
-    "effort": ("to arrive", "{:,.0f} d"),
-}
+Row = Mapping[str, float]  # a function's features
+Key = tuple[int, int]  # function, dimension
+Shares = dict[str, list[float]]  # of targets, or costs, by method, after each budget
 COMPARED = ("conditioning", "elsewhere", "interaction", "ruggedness", "rises", "distance", "noise")
 
 
-def descent(cost: Cost, start: Array, step: float, rng: np.random.Generator) -> tuple[float, Array, int]:
-    """Return the best cost of a CMA-ES without restarts, its point (d,), and the evaluations."""
+def descent(cost: Cost, start: Array, step: float, rng: np.random.Generator) -> tuple[float, Array]:
+    """Return the best cost of a CMA-ES without restarts, and its point (d,)."""
     d = len(start)
     search, least, best, used = Strategy(start, np.full(d, step), default_population_size(d)), np.inf, start, 0
     while used < LONGEST * d and not search.ended():
@@ -68,7 +56,7 @@ def descent(cost: Cost, start: Array, step: float, rng: np.random.Generator) -> 
         used += len(points)
         if costs.min() < least:
             least, best = float(costs.min()), points[costs.argmin()].copy()
-    return least, best, used
+    return least, best
 
 
 def conditioning(cost: Cost, best: Array, level: float, rng: np.random.Generator) -> float:
@@ -104,17 +92,12 @@ def _distance(cost: Cost, best: Array, ways: Array, level: float) -> Array:
     low, high = costs[n, k - 1], costs[n, k]
     part = ((level - low) / np.maximum(high - low, 1e-300)).clip(0.0, 1.0)
     met = REACH[k - 1] + part * (REACH[k] - REACH[k - 1])
-    return np.where(over.any(axis=1), met, np.minimum(REACH[-1], 1.0 / np.abs(ways).max(axis=1)))
-
-
-def correlation(first: Array, second: Array) -> float:
-    """Return the correlation of ranks."""
-    return float(np.corrcoef(rankdata(first), rankdata(second))[0, 1])
+    return np.asarray(np.where(over.any(axis=1), met, np.minimum(REACH[-1], 1.0 / np.abs(ways).max(axis=1))))
 
 
 def features(
     cost: Cost, noise_free: Cost, known: Array, points: Array, rng: np.random.Generator
-) -> tuple[dict[str, float], list[tuple[float, Array]]]:
+) -> tuple[Row, list[tuple[float, Array]]]:
     """Return the features of a function, and the best cost and point of each basin, the optimum's first.
 
     `known` (d,) is the optimum, or a point near it; `points` (n, d) are drawn at random.
@@ -123,7 +106,7 @@ def features(
     costs = cost(points)
     ends = [descent(cost, start, DESCENT, rng) for start in points[:DESCENTS]]
     near = descent(noise_free, known, NEAR, rng)
-    placed = [(float(noise_free(point[None])[0]), point) for point in (known, near[1], *(end[1] for end in ends))]
+    placed = [(float(noise_free(point[None])[0]), point) for point in (known, near[1], *(point for _, point in ends))]
     least, best = min(placed, key=lambda end: end[0])
     off = rng.standard_normal((POINTS, d))
     off *= np.sqrt(d) / np.linalg.norm(off, axis=1, keepdims=True)
@@ -145,38 +128,32 @@ def features(
     again = cost(np.tile(best, (POINTS, 1)))
     way = np.diff(cost((points[:200, None] + WAY * (best - points[:200, None])).reshape(-1, d)).reshape(200, -1))
     return {
-        "dimension": d,
         "conditioning": conditioning(noise_free, best, level, rng),
         "elsewhere": 1.0 - arrived / DESCENTS,
         "basins": len(basins),
         "interaction": float(np.abs(both - one - other).sum() / (np.abs(one) + np.abs(other)).sum()),
-        "ruggedness": 1.0 - correlation(costs, cost(points + STEP * off)),
+        "ruggedness": 1.0 - float(spearmanr(costs, cost(points + STEP * off)).statistic),
         "rises": float(way.clip(0.0).sum() / np.abs(way).sum()),
-        "flat": float((cost(points + FINE * off) == costs).mean()),
-        "distance": correlation(costs, np.linalg.norm(points - best, axis=1)),
-        "evaluations": float(np.mean([used for *_, used in ends])) / d,
+        "distance": float(spearmanr(costs, np.linalg.norm(points - best, axis=1)).statistic),
         "noise": float((again - again[0]).std() / costs.std()),
     }, basins
 
 
-def bbob(number: int, dimension: int, instance: int) -> dict[str, float]:
+def bbob(number: int, dimension: int) -> Row:
     """Return the features of a function of bbob."""
     import ioh
 
-    problem = ioh.get_problem(number, instance=instance, dimension=dimension)
+    problem = ioh.get_problem(number, instance=1, dimension=dimension)
 
     def cost(points: Array) -> Array:
         return np.array([problem(point) for point in 5.0 * points])  # its box is [-5, 5]^d
 
-    rng = np.random.default_rng([instance, number])
+    rng = np.random.default_rng([1, number])
     points = rng.uniform(-1.0, 1.0, (POINTS, dimension))
-    row, _ = features(cost, cost, np.array(problem.optimum.x) / 5.0, points, rng)
-    return {**row, "infeasible": 0.0}
+    return features(cost, cost, np.array(problem.optimum.x, np.float64) / 5.0, points, rng)[0]
 
 
-def measured(
-    number: int, dimension: int, instance: int
-) -> tuple[dict[str, float], Array, dict[str, list[float]], Array]:
+def measured(number: int, instance: int, dimension: int) -> tuple[Row, Array, Shares, Array]:
     """Return a problem's features, its targets, the costs by method after each of the budgets, and a slice.
 
     Each budget is a search of its own, as some methods plan ahead; what has reached the last target is not repeated.
@@ -184,8 +161,7 @@ def measured(
     problem, rng = suite(SUITE, number, instance, dimension), np.random.default_rng([instance, number])
     points, truth = draw_population(problem.space, rng, POINTS), np.array(problem.made.truth)
     row, basins = features(problem.evaluate, problem.noise_free, truth, points, rng)
-    row["infeasible"] = float(1.0 - problem.space.feasible(rng.uniform(-1.0, 1.0, (POINTS, dimension))).mean())
-    reached: dict[str, list[float]] = {name: [] for name in METHODS}
+    reached: Shares = {name: [] for name in METHODS}
     for method, costs in reached.items():
         problem.reset()
         for budget in BUDGETS:
@@ -219,46 +195,37 @@ def sliced(cost: Cost, basins: list[tuple[float, Array]], rng: np.random.Generat
 
 
 def shares_of(targets: Array, reached: Sequence[Mapping[str, Sequence[float]]]) -> Shares:
-    """Return the shares of targets (n, t) by method after each budget, and those of the best of all methods."""
+    """Return the shares of targets (n, t) by method after each budget."""
     costs = {name: np.array([one[name] for one in reached]) for name in METHODS}
-    costs["best of all"] = np.min(list(costs.values()), axis=0)
     return {name: (values[..., None] <= targets[:, None]).mean(axis=(0, 2)).tolist() for name, values in costs.items()}
 
 
-def medians(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the medians of features, the mean share of descents, and the evaluations for each dimension it takes."""
+def medians(rows: Sequence[Row]) -> Row:
+    """Return the medians of features, and the mean share of descents that end elsewhere."""
     row = {name: float(np.median([one[name] for one in rows])) for name in rows[0]}
-    row["elsewhere"] = float(np.mean([one["elsewhere"] for one in rows]))
-    arrived = 1.0 - row["elsewhere"]
-    return {**row, "effort": row["evaluations"] / arrived if arrived else np.inf}
+    return {**row, "elsewhere": float(np.mean([one["elsewhere"] for one in rows]))}
 
 
-def compared(rows: Sequence[Mapping[str, float]]) -> Array:
-    """Return the features (n, f) that functions are compared by, each with a deviation of 1."""
-    values = np.array([[row[name] for name in COMPARED] for row in rows])
+def nearest(rows: Mapping[Key, Row], others: Mapping[Key, Row]) -> Iterator[Key]:
+    """Yield which other of as many dimensions each function is nearest to, by features of a deviation of 1 over all."""
+    values = np.array([[row[name] for name in COMPARED] for row in [*rows.values(), *others.values()]])
     values[:, 0] = np.log(values[:, 0])
-    return np.asarray((values - values.mean(axis=0)) / np.maximum(values.std(axis=0), 1e-9))
+    values = (values - values.mean(axis=0)) / np.maximum(values.std(axis=0), 1e-9)
+    for key, own in zip(rows, values, strict=False):
+        away = zip(others, np.linalg.norm(values[len(rows) :] - own, axis=1), strict=True)
+        yield min((distance, other) for other, distance in away if other[1] == key[1])[1]
 
 
-def nearest(keys: Sequence[Key], rows: Sequence[Mapping[str, float]], suites: Sequence[str]) -> dict[Key, Key]:
-    """Return of each function, or instance, the nearest other of some suites in as many dimensions, if any."""
-    values, neighbours = compared(rows), {}
-    for key, value in zip(keys, values, strict=True):
-        others = [n for n, one in enumerate(keys) if one != key and one[0] in suites and one[2] == key[2]]
-        if others:
-            neighbours[key] = keys[min(others, key=lambda n: float(np.linalg.norm(values[n] - value)))]
-    return neighbours
-
-
-def feature_lines(rows: Mapping[Key, Mapping[str, float]]) -> Iterator[str]:
-    """Yield the table of functions' features."""
-    near = nearest(list(rows), list(rows.values()), ["bbob"])
-    cells = []
-    for key, row in rows.items():
-        name = f"{key[1]} {suite_function(key[1]).name}" if key[0] == SUITE else f"bbob {key[1]}"
-        texts = [form.format(row[feature]).replace("%", " %") for feature, (_, form) in HEADS.items()]
-        cells.append([name, *texts, str(near[key][1]) if key[0] == SUITE and key in near else ""])
-    yield from markdown(["function", *(head for head, _ in HEADS.values()), "nearest of bbob"], cells)
+def feature_lines(rows: Mapping[Key, Row], others: Mapping[Key, Row]) -> Iterator[str]:
+    """Yield the table of functions' features, with the nearest of bbob."""
+    cells = [
+        [
+            f"{number} {suite_function(number).name}",
+            *(f"{row['conditioning']:,.0f}", f"{100.0 * row['elsewhere']:.0f} %", f"{row['basins']:.0f}", str(other)),
+        ]
+        for ((number, _), row), (other, _) in zip(rows.items(), nearest(rows, others), strict=True)
+    ]
+    yield from markdown(["function", "conditioning", "end elsewhere", "basins", "nearest of bbob"], cells)
 
 
 def share_lines(shares: Mapping[int, Shares]) -> Iterator[str]:
@@ -266,48 +233,31 @@ def share_lines(shares: Mapping[int, Shares]) -> Iterator[str]:
     cells = []
     for number, table in shares.items():
         wins = [max(METHODS, key=lambda name: table[name][k]) for k in range(len(BUDGETS))]
-        texts = [" ".join(f"{100.0 * share:.0f}" for share in table[name]) for name in (*METHODS, "best of all")]
+        texts = [" ".join(f"{100.0 * share:.0f}" for share in table[name]) for name in METHODS]
         cells.append([f"{number} {suite_function(number).name}", ", ".join(dict.fromkeys(wins)), *texts])
-    yield from markdown(["function", "leads", *METHODS, "best of all"], cells, 2)
+    yield from markdown(["function", "leads", *METHODS], cells, 2)
 
 
-@click.command(help=__doc__)
-@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
-@click.option("--dimension", type=int, help="Of all functions; by default the lowest of each.")
-@click.option("--instances", type=click.IntRange(1), default=8, show_default=True, help="Of each, held out ones.")
+@click.command(cls=Command, help=__doc__)
 @click.option("--picture", metavar="FILE", help="New .jpg of slices.")
 @WORKERS
-def main(
-    functions: tuple[int, ...], dimension: int | None, instances: int, picture: str | None, workers: int | None
-) -> None:
+def main(picture: str | None, workers: int | None) -> None:
     if picture is not None:
         check_new(picture)
-    chosen = [suite_function(number) for number in functions] or FUNCTIONS
-    sizes = {
-        one.number: dimension or one.dimensions[0]
-        for one in chosen
-        if (dimension or one.dimensions[0]) in one.dimensions
+    sizes = {function.number: function.dimensions[0] for function in FUNCTIONS}
+    problems = {number: [(number, instance) for instance in HELD_OUT[:INSTANCES]] for number in sizes}
+    jobs: dict[Any, Any] = {key: partial(measured, *key, sizes[key[0]]) for keys in problems.values() for key in keys}
+    others = {("bbob", n, d): partial(bbob, n, d) for d in dict.fromkeys(sizes.values()) for n in BBOB}
+    results = each(others | jobs, workers or 1, bar)
+    rows = {(n, d): medians([results[key][0] for key in problems[n]]) for n, d in sizes.items()}
+    click.echo("\n".join([*feature_lines(rows, {key[1:]: results[key] for key in others}), ""]))
+    shares = {
+        number: shares_of(np.array([results[key][1] for key in keys]), [results[key][2] for key in keys])
+        for number, keys in problems.items()
     }
-    if not sizes:
-        raise click.UsageError(f"dimension must be one that a chosen function has, got {dimension}")
-    problems = [(SUITE, number, d, instance) for number, d in sizes.items() for instance in HELD_OUT[:instances]]
-    others = [("bbob", number, d, 1) for d in dict.fromkeys(sizes.values()) for number in BBOB if find_spec("ioh")]
-    jobs: dict[Key, Any] = {key: partial(measured, *key[1:]) for key in problems}
-    results = each(jobs | {key: partial(bbob, *key[1:]) for key in others}, workers or 1, bar)
-    own_features = {key: results[key][0] for key in problems}
-    rows = {(SUITE, n, d, 0): medians([own_features[key] for key in problems if key[1] == n]) for n, d in sizes.items()}
-    click.echo("\n".join(feature_lines(rows | {key: medians([results[key]]) for key in others})))
-    near = nearest(problems, list(own_features.values()), [SUITE])
-    own = {number: sum(key[1] == number == other[1] for key, other in near.items()) for number in sizes}
-    texts = [f"{count} of function {number}" for number, count in own.items()]
-    click.echo(f"\nInstances nearest to one of their own function, of {instances} each: {', '.join(texts)}")
-    shares = {}
-    for number in sizes:
-        mine = [results[key] for key in problems if key[1] == number]
-        shares[number] = shares_of(np.array([one[1] for one in mine]), [one[2] for one in mine])
     click.echo("\n".join(share_lines(shares)))
     if picture is not None:
-        tiles = [results[SUITE, number, d, HELD_OUT[0]][-1] for number, d in sizes.items()]
+        tiles = [results[keys[0]][-1] for keys in problems.values()]
         tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % ACROSS)
         whole = np.vstack([np.hstack(tiles[k : k + ACROSS]) for k in range(0, len(tiles), ACROSS)])
         cv2.imwrite(picture, whole, [cv2.IMWRITE_JPEG_QUALITY, 85])

@@ -9,15 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import click
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from clips import FOUR, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
-from people import CHANGES
+from clips import CHANGES, FOUR, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
@@ -25,16 +24,13 @@ from posefit.evaluation.errors import LOST
 from posefit.files import new_file
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.tracker import Observation
-from posefit.reading import parsed_json, read_text
 from posefit.silhouette.corruption import shadow, wandering
 from posefit.silhouette.mask import Mask, Silhouette
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.uncertainty.modes import mirrored_gain
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
-from posefit_reproduce.jobs import Progress, each
-from scores import auroc, calibration_error, false_alarms, kept_errors
-from table import WORKERS, bar, markdown, percent
+from table import WORKERS, markdown, measured, percent
 
 RNG_STREAM = 2026  # part of every seed
 LASTING = 10  # frames of a lasting error: a third of a second
@@ -274,46 +270,11 @@ def _logistic(name: str, known: Array, truth: Flags, signs: Sequence[str]) -> di
     return {"weights": named, "bias": round(bias, DIGITS)}
 
 
-MAX_BYTES = 200_000_000  # of a file of rows
+RECALL = 0.95  # of lost frames, at which false alarms are counted
 
 
-def lost(
-    store: str | None,
-    workers: int | None,
-    rows: str | None,
-    out: str | None,
-    progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Return how well lost frames and exchanged sides are detected, of people in neither models nor library.
-
-    `out` is a new file for a row a track, and `rows` such a file, from which the models are fitted without tracking
-    again. `store` is a new file for the models fitted to all rows, for `exemplars` to read.
-    """
-    if rows is not None and out is not None:
-        raise InputError("out must be given for new tracks, got --out with --rows")
-    with new_file(out) if out else nullcontext() as file, new_file(store) if store else nullcontext() as stored:
-        tracks = (
-            [parsed_json(line) for line in read_text(rows, MAX_BYTES).splitlines()]
-            if rows is not None
-            else _rows(cases(), workers, progress)
-        )
-        if file is not None:
-            file.write_text("".join(f"{json.dumps(row)}\n" for row in tracks), encoding="utf-8")
-        predictions, model = judge(tracks), fit(tracks)
-        if stored is not None:
-            stored.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
-    tables = lost_tables(tracks, [row.lost for row in predictions]) | {"sides": sides_table(tracks, predictions)}
-    return {"tracks": len(tracks), "model": model} | tables
-
-
-def _rows(tracks: Sequence[Case], workers: int | None, progress: Progress | None) -> list[dict[str, Any]]:
-    # all cells are made, and so checked, before any runs
-    cells = {track: cell_of(track.spec) for track in tracks}
-    return list(each({track: partial(_row, cell, track) for track, cell in cells.items()}, workers, progress).values())
-
-
-def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
-    """Return the row of a track: its frames' errors, costs, and evidence where the tracker has it."""
+def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:
+    """Return the row of a track: its frames' errors, and the evidence that the tracker has."""
     scene = cell_scene(cell)
     if track.condition == MASKS:
         seed = [track.clip.instance, *track.clip.name.encode()]
@@ -321,7 +282,8 @@ def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
     result = track_of(cell, scene)
     assert result.truth is not None
     gains = 1e3 * mirrored_gain(result.truth.joints, result.motion.joints)
-    row = {
+    evidence = [frame.details["evidence"] for frame in result.frames]
+    return {
         "subject": track.clip.subject,
         "group": track.group,
         "clip": track.clip.name,
@@ -330,146 +292,77 @@ def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
         "fps": scene.fps,
         "mpjpe_mm": result.table["mpjpe_mm"].round(2).tolist(),
         "mirrored_gain_mm": [round(gain, 1) for gain in gains.tolist()],
-        "cost": result.table["cost"].round(DIGITS).tolist(),
-    }
-    evidence = [frame.details.get("evidence", {}) for frame in result.frames]
-    if all(evidence):
-        row["evidence"] = [{name: round(value, DIGITS) for name, value in values.items()} for values in evidence]
-    return row
-
-
-T = TypeVar("T")
-
-RECALLS = (0.9, 0.95)
-SHARES = (0.25, 0.5, 0.75, 0.9, 1.0)  # of the frames with the least probabilities
-NEAR_MM = (100.0, 200.0)  # frames in between are neither clearly lost nor clearly not
-
-
-def lost_tables(rows: Sequence[Row], scores: Sequence[Array]) -> dict[str, Any]:
-    """Return the tables of rows whose frames have scores (T,): probabilities, or figures that grow with them."""
-    every = list(zip(rows, scores, strict=True))
-    return {
-        "frames": sum(map(len, scores)),
-        "lost": [_figures(name, part) for name, part in _parted(every)],
-        "kept": {
-            f"{share:g}": float(error)
-            for share, error in zip(SHARES, kept_errors(_errors(rows), np.concatenate(scores), SHARES), strict=True)
-        },
+        "evidence": [{name: round(value, DIGITS) for name, value in values.items()} for values in evidence],
     }
 
 
-def _parted(every: Sequence[tuple[Row, T]]) -> Iterator[tuple[str, list[tuple[Row, T]]]]:
-    """Yield all rows with their predictions, then those of each group, number of views and condition, by name."""
-    yield "all", list(every)
-    for part in (_group, _cameras, _condition):
-        for name in dict.fromkeys(part(row) for row, _ in every):
-            yield name, [pair for pair in every if part(pair[0]) == name]
+def key_of(row: Row) -> tuple[Any, ...]:
+    """Return what a row is found by."""
+    return row["group"], row["clip"], tuple(row["views_degrees"]), row["condition"]
 
 
-def _group(row: Row) -> str:
-    return str(row["group"])
-
-
-def _cameras(row: Row) -> str:
+def cameras(row: Row) -> str:
+    """Return by how many cameras a row is."""
     count = len(row["views_degrees"])
     return f"{count} camera{'s' * (count > 1)}"
 
 
-def _condition(row: Row) -> str:
-    return str(row["condition"])
+def line_of(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Iterator[str]:
+    """Yield how well swapped sides and lost frames of rows are noticed."""
+    swapped, lost = swapped_frames(rows), lost_frames(rows)
+    lost_by, exchanged, unknown = (np.concatenate(parts) for parts in zip(*predictions, strict=True))
+    yield from (percent(swapped.mean()), auroc(exchanged, swapped))
+    yield from (percent(unknown.mean()), share(swapped, ~unknown))
+    yield from (percent(lost.mean()), auroc(lost_by, lost))
+    yield from (share(lost_by >= LOST, lost), share(lost_by >= LOST, ~lost))
 
 
-def _figures(name: str, pairs: Sequence[tuple[Row, Array]]) -> dict[str, Any]:
-    rows, scores = [row for row, _ in pairs], np.concatenate([values for _, values in pairs])
-    lost, errors = lost_frames(rows), _errors(rows)
-    clear = (errors < NEAR_MM[0]) | (errors > NEAR_MM[1])
-    probable = bool(scores.min() >= 0.0 and scores.max() <= 1.0)
-    reported = scores >= LOST
-    return {
-        "name": name,
-        "tracks": len(rows),
-        "frames": len(lost),
-        "lost_rate": float(lost.mean()),
-        "auroc": auroc(scores, lost),
-        "auroc_clear": auroc(scores[clear], lost[clear]) if clear.any() else None,
-        **{f"false_alarms_{100 * recall:.0f}": false_alarms(scores, lost, recall) for recall in RECALLS},
-        "reported_recall": float(reported[lost].mean()) if probable and lost.any() else None,
-        "reported_false_alarms": float(reported[~lost].mean()) if probable and not lost.all() else None,
-        "calibration_error": calibration_error(scores, lost) if probable else None,
-    }
+def share(flags: Flags, of: Flags) -> str:
+    """Return the percentage of some frames that have a flag; a dash without any."""
+    return percent(float(flags[of].mean()) if of.any() else None)
 
 
-def _errors(rows: Sequence[Row]) -> Array:
-    return np.concatenate([np.array(row["mpjpe_mm"]) for row in rows])
+def auroc(scores: Array, positive: Flags) -> str:
+    """Return how often a positive has a higher score than a negative, ties a half; a dash without both."""
+    from sklearn.metrics import roc_auc_score
+
+    return "-" if positive.all() or not positive.any() else f"{roc_auc_score(positive, scores):.3f}"
 
 
-def sides_table(rows: Sequence[Row], predictions: Sequence[Predictions]) -> list[dict[str, Any]]:
-    """Return how often sides are exchanged, called unknown, and both, of all rows and of parts of them."""
+def lost_lines(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Iterator[str]:
+    """Yield the printed table, and the error of the least doubted frames."""
+    from sklearn.metrics import roc_curve
+
     every = list(zip(rows, predictions, strict=True))
-    return [_sides_figures(name, part) for name, part in _parted(every)]
-
-
-def _sides_figures(name: str, pairs: Sequence[tuple[Row, Predictions]]) -> dict[str, Any]:
-    swapped = swapped_frames([row for row, _ in pairs])
-    exchanged, unknown = (np.concatenate([getattr(row, key) for _, row in pairs]) for key in ("exchanged", "unknown"))
-
-    def share(flags: Any, of: Any) -> float | None:
-        return float(flags[of].mean()) if of.any() else None
-
-    return {
-        "name": name,
-        "tracks": len(pairs),
-        "frames": len(swapped),
-        "swapped": float(swapped.mean()),
-        "auroc": auroc(exchanged, swapped),
-        "calibration_error": calibration_error(exchanged, swapped),
-        "unknown": float(unknown.mean()),
-        "unknown_right": share(unknown, ~swapped),
-        "swapped_unknown": share(swapped, unknown),
-        "swapped_known": share(swapped, ~unknown),
-    }
-
-
-def lost_lines(tables: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the printed tables."""
-    heads = ["tracks", "frames", "lost %", "AUROC", "AUROC, clear cases"]
-    heads += [f"false alarms at {100 * recall:.0f} % recall, %" for recall in RECALLS]
-    heads += ["called lost: recall %", "false alarms %", "calibration error"]
-    table = []
-    for part in tables["lost"]:
-        shares = [part[f"false_alarms_{100 * recall:.0f}"] for recall in RECALLS]
-        shares += [part["reported_recall"], part["reported_false_alarms"]]
-        cells = [part["name"], str(part["tracks"]), str(part["frames"]), percent(part["lost_rate"])]
-        cells += [_number(part["auroc"]), _number(part["auroc_clear"]), *map(percent, shares)]
-        table.append([*cells, _number(part["calibration_error"])])
-    yield from markdown(["", *heads], table)
-    yield ""
-    kept = (f"{100 * float(share):g} % kept {error:.0f} mm" for share, error in tables["kept"].items())
-    yield f"mean MPJPE, least probably lost frames first: {', '.join(kept)}"
-    yield ""
-    heads = ["tracks", "frames", "swapped %", "AUROC", "calibration error", "unknown %", "unknown of right ones %"]
-    heads += ["swapped of unknown ones %", "swapped of known ones %"]
-    table = []
-    for part in tables["sides"]:
-        cells = [part["name"], str(part["tracks"]), str(part["frames"]), percent(part["swapped"])]
-        cells += [_number(part["auroc"]), _number(part["calibration_error"])]
-        shares = [part[key] for key in ("unknown", "unknown_right", "swapped_unknown", "swapped_known")]
-        table.append([*cells, *map(percent, shares)])
-    yield from markdown(["", *heads], table)
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
+    parts = {"all": every}
+    for kind in (lambda row: row["group"], cameras):
+        for name in dict.fromkeys(map(kind, rows)):
+            parts[name] = [(row, predicted) for row, predicted in every if kind(row) == name]
+    heads = ["swapped %", "AUROC", "unknown %", "swapped of known ones %"]
+    heads += ["lost %", "AUROC", "called lost: recall %", "false alarms %"]
+    yield from markdown(["", *heads], [[name, *line_of(*zip(*part, strict=True))] for name, part in parts.items()])
+    errors, lost = np.concatenate([row["mpjpe_mm"] for row in rows]), lost_frames(rows)
+    probable = np.concatenate([prediction.lost for prediction in predictions])
+    alarms, recalls, _ = roc_curve(lost, probable, drop_intermediate=False)
+    half = errors[np.argsort(probable, kind="stable")[: len(errors) // 2]]
+    needed = percent(alarms[np.searchsorted(recalls, RECALL)])
+    yield f"\nto recall {percent(RECALL, 0)} % of the lost frames takes {needed} % false alarms"
+    yield f"the least doubted half of the frames is {half.mean():.0f} mm off, all are {errors.mean():.0f}"
 
 
 @click.command(cls=Command, help=__doc__)
+@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
 @click.option("--store", metavar="FILE.json", help="New file for the fitted models, for exemplars to read.")
-@click.option("--rows", metavar="FILE", help="Fit to rows of --out, without tracking.")
-@click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")
 @WORKERS
-def main(**arguments: Any) -> None:
-    for line in lost_lines(lost(**arguments, progress=bar)):
-        click.echo(line)
+def main(rows: str | None, store: str | None, workers: int | None) -> None:
+    with new_file(store) if store else nullcontext() as stored:
+        cells = [(track, cell_of(track.spec)) for track in cases()]  # all are made, and so checked, before any runs
+        jobs = {(track.group, track.clip.name, *track[2:]): partial(row_of, cell, track) for track, cell in cells}
+        tracks = [*measured(jobs, rows, key_of, workers).values()]
+        for line in lost_lines(tracks, judge(tracks)):
+            click.echo(line)
+        if stored is not None:
+            stored.write_text(json.dumps(fit(tracks), indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

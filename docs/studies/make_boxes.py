@@ -6,7 +6,9 @@ The file of a suite is never replaced: its numbers would change. This documents 
 """
 
 from pathlib import Path
+from typing import Any
 
+import click
 import numpy as np
 
 from posefit.arrays import Array
@@ -52,6 +54,7 @@ def upright_poses(subjects: tuple[str, ...]) -> Array:
     return wrapped(np.concatenate([poses, mirrored_poses(built_in.average_skeleton(), poses)]))
 
 
+@click.command()
 def main() -> None:
     """Write the file."""
     groups = {
@@ -59,10 +62,9 @@ def main() -> None:
         for name in (*TRAINING_PEOPLE, HELD_OUT_GROUP)
     }
     learned = [learned_from(upright_poses(people)) for people in groups.values()]
-    arrays = {name: np.stack([group[name] for group in learned]) for name in learned[0]}
-    np.savez_compressed(
-        Path(__file__).parents[2] / "posefit" / "suites" / "boxes.npz", names=np.array(list(groups)), **arrays
-    )  # type: ignore[arg-type]
+    arrays: dict[str, Any] = {name: np.stack([group[name] for group in learned]) for name in learned[0]}
+    path = Path(__file__).parents[2] / "posefit" / "suites" / "boxes.npz"
+    np.savez_compressed(path, names=np.array(list(groups)), **arrays)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ Two cameras see the silhouettes of somebody whom the library has never seen; the
 """
 
 import sys
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,7 +21,7 @@ FRAMES, RATE, COLOURS = 60, 15, 64
 DISTANCE = 4.6  # metres between the body and the camera that goes round it
 
 
-def stage(body: posefit.Body, pose: Array, place: Array, azimuth: float) -> Array:
+def stage(body: posefit.Body, pose: Array, place: Array, azimuth: float) -> Any:
     """Return a picture (STAGE, STAGE, 3) of a body on the ground, its shadow below it."""
     image = np.full((STAGE, STAGE, 3), BACKGROUND, np.uint8)
     middle = np.array([place[0], 0.9, place[2]])
@@ -44,7 +45,7 @@ def main(out: str) -> None:
     print(track)
     pictures = []
     for k, (pose, place) in enumerate(zip(track.motion.poses, track.motion.translations, strict=True)):
-        masks = []
+        masks = list[Any]()
         for view, silhouette in enumerate(track.scene.observations[k].silhouettes):
             seen = np.full((*silhouette.mask.shape, 3), BACKGROUND, np.uint8)
             seen[silhouette.mask] = SILHOUETTE

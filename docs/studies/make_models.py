@@ -2,8 +2,8 @@
 
 Ridge regression of how the quaternions go on to the next frame, "zero" as the patent writes it and "identity" as ours;
 what is stored are its coefficients, the covariance of what it leaves, means of similar poses and a hundred captured
-ones; `--ridge-lambda` and `--out` make others. Every clip is also used mirrored. Printed, and stored beside each model,
-are its errors one and ten frames ahead on clips that were not used, against standing still.
+ones. Every clip is also used mirrored. Printed, and stored beside each model, are its errors one and ten frames ahead
+on clips that were not used, against standing still.
 """
 
 import json
@@ -19,8 +19,8 @@ from sklearn.covariance import LedoitWolf
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
+from posefit.geometry.skeleton import MIRROR
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
@@ -154,7 +154,7 @@ def dependent(clips: list[Recorded]) -> dict[str, Any]:
     for clip in clips:
         for states, angles in (
             (clip.states, clip.angles),
-            (mirrored_states(clip.states), mirrored_angles(clip.angles)),
+            (mirrored_states(clip.states), mirrored_poses(built_in.average_skeleton(), clip.angles)),
         ):
             quaternions = states[::4, 7:].reshape(-1, 4)
             inputs.append(Rotation.from_quat(quaternions, scalar_first=True).as_rotvec().reshape(-1, 3 * len(BONES)))
@@ -164,17 +164,6 @@ def dependent(clips: list[Recorded]) -> dict[str, Any]:
     normal = (x - middle).T @ (x - middle) + 0.05 * len(x) * np.eye(x.shape[1])
     matrix = np.linalg.solve(normal, (x - middle).T @ (y - mean)).T
     return {"matrix": rounded(matrix), "offset": rounded(mean - matrix @ middle)}
-
-
-def mirrored_angles(poses: Array) -> Array:
-    """Return the poses (n, 66) of the mirror image, left for right."""
-    flip = np.diag([-1.0, 1.0, 1.0])
-    other = np.zeros((len(poses), ANGLES))
-    for joint in INNER:
-        here, there = angle_index(joint), angle_index(MIRROR[joint])
-        turned = flip @ rotation_from_joint_angles(poses[:, there : there + 3]) @ flip
-        other[:, here : here + 3] = joint_angles_from_rotation(turned)
-    return other
 
 
 def rounded(values: Array) -> Any:
@@ -200,9 +189,7 @@ def normalised_ridge(before: Array, after: Array, target: Array, weight: float) 
 
 @click.command(cls=Command)
 @click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
-@click.option("--ridge-lambda", type=float, default=LAMBDA, show_default=True, help="Weight of |F|^2, above 0.")
-@click.option("--out", type=click.Path(path_type=Path), help="Another file than the package's models.json.")
-def main(root: Path, ridge_lambda: float, out: Path | None) -> None:
+def main(root: Path) -> None:
     """Write models.json beside the models. Raises ValueError where a clip it needs is missing."""
     stored: dict[str, Any] = {}
     every: list[Recorded] = []
@@ -221,8 +208,8 @@ def main(root: Path, ridge_lambda: float, out: Path | None) -> None:
         found: dict[str, Any] = {}
         report: dict[str, float] = {}
         captured = before[np.linspace(0, len(before) - 1, CAPTURED).astype(np.int64), 3:]
-        literal = ridge(before[:, 3:], after, ridge_lambda) - identity, np.zeros(STATE)
-        ours = normalised_ridge(before, after, -FADING * identity, ridge_lambda)
+        literal = ridge(before[:, 3:], after) - identity, np.zeros(STATE)
+        ours = normalised_ridge(before, after, -FADING * identity, LAMBDA)
         for shrink, (matrix, offset) in (("identity", ours), ("zero", literal)):
             model = MotionModels(
                 (name,), matrix[None], offset[None], np.eye(ERROR)[None], typicals[None], captured[None]
@@ -234,7 +221,7 @@ def main(root: Path, ridge_lambda: float, out: Path | None) -> None:
                 report |= {f"{shrink}_{frames}": round(error, 2), f"still_{frames}": round(still, 2)}
         print(name, len(before), report)
         stored[name] = {**found, "poses": rounded(typicals), "captured": captured.round(3).tolist(), "report": report}
-    target_file = out or Path(models.__file__).with_name("models.json")
+    target_file = Path(models.__file__).with_name("models.json")
     text = json.dumps({"origin": ORIGIN, "models": stored, "dependent_joints": dependent(every)}, separators=(",", ":"))
     target_file.write_text(text + "\n", encoding="utf-8")
     print(f"{target_file.name}: {len(text)} bytes")

@@ -3,8 +3,9 @@
 A row is a clip of each group of `people.py`, from 45 degrees: the best frame, four of the film, and the worst.
 """
 
-import sys
+from typing import Any
 
+import click
 import cv2
 import numpy as np
 
@@ -37,21 +38,25 @@ def strip(clip: Clip) -> Array:
         draw_body(drawn, scene.body, scene.cameras[0], track.motion.poses[k], track.motion.translations[k])
         drawn = cv2.addWeighted(drawn, SOLID, seen, 1.0 - SOLID, 0.0)
         rows, columns = np.nonzero(mask)
-        side = int(1.25 * max(np.ptp(rows), np.ptp(columns), 40))
+        side = int(1.25 * max(int(np.ptp(rows)), int(np.ptp(columns)), 40))
         corner = np.array([np.mean([rows.min(), rows.max()]), np.mean([columns.min(), columns.max()])]).astype(int)
         padded = cv2.copyMakeBorder(drawn, side, side, side, side, cv2.BORDER_CONSTANT, value=BACKGROUND)
         top, left = corner + side - side // 2
-        still = cv2.resize(padded[top : top + side, left : left + side], (SIDE, SIDE), interpolation=cv2.INTER_CUBIC)
+        still: Any = cv2.resize(
+            padded[top : top + side, left : left + side], (SIDE, SIDE), interpolation=cv2.INTER_CUBIC
+        )
         write(still, f"{name}, {errors[k]:.0f} mm", (8, SIDE - 10), TEXT, 0.45)
         stills.append(still)
     write(stills[0], f"{clip.name} {clip.shows.partition(',')[0]}", (8, 18), TEXT, 0.45)
     return np.hstack(stills)
 
 
+@click.command()
+@click.argument("out")
 def main(out: str) -> None:
     """Track a clip of each group, and draw it."""
     cv2.imwrite(out, np.vstack([strip(clips[0]) for clips in GROUPS.values()]), [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()

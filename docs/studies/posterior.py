@@ -1,23 +1,24 @@
 """Calibration of intervals and modes for people who are not in the library.
 
 One person at a time is left out of library and fit.
+
+The libraries crepes and MAPIE treat every error as an independent draw. Here the clip is the exchangeable unit, as the
+errors of its frames are correlated.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 import numpy as np
 from numpy.typing import NDArray
 
+from clips import CHANGES, METHOD, PAIRS, SIDES, Clip, Views, cell_fields, track_of
 from clips import GROUPS as CLIPS
-from clips import METHOD, PAIRS, SIDES, Clip, Views, cell_fields, track_of
-from people import CHANGES
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
@@ -27,14 +28,13 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, joint_distances
 from posefit.motion import recorded
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
-from posefit.uncertainty.calibration import LEVELS, Recalibration, reliability
+from posefit.uncertainty.calibration import LEVELS, Recalibration
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
-from posefit.uncertainty.modes import APART, Posterior, modes_of, nearer_mirrored, poses_apart, second_side
+from posefit.uncertainty.modes import APART, Posterior, modes_of, poses_apart
 from posefit_exemplars.calibration import Calibration, evidence, none_features
 from posefit_exemplars.tracker import POSTERIOR_TEMPERATURE
-from posefit_reproduce.jobs import Progress, each
-from scores import auroc, calibration_error, conformal_factor
-from table import WORKERS, bar, markdown
+from posefit_reproduce.jobs import each
+from table import WORKERS, bar, markdown, percent
 
 FRAMES = 50
 DANCES, EVERYDAY = "dances", "everyday"
@@ -129,8 +129,8 @@ class Samples:
         return Posterior(self.drawn[k], np.zeros((len(self.weights[k]), 3)), self.weights[k], coherent=True)
 
 
-def sampled(case: Case) -> dict[str, Array]:
-    """Return the arrays of `Samples` of the track of a clip by a library without its person."""
+def sampled(case: Case) -> Samples:
+    """Return the track of a clip by a library without its person."""
     cell = cell_of(case.spec)
     track = track_of(cell, cell_scene(cell))
     assert track.truth is not None
@@ -142,37 +142,7 @@ def sampled(case: Case) -> dict[str, Array]:
         assert frame is not None
         drawn[k, : len(frame)], weights[k, : len(frame)] = frame.poses, frame.weights
     costs = np.array([frame.cost for frame in track.frames])
-    return dict(zip(ARRAYS, (track.truth.poses, track.motion.poses, drawn, weights, costs), strict=True))
-
-
-ARRAYS = ("truth", "reported", "drawn", "weights", "costs")
-
-
-def save_tracks(tracks: Sequence[Samples], path: Path) -> None:
-    """Write tracks to a file .npz: angles in single precision, those of samples in half."""
-    arrays: dict[str, Any] = {}
-    for k, track in enumerate(tracks):
-        arrays |= {f"{k}.{name}": getattr(track, name).astype(np.float32) for name in ARRAYS}
-        arrays[f"{k}.drawn"] = track.drawn.astype(np.float16)
-    arrays["cases"] = np.array(json.dumps([track.case for track in tracks]))  # tuples become lists
-    with path.open("wb") as file:
-        np.savez_compressed(file, **arrays)
-
-
-def load_tracks(path: str) -> list[Samples]:
-    """Return the tracks of a file that `save_tracks` wrote. Raises ValueError where it is none."""
-    try:
-        with np.load(path) as stored:
-            cases = [
-                Case(group, Clip(*clip), tuple(views), *rest)
-                for group, clip, views, *rest in json.loads(str(stored["cases"]))
-            ]
-            return [
-                Samples(case, **{name: stored[f"{k}.{name}"].astype(np.float64) for name in ARRAYS})
-                for k, case in enumerate(cases)
-            ]
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: expected tracks that --out wrote, got {error}") from None
+    return Samples(case, track.truth.poses, track.motion.poses, drawn, weights, costs)
 
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -203,8 +173,6 @@ class TrackFeatures:
     track: Samples
     evidence: Array = field(repr=False)  # (T, 4)
     error: Array = field(repr=False)  # (T,) metres, the mean over joints
-    swapped: NDArray[np.bool_] = field(repr=False)  # (T,)
-    second: Array = field(repr=False)  # (T,) weight of the second side
     modes: list[Array] = field(repr=False)  # weights of each frame's modes, the heaviest first
     nearest: Array = field(repr=False)  # (T, 2) the mode nearest to the truth, and its distance, metres
 
@@ -215,15 +183,13 @@ class TrackFeatures:
         posteriors = [track.posterior(k) for k in range(len(track))]
         frames = list(zip(posteriors, track.reported, track.costs, strict=True))
         signs = np.array([evidence(skeleton, posterior, pose, cost, cameras) for posterior, pose, cost in frames])
-        swapped = nearer_mirrored(skeleton.joints(track.truth), skeleton.joints(track.reported))
-        second = np.array([second_side(skeleton, posterior, pose) for posterior, pose, _ in frames])
         modes, nearest = [], []
         for posterior, truth in zip(posteriors, track.truth, strict=True):
             of_frame = modes_of(skeleton, posterior)
             distances = poses_apart(skeleton, np.array([mode.pose for mode in of_frame]), truth[None])[:, 0]
             modes.append(np.array([mode.weight for mode in of_frame]))
             nearest.append((distances.argmin(), distances.min()))
-        return cls(track, signs, track.off[:, 1:].mean(axis=1), swapped, second, modes, np.array(nearest))
+        return cls(track, signs, track.off[:, 1:].mean(axis=1), modes, np.array(nearest))
 
 
 def calibration_of(tracks: Sequence[TrackFeatures]) -> Calibration:
@@ -326,19 +292,36 @@ def _factors(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> tuple
     return factors[0], factors[1]
 
 
+def conformal_factor(scores: Sequence[Array], level: float) -> float:
+    """Return the factor at which radii hold a share `level` of the errors in a new clip.
+
+    `scores` has an array for each of n clips: distances over radii. Every clip counts the same, however long it is, and
+    the new one as infinitely far off: the factor is the least at which the mean over n + 1 clips of the share within it
+    is at least the level. Raises ValueError where there are too few clips for that. R. Dunn, L. Wasserman, A. Ramdas,
+    Distribution-free prediction sets for two-layer hierarchical models, 2023: the pooled CDF.
+    """
+    if not scores or any(not len(clip) for clip in scores):
+        raise InputError("scores must be of one clip or more, each with one score or more")
+    if not 0.0 < level < 1.0:
+        raise InputError(f"level must be between 0 and 1, got {level}")
+    clips = len(scores)
+    if level > clips / (clips + 1):
+        raise InputError(
+            f"clips must be at least {int(np.ceil(level / (1.0 - level) - 1e-9))} for a level of {level}, got {clips}"
+        )
+    values = np.concatenate([np.asarray(clip, dtype=np.float64) for clip in scores])
+    weights = np.concatenate([np.full(len(clip), 1.0 / (len(clip) * (clips + 1))) for clip in scores])
+    order = np.argsort(values, kind="stable")
+    reached = np.cumsum(weights[order])  # the pooled CDF
+    return float(values[order][min(int(np.searchsorted(reached, level - 1e-12)), len(values) - 1)])
+
+
 def scores(calibration: Calibration, features: TrackFeatures, every: int = 1) -> tuple[Array, Array]:
     """Return the errors of joints (T, levels, 27) and angles (T, levels, 66), in radii of their intervals."""
     track = features.track
     turned = np.abs(wrapped(track.truth - track.reported))[::every, None]
     radii, halves = radii_of(calibration, features, every)
     return track.off[::every, None] / np.maximum(radii, TINY), turned / np.maximum(halves, TINY)
-
-
-def radii_and_angles_inside(calibration: Calibration, features: TrackFeatures) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the radii of joints (T, levels, 27), metres, and whether angles (T, levels, 66) are in their intervals."""
-    radii, halves = radii_of(calibration, features)
-    track = features.track
-    return radii, np.abs(wrapped(track.truth - track.reported))[:, None] <= halves
 
 
 def radii_of(calibration: Calibration, features: TrackFeatures, every: int = 1) -> tuple[Array, Array]:
@@ -366,45 +349,16 @@ def logistic(design: Array, truth: NDArray[np.bool_], weights: Array) -> Array:
 MIN_PEOPLE = 3  # of which one is left out at a time
 
 
-def posterior(
-    again: str | None,
-    out: str | None,
-    store: str | None,
-    workers: int | None,
-    progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Return the calibration of intervals and modes on people left out of library and fit.
-
-    `again` is a file of tracks that an earlier `out` wrote, instead of tracking. `out` is a new file .npz for the
-    frames of all tracks, `store` a new one .json for the calibration fitted to all people.
-    """
-    if again is not None and out:
-        raise InputError(f"again must not be given beside --out, got --again {again}")
-    with ExitStack() as stack:
-        file, table = (stack.enter_context(new_file(path)) if path else None for path in (out, store))
-        if again is not None:
-            tracks = load_tracks(again)
-        else:
-            arrays = each({case: partial(sampled, case) for case in planned_tracks()}, workers, progress)
-            tracks = [Samples(case, **some) for case, some in arrays.items()]
-            if file is not None:
-                save_tracks(tracks, file)
-        sampling = [TrackFeatures.of(track) for track in tracks]
-        people = list(dict.fromkeys(map(_person, sampling)))
-        if len(people) < MIN_PEOPLE:
-            raise InputError(f"tracks must be of {MIN_PEOPLE} people or more, got {len(people)}")
-        evaluations = []
-        for person in people:
-            calibration = calibration_of([features for features in sampling if _person(features) != person])
-            evaluations += [evaluated(calibration, features) for features in sampling if _person(features) == person]
-        if table is not None:
-            fitted = {"temperature": POSTERIOR_TEMPERATURE, **_rounded(vars(calibration_of(sampling)))}
-            table.write_text(json.dumps(fitted) + "\n", encoding="utf-8")
-    left_out = [evaluation.features for evaluation in evaluations]
-    return {
-        "coverage": coverages(evaluations),
-        "modes": {"recalibrated": best_modes(left_out, evaluations), "as drawn": best_modes(sampling)},
-    }
+def judged(tracks: Sequence[TrackFeatures]) -> list["Evaluation"]:
+    """Return the evaluation of each track by a calibration that was fitted to other people."""
+    people = list(dict.fromkeys(map(_person, tracks)))
+    if len(people) < MIN_PEOPLE:
+        raise InputError(f"tracks must be of {MIN_PEOPLE} people or more, got {len(people)}")
+    evaluations = []
+    for person in people:
+        calibration = calibration_of([features for features in tracks if _person(features) != person])
+        evaluations += [evaluated(calibration, features) for features in tracks if _person(features) == person]
+    return evaluations
 
 
 def _person(features: TrackFeatures) -> str:
@@ -426,112 +380,62 @@ class Evaluation:
 def evaluated(calibration: Calibration, features: TrackFeatures) -> Evaluation:
     """Return the evaluation of a track by a calibration."""
     none = np.array([calibration.recalibration(calibration.log(signs)).none for signs in features.evidence])
-    radii, angles = radii_and_angles_inside(calibration, features)
-    inside = features.track.off[:, None] <= radii
+    track = features.track
+    radii, halves = radii_of(calibration, features)
+    inside, angles = track.off[:, None] <= radii, np.abs(wrapped(track.truth - track.reported))[:, None] <= halves
     return Evaluation(features, calibration.sharpness, none, inside, radii, angles.mean(axis=(0, 2)))
 
 
-def coverages(tracks: Sequence[Evaluation]) -> dict[str, Any]:
-    """Return the coverage of left-out people: overall, by group of joints, by view and by kind of motion."""
-
-    def figures(some: Sequence[Evaluation], joints: Any = slice(1, None)) -> dict[str, Any]:
-        weights = frame_weights([track.features for track in some])
-        inside, radii = (
-            weights @ np.concatenate([getattr(track, name)[:, :, joints].mean(axis=2) for track in some])
-            for name in ("inside", "radii")
-        )
-        radius = np.concatenate([track.radii[:, 1, joints].mean(axis=1) for track in some])
-        return {
-            "tracks": len(some),
-            "coverage": {f"{100 * level:.0f}": float(inside[k]) for k, level in enumerate(LEVELS)},
-            "radius_mm": {f"{100 * level:.0f}": float(1e3 * radii[k]) for k, level in enumerate(LEVELS)},
-            "median_radius_mm": float(1e3 * np.median(radius)),
-        }
-
-    def by(label: Callable[[Case], str]) -> dict[str, Any]:
-        labels = [label(track.features.track.case) for track in tracks]
-        groups = {name: [track for track, own in zip(tracks, labels, strict=True) if own == name] for name in labels}
-        return {name: figures(groups[name]) for name in sorted(groups)}
-
-    angles = np.mean([track.turned for track in tracks], axis=0).tolist()
-    return {
-        "overall": figures(tracks),
-        "joints": {name: figures(tracks, members) for name, members in MEMBERS.items()},
-        "views": by(lambda case: ", ".join(f"{view:03.0f}" for view in case.views)),
-        "motions": by(lambda case: case.group),
-        "translations": by(lambda case: case.translation),
-        "people": by(lambda case: case.clip.subject),
-        "angles": dict(zip(("50", "80", "95"), angles, strict=True)),
-    }
-
-
-def best_modes(tracks: Sequence[TrackFeatures], evaluations: Sequence[Evaluation] = ()) -> dict[str, Any]:
-    """Return the calibration of the probability of the best mode.
-
-    It is right where the truth is nearer to it than to any other mode, and as near as poses of one mode are; `several`
-    are the frames that have others, `none` those in which no mode is right. Weights are recalibrated by `evaluations`,
-    in the order of the tracks; without them they are as drawn.
-    """
-    powers = [evaluation.sharpness for evaluation in evaluations] or [1.0] * len(tracks)
-    zeros = [np.zeros(len(features.track)) for features in tracks]
-    none = np.concatenate([evaluation.none for evaluation in evaluations] or zeros)
-    pairs = zip(tracks, powers, strict=True)
-    probable = (1.0 - none) * [sharpened(modes, power)[0] for features, power in pairs for modes in features.modes]
-    several = np.array([len(modes) > 1 for features in tracks for modes in features.modes])
-    nearest = np.concatenate([features.nearest for features in tracks])
-    far = nearest[:, 1] > APART
-    right = (nearest[:, 0] == 0.0) & ~far
-    second, swapped = (
-        np.concatenate([getattr(features, name) for features in tracks]) for name in ("second", "swapped")
+def coverage(name: str, tracks: Sequence[Evaluation], joints: Any = slice(1, None)) -> list[str]:
+    """Return the line of some joints of tracks: how much the intervals hold, and the radius of 80 %."""
+    weights = frame_weights([track.features for track in tracks])
+    inside, radii = (
+        np.concatenate([getattr(track, kind)[:, :, joints].mean(axis=2) for track in tracks])
+        for kind in ("inside", "radii")
     )
-    return {
-        "tracks": len(tracks),
-        "mean_probability": float(probable.mean()),
-        "right": float(right.mean()),
-        "calibration_error": calibration_error(probable, right),
-        "several": float(several.mean()),
-        "calibration_error_several": calibration_error(probable[several], right[several]) if several.any() else 0.0,
-        "none": float(far.mean()),
-        "calibration_error_none": calibration_error(none, far),
-        "auroc": auroc(probable, right),
-        "second_side_auroc": auroc(second, swapped),
-        "reliability": reliability(probable, right),
-    }
+    held, widths = weights @ inside, (1e3 * weights @ radii[:, 1], 1e3 * np.median(radii[:, 1]))
+    return [name, *map(percent, held.tolist()), *(f"{width:.0f}" for width in widths)]
 
 
-def posterior_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the printed tables."""
-    levels = [f"{100 * level:.0f}" for level in LEVELS]
-    coverage = figures["coverage"]
-    heads = ["of", "which", "tracks", *(f"{level} % hold %" for level in levels), "80 % radius mm", "median mm"]
-    table = []
-    for part in ("overall", "joints", "views", "motions", "translations", "people"):
-        rows = {"": coverage[part]} if part == "overall" else coverage[part]
-        for name, row in rows.items():
-            shares = [f"{100 * row['coverage'][level]:.1f}" for level in levels]
-            widths = [f"{row['radius_mm']['80']:.0f}", f"{row['median_radius_mm']:.0f}"]
-            table.append([part, name, str(row["tracks"]), *shares, *widths])
-    table.append(["angles", "", "", *(f"{100 * coverage['angles'][level]:.1f}" for level in levels), "", ""])
-    yield from markdown(heads, table, 2)
-    yield ""
-    heads = ["best mode %", "right %", "error %", "several modes %", "error %", "none right %", "error %"]
-    table = []
-    shares = ["mean_probability", "right", "calibration_error", "several", "calibration_error_several"]
-    shares += ["none", "calibration_error_none"]
-    for name, row in figures["modes"].items():
-        ranks = ["" if row[key] is None else f"{row[key]:.2f}" for key in ("auroc", "second_side_auroc")]
-        table.append([name, str(row["tracks"]), *(f"{100 * row[key]:.1f}" for key in shares), *ranks])
-    yield from markdown(["modes", "tracks", *heads, "AUROC", "second side AUROC"], table)
+def coverage_lines(tracks: Sequence[Evaluation]) -> Iterator[str]:
+    """Yield the table of people left out: overall, by group of joints, by view and by kind of motion."""
+    cells = [coverage("all", tracks), *(coverage(name, tracks, members) for name, members in MEMBERS.items())]
+    for label in (lambda case: ", ".join(f"{view:g}" for view in case.views), lambda case: case.group):
+        labels = [label(track.features.track.case) for track in tracks]
+        for name in sorted(set(labels)):
+            cells.append(coverage(name, [track for track, own in zip(tracks, labels, strict=True) if own == name]))
+    angles = np.mean([track.turned for track in tracks], axis=0).tolist()
+    cells.append(["angles instead of joints", *map(percent, angles), "", ""])
+    heads = ["joints of", *(f"{100 * level:.0f} % hold %" for level in LEVELS), "80 % radius mm", "median mm"]
+    yield from markdown(heads, cells)
+
+
+def modes_line(evaluations: Sequence[Evaluation]) -> str:
+    """Return how often the best mode is right, as its probability says and as it is, and how often no mode is.
+
+    It is right where the truth is nearer to it than to any other mode, and as near as poses of one mode are.
+    """
+    none = np.concatenate([evaluation.none for evaluation in evaluations])
+    best = [sharpened(modes, track.sharpness)[0] for track in evaluations for modes in track.features.modes]
+    nearest = np.concatenate([evaluation.features.nearest for evaluation in evaluations])
+    far = nearest[:, 1] > APART
+    flags = (nearest[:, 0] == 0.0) & ~far, (1.0 - none) * best, far
+    right, claimed, never = (percent(float(values.mean())) for values in flags)
+    return f"best mode: right in {right} % of the frames, claimed in {claimed} %; none is right in {never} %"
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--again", metavar="FILE", help="Tracks that --out wrote, instead of tracking.")
-@click.option("--out", metavar="FILE.npz", help="New file for the frames of all tracks.")
 @click.option("--store", metavar="FILE.json", help="New file for the calibration, for exemplars to read.")
 @WORKERS
-def main(**arguments: Any) -> None:
-    for line in posterior_lines(posterior(**arguments, progress=bar)):
-        click.echo(line)
+def main(store: str | None, workers: int | None) -> None:
+    with new_file(store) if store else nullcontext() as file:
+        jobs = {case: partial(sampled, case) for case in planned_tracks()}
+        tracks = [TrackFeatures.of(track) for track in each(jobs, workers, bar).values()]
+        evaluations = judged(tracks)
+        click.echo("\n".join([*coverage_lines(evaluations), "", modes_line(evaluations)]))
+        if file is not None:
+            fitted = {"temperature": POSTERIOR_TEMPERATURE, **_rounded(vars(calibration_of(tracks)))}
+            file.write_text(json.dumps(fitted) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -4,9 +4,8 @@ All have the same instances, first populations and budgets, so that they are com
 ln(1 + best cost), which the rewards of an episode sum up to.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import click
@@ -20,8 +19,7 @@ from posefit.fitting.cma import Strategy
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.policies import Policy, race_action, race_features
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES, SEARCHES
-from posefit_reproduce.jobs import each
-from table import LEVEL, RESAMPLES, WORKERS, earlier, kept, markdown
+from table import WORKERS, drawn_means, markdown, measured, quantiles
 
 NAME = "posefit/Race-v0"
 INSTANCES, SEEDS = 192, 2
@@ -36,107 +34,78 @@ LOG_DEVIATION = -1.0  # of PPO's first actions: of several that are clipped to 1
 SAC_ENVIRONMENTS, SAC_STEPS = 16, 24_000
 SAC_SETTINGS: dict[str, Any] = {"buffer_size": SAC_STEPS, "gradient_steps": 4}
 REFERENCES = ("round robin", "random actions", "one restarted", "halving")
-NETWORKS = ("PPO, a shared net", "PPO", "SAC")
-LEARNERS = ("bandit", "linear, CMA-ES", *NETWORKS)
+LEARNERS = ("bandit", "linear, CMA-ES", "PPO, a shared net", "PPO", "SAC")
 
 
 class Turn(NamedTuple):
-    """One row: a policy, the seed of its training, and the held-out instances."""
+    """One row: a policy, and the seed of its training."""
 
     agent: str
     seed: int
-    instances: int
 
 
-def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
-    """Return the policy that draws actions uniformly from an environment's box."""
-    shape = env.action_space.shape
-    return lambda _, __: rng.uniform(-1.0, 1.0, shape)
+def round_robin(observation: Any, step: int) -> Array:
+    """Return the action by which searches take turns."""
+    features, _ = race_features(observation)
+    searches: int = features.shape[-2]
+    return race_action(np.full(features.shape[:-2], step % searches), searches)
 
 
-def round_robin_policy() -> Policy:
-    """Return the policy whose searches take turns."""
-
-    def act(observation: Any, step: int) -> Array:
-        features, _ = race_features(observation)
-        searches: int = features.shape[-2]
-        return race_action(np.full(features.shape[:-2], step % searches), searches)
-
-    return act
-
-
-def restarted_policy(slope: float = 0.05) -> Policy:
-    """Return the policy that advances one search until it shows a slope below `slope`, and then another.
+def restarted(observation: Any, _: int, *, slope: float) -> Array:
+    """Return the action that advances one search until its slope is below `slope`, and then another.
 
     The next one is a search that never was advanced, or where there is none, one that begins.
     """
-
-    def act(observation: Any, _: int) -> Array:
-        features = race_features(observation)[0]
-        open_ones = features[..., 1] >= slope
-        longest = np.where(open_ones, features[..., 3], -1.0).argmax(axis=-1)
-        searches = features.shape[-2]
-        return race_action(np.where(open_ones.any(axis=-1), longest, searches), searches)
-
-    return act
+    features = race_features(observation)[0]
+    steep = features[..., 1] >= slope
+    longest = np.where(steep, features[..., 3], -1.0).argmax(axis=-1)
+    searches = features.shape[-2]
+    return race_action(np.where(steep.any(axis=-1), longest, searches), searches)
 
 
-def halving_policy() -> Policy:
-    """Return successive halving as a policy: after each of equal parts of the budget the worse half stops.
+def halving(observation: Any, _: int) -> Array:
+    """Return the action of successive halving: after each of equal parts of the budget the worse half stops.
 
     Those that are left take turns. K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and
     hyperparameter optimization, AISTATS 2016.
     """
-
-    def act(observation: Any, _: int) -> Array:
-        features, common = race_features(observation)
-        searches = features.shape[-2]
-        parts = int(np.log2(searches)) + 1
-        done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)  # float32 shows the budget
-        ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
-        left = ranks < searches // 2.0 ** done[..., None]
-        return race_action(np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches)
-
-    return act
+    features, common = race_features(observation)
+    searches = features.shape[-2]
+    parts = int(np.log2(searches)) + 1
+    done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)  # float32 shows the budget
+    ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
+    left = ranks < searches // 2.0 ** done[..., None]
+    return race_action(np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches)
 
 
-def bandit_policy(curiosity: float = 0.4) -> Policy:
-    """Return UCB1 as a policy: the lowest best cost, less what a search may gain that had few generations.
+def bandit(observation: Any, step: int, *, curiosity: float) -> Array:
+    """Return the action of UCB1: the lowest best cost, less what a search may gain that had few generations.
 
     That is `curiosity` times the root of ln(generations of all) / generations, in shown costs. It begins no search.
     P. Auer, N. Cesa-Bianchi, P. Fischer, Finite-time analysis of the multiarmed bandit problem, Machine Learning 47,
     2002, whose rewards are means and not bests.
     """
-
-    def act(observation: Any, step: int) -> Array:
-        features, _ = race_features(observation)
-        searches, used = int(features.shape[-2]), np.asarray(features[..., 3])
-        total = step + searches
-        generations = used / used.sum(axis=-1, keepdims=True) * total
-        index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)
-        return race_action(index.argmin(axis=-1), searches)
-
-    return act
+    features, _ = race_features(observation)
+    searches, used = int(features.shape[-2]), np.asarray(features[..., 3])
+    total = step + searches
+    generations = used / used.sum(axis=-1, keepdims=True) * total
+    index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)
+    return race_action(index.argmin(axis=-1), searches)
 
 
-def linear_policy(weights: Any) -> Policy:
-    """Return the policy with the choice of the highest score, linear in what is shown of a search.
+def linear(observation: Any, _: int, *, weights: Array) -> Array:
+    """Return the action with the highest score, linear in what is shown of a search.
 
     `weights` (..., 9), one policy or one for each row of observations: of four numbers, of these times the budget left,
     and the score of another search. The numbers are the best cost above the best of all, slope, spread and use.
     """
-    own = np.asarray(weights, dtype=np.float64)
-
-    def act(observation: Any, _: int) -> Array:
-        features, common = race_features(observation)
-        features[..., 0] -= common[..., :1]
-        shown = np.concatenate([features, features * common[..., 1, None, None]], axis=-1)
-        scores = (shown @ own[..., :-1, None])[..., 0]
-        another = np.broadcast_to(own[..., -1:], (*scores.shape[:-1], 1))
-        choice = np.concatenate([scores, another], axis=-1).argmax(axis=-1)
-        return race_action(choice, scores.shape[-1])
-
-    return act
+    features, common = race_features(observation)
+    features[..., 0] -= common[..., :1]
+    shown = np.concatenate([features, features * common[..., 1, None, None]], axis=-1)
+    scores = (shown @ weights[..., :-1, None])[..., 0]
+    another = np.broadcast_to(weights[..., -1:], (*scores.shape[:-1], 1))
+    choice = np.concatenate([scores, another], axis=-1).argmax(axis=-1)
+    return race_action(choice, scores.shape[-1])
 
 
 def final_costs(policy: Policy, env: Any, numbers: Sequence[int], seeds: Sequence[int]) -> tuple[Array, int]:
@@ -175,12 +144,12 @@ def evolved(seed: int) -> tuple[Policy, int]:
     for _ in range(GENERATIONS):
         weights = strategy.sample(rng, CANDIDATES)
         numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
-        policy = linear_policy(weights.repeat(EPISODES, axis=0))
+        policy = partial(linear, weights=weights.repeat(EPISODES, axis=0))
         tiled = np.tile(numbers, CANDIDATES).tolist(), np.tile(seeds, CANDIDATES).tolist()
         costs, steps = final_costs(policy, env, *tiled)
         strategy.learn(weights, costs.reshape(CANDIDATES, EPISODES).mean(axis=1))
         taken += steps
-    return linear_policy(strategy.mean), taken
+    return partial(linear, weights=strategy.mean), taken
 
 
 def trained(agent: str, seed: int) -> tuple[Policy, int]:
@@ -244,40 +213,40 @@ def _shared_net() -> type:
 
     class SharedNet(ActorCriticPolicy):  # type: ignore[misc]
         def _build_mlp_extractor(self) -> None:
-            self.mlp_extractor = Scores()
+            self.mlp_extractor: Any = Scores()
 
         def _build(self, schedule: Any) -> None:
             super()._build(schedule)
             self.action_net = nn.Identity()  # scores are the actions
-            self.optimizer = self.optimizer_class(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
+            optimizer: Any = self.optimizer_class
+            self.optimizer = optimizer(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
 
     return SharedNet
 
 
 def policy_of(turn: Turn, env: Any) -> tuple[Policy, int]:
     """Return the policy of a row, trained, and the steps of its training."""
-    plain: dict[str, Callable[[], Policy]] = {
-        "round robin": round_robin_policy,
-        "random actions": lambda: uniform_policy(env, np.random.default_rng(turn.seed)),
-        "halving": halving_policy,
+    rng = np.random.default_rng(turn.seed)
+    plain: dict[str, Policy] = {
+        "round robin": round_robin,
+        "random actions": lambda _, __: rng.uniform(-1.0, 1.0, env.action_space.shape),
+        "halving": halving,
     }
     if turn.agent in plain:
-        return plain[turn.agent](), 0
+        return plain[turn.agent], 0
     if turn.agent == "one restarted":
-        return chosen([restarted_policy(slope) for slope in SLOPES], turn.seed)
+        return chosen([partial(restarted, slope=slope) for slope in SLOPES], turn.seed)
     if turn.agent == "bandit":
-        return chosen([bandit_policy(curiosity) for curiosity in CURIOSITIES], turn.seed)
+        return chosen([partial(bandit, curiosity=curiosity) for curiosity in CURIOSITIES], turn.seed)
     return evolved(turn.seed) if turn.agent == "linear, CMA-ES" else trained(turn.agent, turn.seed)
 
 
 def row_of_turn(turn: Turn) -> dict[str, Any]:
-    """Return a row: the final costs of a policy on the held-out instances, and what its training took."""
-    start, env = perf_counter(), _made(turn.instances)
+    """Return a row: the final costs of a policy on the held-out instances, and the steps of its training."""
+    env, numbers = _made(INSTANCES), range(HELD_OUT, HELD_OUT + INSTANCES)
     policy, steps = policy_of(turn, env)
-    minutes = (perf_counter() - start) / 60.0
-    numbers = range(HELD_OUT, HELD_OUT + turn.instances)
     costs, _ = final_costs(policy, env, numbers, numbers)
-    return turn._asdict() | {"steps": steps, "minutes": round(minutes, 2), "costs": costs.tolist()}
+    return turn._asdict() | {"steps": steps, "costs": costs.tolist()}
 
 
 def turn_of(row: Mapping[str, Any]) -> Turn:
@@ -287,56 +256,26 @@ def turn_of(row: Mapping[str, Any]) -> Turn:
 
 def race_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the printed table, the highest mean first; intervals are of 95 %, a bootstrap of seeds and instances."""
-    costs = {agent: np.array([row["costs"] for row in rows if row["agent"] == agent]) for agent in _agents(rows)}
-    cells = []
+    agents = dict.fromkeys(row["agent"] for row in rows)
+    costs = {agent: np.array([row["costs"] for row in rows if row["agent"] == agent]) for agent in agents}
+    robin, cells = costs["round robin"], []
     for agent, own in sorted(costs.items(), key=lambda item: -float(item[1].mean())):
-        mine = [row for row in rows if row["agent"] == agent]
-        steps, minutes = (np.mean([row[name] for row in mine]) for name in ("steps", "minutes"))
-        gains = [_interval(_drawn(costs["round robin"]) - _drawn(own), costs["round robin"].mean() - own.mean())]
-        gains += [_interval(_drawn(costs["one restarted"]) - _drawn(own), costs["one restarted"].mean() - own.mean())]
-        whole = costs["round robin"].mean() - costs["halving"].mean()
-        shares = (_drawn(costs["round robin"]) - _drawn(own)) / (
-            _drawn(costs["round robin"]) - _drawn(costs["halving"])
-        )
-        gains += [_interval(shares, (costs["round robin"].mean() - own.mean()) / whole)]
-        cells.append([agent, f"{steps:,.0f}", str(len(own)), f"{minutes:.1f}", f"{own.mean():.2f}", *gains])
-    heads = ["policy", "trained steps", "seeds", "minutes", "ln(1 + cost)", "below round robin", "below one restarted"]
-    yield from markdown([*heads, "share of halving's gain"], cells)
-
-
-def _agents(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(row["agent"] for row in rows))
-
-
-def _drawn(costs: Array) -> Array:
-    """Return means (2000,) of costs (seeds, instances) by a bootstrap of both, with the same instances for all."""
-    rng = np.random.default_rng(0)
-    columns = rng.integers(costs.shape[1], size=(RESAMPLES, costs.shape[1]))
-    seeds = rng.integers(len(costs), size=(RESAMPLES, len(costs)))
-    return np.array([costs[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)])
-
-
-def _interval(drawn: Array, value: float) -> str:
-    low, high = np.quantile(drawn, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
-    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+        steps = np.mean([row["steps"] for row in rows if row["agent"] == agent])
+        low, high = quantiles(drawn_means(robin) - drawn_means(own))
+        gain = f"{robin.mean() - own.mean():.2f} ({low:.2f} to {high:.2f})"
+        cells.append([agent, f"{steps:,.0f}", str(len(own)), f"{own.mean():.2f}", gain])
+    yield from markdown(["policy", "trained steps", "seeds", "ln(1 + cost)", "below round robin"], cells)
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--agent", "names", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
-@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
-@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
 @click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
 @WORKERS
-def main(names: tuple[str, ...], seeds: int, instances: int, rows: str | None, workers: int | None) -> None:
-    learners = names or LEARNERS
-    if set(learners) & set(NETWORKS):
-        check_learners()
-    turns = [Turn(agent, 0, instances) for agent in REFERENCES]
-    turns += [Turn(agent, seed, instances) for agent in learners for seed in range(seeds)]
-    done = earlier(rows, turn_of)
-    jobs = {turn: partial(row_of_turn, turn) for turn in turns if turn not in done}
-    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
-    for line in race_lines([done[turn] for turn in turns]):
+def main(rows: str | None, workers: int | None) -> None:
+    check_learners()
+    turns = [Turn(agent, 0) for agent in REFERENCES]
+    turns += [Turn(agent, seed) for agent in LEARNERS for seed in range(SEEDS)]
+    done = measured({turn: partial(row_of_turn, turn) for turn in turns}, rows, turn_of, workers)
+    for line in race_lines([*done.values()]):
         click.echo(line)
 
 

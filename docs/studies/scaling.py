@@ -1,7 +1,6 @@
 """What a pose costs as a function of the picture's size, the views, the dimensions and the population.
 
-Each is the benchmark's problem with one number changed, on one thread, in microseconds a pose: the fastest run. The
-last column of a curve is its slope by least squares.
+Each is the benchmark's problem with one number changed, on one thread, in microseconds a pose: the fastest run.
 """
 
 from dataclasses import replace
@@ -21,12 +20,8 @@ from posefit_priors.pca import PCA
 from posefit_reproduce.bench.kernel import bench_problem, fastest
 
 POSES = 400
-WIDTHS, VIEWS, COMPONENTS, POPULATIONS = (
-    (80, 160, 320, 640, 1280),
-    (1, 2, 4, 8),
-    (3, 6, 12, 24, 48),
-    (1, 4, 10, 40, 400),
-)
+WIDTHS, VIEWS = (80, 160, 320, 640, 1280), (1, 2, 4, 8)
+COMPONENTS, POPULATIONS = (3, 6, 12, 24, 48), (1, 4, 10, 40, 400)
 
 
 def viewed(problem: PoseProblem, width: int = 320, views: int = 1) -> PoseProblem:
@@ -64,12 +59,7 @@ def main() -> None:
         }
         took = fastest(jobs)
         costs = {x: 1e6 * took[str(x)] / counts[x] for x in problems}
-        slope = np.polyfit(
-            list(costs), [cost * counts[x] if name == "population" else cost for x, cost in costs.items()], 1
-        )
-        click.echo(
-            f"| {name} | " + " | ".join(f"{x}: {cost:.3g}" for x, cost in costs.items()) + f" | {slope[0]:.3g} |"
-        )
+        click.echo(f"| {name} | " + " | ".join(f"{x}: {cost:.3g}" for x, cost in costs.items()) + " |")
 
 
 if __name__ == "__main__":

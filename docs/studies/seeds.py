@@ -3,7 +3,6 @@
 Frames, height and how the person is taken out are chosen as for `posefit track`.
 """
 
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import combinations
@@ -14,23 +13,21 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.cli.options import EXTRACTION, FRAMES, options, track_flags
+from posefit.cli.output import Command
 from posefit.evaluation.errors import LOST
 from posefit.footage.masks import Range
 from posefit.footage.segmentation import Extraction
 from posefit.geometry.skeleton import BONES
 from posefit.progress import QUIET
 from posefit.tracking.front import track
-from posefit_reproduce.jobs import each
-from table import WORKERS, earlier, kept, markdown
+from table import WORKERS, markdown, measured, percent
 
-LIMBS = {"thigh": ("lfemur",), "shank": ("ltibia",), "upper arm": ("lhumerus",), "forearm": ("lradius", "lwrist")}
+LIMBS = {"thigh": ("lfemur",), "forearm": ("lradius", "lwrist")}
 
 
 def seed_row(film: str, how: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """Return the figures of a film tracked with a seed, and its joints in millimetres."""
-    start, cpu = time.perf_counter(), time.process_time()
     result = track(film, seed=seed, progress=QUIET, **how)
-    seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu
     usable, skeleton = result.table["usable"] > 0.0, result.motion.skeleton
     lengths = dict(zip(BONES, skeleton.lengths, strict=True))
     return {
@@ -40,8 +37,6 @@ def seed_row(film: str, how: Mapping[str, Any], seed: int) -> dict[str, Any]:
         "iou": result.measures.iou,
         "grade": None if result.trust is None else result.trust.grade,
         **{f"{name}_mm": 1e3 * sum(lengths[bone] for bone in bones) for name, bones in LIMBS.items()},
-        "seconds": seconds,
-        "cpu_ms_a_frame": 1e3 * cpu_seconds / len(result.motion),
         "joints_mm": (1e3 * result.motion.joints).round().astype(int).tolist(),
     }
 
@@ -54,24 +49,23 @@ def median_distance(tracks: Sequence[Array]) -> float:
 
 def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the table of all seeds, and how far their joints are apart."""
-    heads = ["seed", "lost %", "unknown %", "IoU", "verdict", *(f"{name} mm" for name in LIMBS), "CPU ms a frame"]
+    heads = ["seed", "lost %", "unknown %", "IoU", "verdict", *(f"{name} mm" for name in LIMBS)]
     cells = [
         [
             str(row["seed"]),
-            *(f"{100.0 * row[name]:.0f}" for name in ("lost", "unknown")),
-            f"{row['iou']:.3f}",
-            str(row["grade"]),
+            *(percent(row[name], 0) for name in ("lost", "unknown")),
+            *(f"{row['iou']:.3f}", str(row["grade"])),
             *(f"{row[f'{name}_mm']:.0f}" for name in LIMBS),
-            f"{row['cpu_ms_a_frame']:.0f}",
         ]
         for row in rows
     ]
     yield from markdown(heads, cells, 1)
-    apart = median_distance([np.array(row["joints_mm"]) for row in rows])
-    yield f"joints of two seeds are {apart:.0f} mm apart, median"
+    tracks = [np.array(row["joints_mm"]) for row in rows]
+    apart, about_root = median_distance(tracks), median_distance([joints - joints[:, :1] for joints in tracks])
+    yield f"joints of two seeds are {apart:.0f} mm apart, median; about the root {about_root:.0f}"
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.argument("film")
 @click.option("--seeds", type=click.IntRange(1), default=4, show_default=True, help="From 0 on.")
 @click.option("--rows", metavar="FILE", help="Of a row a line as they come; what it holds is not measured again.")
@@ -91,10 +85,8 @@ def main(
     how: dict[str, Any] = {"frames": frames, "height": height}
     if chosen:
         how["extraction"] = Extraction(**chosen)
-    done = earlier(rows, lambda row: int(row["seed"]))
-    jobs = {seed: partial(seed_row, film, how, seed) for seed in range(seeds) if seed not in done}
-    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
-    for line in seeds_lines([done[seed] for seed in range(seeds)]):
+    jobs = {seed: partial(seed_row, film, how, seed) for seed in range(seeds)}
+    for line in seeds_lines([*measured(jobs, rows, lambda row: int(row["seed"]), workers).values()]):
         click.echo(line)
 
 

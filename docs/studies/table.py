@@ -20,19 +20,19 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.cli.output import Command, progress, say
-from posefit.evaluation.measures import BASELINES, MEASURES
+from posefit.evaluation.measures import MEASURES
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.engine import Limits
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool, cores
+from posefit_reproduce.jobs import each
 
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
 RESAMPLES, LEVEL = 2000, 0.95
 SHARES = ("lost_rate", "swap_rate")
-TRIVIAL = ("nearest", "mean_pose")  # baselines, which know the true root
 WORKERS = click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; one a core by default.")
 LEDGER = click.option("--ledger", metavar="DIR", help="Folder of finished rows: the same command continues there.")
 bar = partial(progress, unit="run")
@@ -70,6 +70,20 @@ def kept(path: str | None, ended: Iterator[tuple[K, Row]], count: int) -> Iterat
         yield key, row
 
 
+def measured(
+    jobs: Mapping[K, Callable[[], Row]],
+    path: str | None,
+    key: Callable[[Row], K],
+    workers: int | None,
+    limits: Limits | None = None,
+) -> dict[K, Row]:
+    """Return the row of each job under its key; those that a file holds are not measured again, new ones go there."""
+    done = earlier(path, key)
+    missing = {name: job for name, job in jobs.items() if name not in done}
+    done |= each(missing, workers, partial(kept, path), limits) if missing else {}
+    return {name: done[name] for name in jobs}
+
+
 def head_of(name: str, which: str = "") -> str:
     """Return the head of a figure's column: which of its values (such as median), its label, and its unit."""
     measure = MEASURES[name]
@@ -93,14 +107,26 @@ def percent(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else f"{100.0 * value:.{digits}f}"
 
 
+def quantiles(drawn: Array) -> tuple[float, float]:
+    """Return the ends of the 95 % interval of drawn values (n,)."""
+    low, high = np.quantile(drawn, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
+    return float(low), float(high)
+
+
+def drawn_means(values: Array) -> Array:
+    """Return means (2000,) of values (seeds, instances), by a bootstrap of both; all have the same instances."""
+    rng = np.random.default_rng(0)
+    columns = rng.integers(values.shape[1], size=(RESAMPLES, values.shape[1]))
+    seeds = rng.integers(len(values), size=(RESAMPLES, len(values)))
+    return np.array([values[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)])
+
+
 def interval(values: Array, clusters: Sequence[object]) -> tuple[float, float]:
     """Return the 95 % interval of the median of values (n,), by a bootstrap over the clusters that they are of."""
     rng = np.random.default_rng(0)
     groups = [values[[k for k, name in enumerate(clusters) if name == one]] for one in dict.fromkeys(clusters)]
     drawn = rng.integers(len(groups), size=(RESAMPLES, len(groups)))
-    medians = [np.median(np.concatenate([groups[k] for k in rows])) for rows in drawn]
-    low, high = np.quantile(medians, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
-    return float(low), float(high)
+    return quantiles(np.array([np.median(np.concatenate([groups[k] for k in rows])) for rows in drawn]))
 
 
 def grouped(found: Sequence[Row], labels: Callable[[Row], Sequence[str]], names: Sequence[str]) -> Iterator[str]:
@@ -108,9 +134,8 @@ def grouped(found: Sequence[Row], labels: Callable[[Row], Sequence[str]], names:
     groups: dict[tuple[str, ...], list[Row]] = {}
     for row in found:
         groups.setdefault(tuple(labels(row)), []).append(row)
-    heads = [*names, "tracks", head_of("error_degrees", "median"), "least to most", head_of("mpjpe_mm", "median")]
-    heads += ["95 % interval, mm", *(head_of(name) for name in SHARES)]
-    heads += [f"{BASELINES[name]}, degrees" for name in TRIVIAL] + ["ms a frame"]
+    heads = [*names, "tracks", head_of("error_degrees", "median"), "worst", head_of("mpjpe_mm", "median")]
+    heads += ["95 % interval, mm", *map(head_of, SHARES), "mean pose, degrees", "closest training pose, mm"]
     yield from markdown(heads, [[*key, *_cells(mine)] for key, mine in groups.items()], len(names))
 
 
@@ -122,12 +147,12 @@ def _cells(mine: Sequence[Row]) -> list[str]:
     return [
         str(len(mine)),
         number("error_degrees", float(np.median(errors))),
-        f"{errors.min():.1f} to {errors.max():.1f}",
+        number("error_degrees", float(errors.max())),
         number("mpjpe_mm", float(np.median(distances))),
         f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}" if len(set(motions)) > 1 else "",
         *(percent(float(np.mean([row[name] for row in mine]))) for name in SHARES),
-        *(f"{np.median([row['baselines_degrees'][name] for row in mine]):.1f}" for name in TRIVIAL),
-        MEASURES["seconds_per_frame"].number(float(np.median([row["seconds_per_frame"] for row in mine]))),
+        f"{np.median([row['baselines_degrees']['mean_pose'] for row in mine]):.1f}",
+        f"{np.median([row['baselines_mm']['nearest'] for row in mine]):.0f}",
     ]
 
 

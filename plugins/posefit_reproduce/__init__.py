@@ -4,8 +4,7 @@
     posefit reproduce vsmm   CN101894278: four activities, by default and to the letter, against an IMM over all models
     posefit bench            how fast the loop is
 
-Each has `--help`, and `--json` for one JSON object on stdout. Other measurements are scripts in the repository's
-folder `docs/studies`.
+Other measurements are scripts in the repository's folder `docs/studies`.
 
     commands.py     the command lines
     experiment.py   the shape of both: runs that are stored, and tables, claims and figures made of them

@@ -40,12 +40,11 @@ CLIPS = click.option(
 @click.option("--films", type=int, default=10, show_default=True, help="Films, of those that no default was chosen on.")
 @OUT
 @WORKERS
-@JSON
-def vsmm_command(films: int, out: str | None, workers: int, as_json: bool) -> None:
+def vsmm_command(films: int, out: str | None, workers: int) -> None:
     """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, by its letter and by default."""
     from posefit_reproduce.vsmm.experiment import Scale
 
-    _run(patent_experiment(Scale(films)), out, workers, as_json)
+    _run(patent_experiment(Scale(films)), out, workers)
 
 
 @reproduce_group.command("sapso")
@@ -58,30 +57,26 @@ def vsmm_command(films: int, out: str | None, workers: int, as_json: bool) -> No
 )
 @OUT
 @WORKERS
-@JSON
-def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int, as_json: bool) -> None:
+def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int) -> None:
     """A walk, a walk with a turn and a run: Acta Automatica Sinica 38(5), and what each part of its method is worth."""
     from posefit_reproduce.sapso.experiment import Scale
 
-    _run(paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers, as_json)
+    _run(paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers)
 
 
-def _run(experiment: "Experiment", out: str | None, workers: int, as_json: bool) -> None:
+def _run(experiment: "Experiment", out: str | None, workers: int) -> None:
     """Run an experiment and print its tables."""
     from posefit_reproduce.experiment import reproduce
 
     tables = reproduce(experiment, out, workers, partial(progress, unit="run"))
-    if as_json:
-        click.echo(json.dumps({table.name: {"heads": table.heads, "rows": table.rows} for table in tables}))
-    else:
-        click.echo("\n\n".join(f"{table.name}\n\n{table}" for table in tables))
+    click.echo("\n\n".join(f"{table.name}\n\n{table}" for table in tables))
 
 
 @click.command("bench")
 @click.option("--threads", type=click.IntRange(1), help="Threads of the multi-threaded figures; by default every core.")
 @JSON
 def bench_command(threads: int | None, as_json: bool) -> None:
-    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
+    """Time the kernel, the OpenCV way, and every optimiser's ask and tell, all in one run.
 
     `cpu` names the processor that the loops are compiled for: this machine's, or the one that the environment variable
     NUMBA_CPU_NAME names, such as x86-64-v3, which has AVX2 and no AVX-512, or x86-64-v2, which has SSE4.

@@ -159,7 +159,7 @@ class Experiment:
 
 
 def reproduce(experiment: Experiment, out: str | Path | None, workers: int, progress: Progress | None) -> list[Table]:
-    """Return the tables of an experiment; with a folder, write them, the figures and report.json there, too.
+    """Return the tables of an experiment; with a folder, write them and the figures there, too.
 
     Runs that the folder holds are not run again. Raises InputError where it holds something else, or runs that depend
     on something else, or cannot be written; and ImportError where the library that draws figures is not installed.
@@ -179,7 +179,8 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
         results = Results({run: _stored(file) for run, file in files.items()})
         tables = list(experiment.tables(results))
         if out is not None:
-            _write(folder, tables, results)
+            for table in tables:
+                (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
             _write_figures(folder, experiment.figures(results))
     return tables
 
@@ -230,14 +231,6 @@ def _store(perform: Callable[[Run], Arrays], run: Run, file: Path) -> Path:
 def _stored(file: Path) -> Arrays:
     with np.load(file) as stored:
         return dict(stored)
-
-
-def _write(folder: Path, tables: Sequence[Table], results: Results) -> None:
-    for table in tables:
-        (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
-    builds = sorted({str(arrays["build"]) for arrays in results.runs.values()})
-    report = {"builds": builds, "runs": len(results.runs), "tables": [table._asdict() for table in tables]}
-    (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
 def _write_figures(folder: Path, figures: Iterable[tuple[str, Any]]) -> None:

@@ -39,7 +39,7 @@ def each(
                 running -= 1
                 key = outcome.job[0]
                 if outcome.result is None:
-                    raise InputError(f"{key}: {outcome.reason}")
+                    raise InputError(f"{key}: {outcome.reason or 'its process ended'}")
                 yield key, outcome.result
 
     with closing(engine):

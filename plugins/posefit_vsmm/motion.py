@@ -132,8 +132,6 @@ class Library(NamedTuple):
 
     models: MotionModels
     dependent: DependentJoints
-    # degrees: one and ten steps on clips that were not used, against standing still
-    report: dict[str, dict[str, float]]
 
 
 @lru_cache(maxsize=2)
@@ -150,8 +148,7 @@ def library(shrunk_to: Literal["identity", "zero"] = "identity") -> Library:
     turns = captured.reshape(*captured.shape[:2], TURNS, 4)
     captured = (turns / lengths(turns)).reshape(captured.shape)
     dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
-    reports = {name: model["report"] for name, model in models.items()}
-    return Library(MotionModels(tuple(models), matrices, offsets, noises, poses, captured), dependent, reports)
+    return Library(MotionModels(tuple(models), matrices, offsets, noises, poses, captured), dependent)
 
 
 def ridge(inputs: Array, outputs: Array, weight: float = LAMBDA) -> Array:

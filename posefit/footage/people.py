@@ -239,7 +239,7 @@ def _distance(tracklet: Tracklet, other: Tracklet) -> float:
     colour = float(np.abs(first.colours - second.colours).mean()) / 100.0
     away = float(np.linalg.norm(np.array(place) - first.latest.place)) / first.height
     size = AREA * float(abs(np.log(second.area / first.area)))
-    return COLOUR * colour + size + away / (1.0 + (start - first.last) / 30.0)
+    return COLOUR * colour + size + away / (1.0 + max(0, start - first.last) / 30.0)
 
 
 def _share(blob: _Blob, group: Sequence[Tracklet], frame: int) -> None:

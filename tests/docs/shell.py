@@ -5,6 +5,7 @@ import re
 import shlex
 import tomllib
 from collections.abc import Iterator
+from importlib import import_module
 
 import click
 
@@ -41,7 +42,11 @@ def check(words: list[str]) -> None:
     elif words[:2] == ["python", "-m"]:
         assert importlib.util.find_spec(words[2]) is not None, f"no module {words[2]}"
     elif name == "python":
-        assert (ROOT / words[1]).is_file(), f"no file {words[1]}"
+        path = ROOT / words[1]
+        assert path.is_file(), f"no file {words[1]}"
+        if path.parent.name == "studies":
+            options = {option for parameter in import_module(path.stem).main.params for option in parameter.opts}
+            assert {word for word in words if word.startswith("--")} <= options, f"an option that {path.name} lacks"
     elif name == "sbatch":
         for inner in commands(rest[rest.index("--wrap") + 1]):
             check(inner)

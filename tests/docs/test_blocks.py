@@ -120,7 +120,8 @@ def test_blocks_are_of_a_known_language_and_those_that_are_not_run_are_right() -
 
 def test_the_check_of_commands_notices_wrong_ones() -> None:
     for line in ["posefit trakc walk", "posefit track --no-such-option 1", "posefit extract video.mp4", "rm -r results",
-                 "python -m posefit_reproduce.nothing", "python -m pip install -e '.[nothing]'"]:  # fmt: skip
+                 "python -m posefit_reproduce.nothing", "python -m pip install -e '.[nothing]'",
+                 "python docs/studies/people.py --nothing"]:  # fmt: skip
         (words,) = shell.commands(line)
         with pytest.raises((AssertionError, click.UsageError)):
             shell.check(words)

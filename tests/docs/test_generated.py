@@ -1,20 +1,19 @@
 """The pages and the drawing that are made from the code say what the code does."""
 
 import json
+import pkgutil
 import re
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import architecture
 import generator
 import pytest
-from click.testing import CliRunner
-from generator import angles, commands, figures, settings
-from generator.prose import restructured, shortened
+from generator import angles, figures, settings
+from generator.prose import restructured
 
+import posefit
 from posefit import track
-from posefit.cli import main
 from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
 from posefit.registry import registry
@@ -25,21 +24,10 @@ from posefit.sweep.plan import LISTS
 from posefit.sweep.table import flat
 from tests.docs.pages import DOCS
 
-HELPS = commands.helps()
-
 
 def rows(page: str) -> set[str]:
     """Return what the rows of a page's tables begin with."""
     return set(re.findall(r"^\| `([^`]+)` \|", page, re.MULTILINE))
-
-
-def test_the_page_of_commands_holds_the_help_of_each() -> None:
-    assert {"posefit", "posefit track", "posefit plugins new", "posefit reproduce sapso"} <= set(HELPS)
-    for name in ("posefit", "posefit track"):
-        shown = CliRunner().invoke(
-            main, [*name.split()[1:], "--help"], prog_name="posefit", terminal_width=commands.WIDTH
-        )
-        assert shown.output.strip() == HELPS[name]
 
 
 def test_the_settings_of_every_method_are_described() -> None:
@@ -117,31 +105,7 @@ def test_a_docstring_is_read_as_plain_text() -> None:
     assert restructured(["Settings:", "    a (b): c"])[:3] == ["Settings:", "", "* **a (b)**: c"]
 
 
-def test_arrays_are_named_as_the_code_names_them() -> None:
-    long = "(poses: ~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]], more: dict = <factory>)"
-    assert shortened(long) == "(poses: Array, more: dict = ...)"
-    assert shortened("ndarray[tuple[Any, ...], dtype[bool]]") == "Array[bool]"
-
-
-def test_a_circle_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    graph = {"a": frozenset("b"), "b": frozenset("cd"), "c": frozenset("a"), "d": frozenset()}
-    assert architecture.circle(graph) == ["a", "b", "c", "a"]
-    monkeypatch.setattr(architecture, "imports", lambda: graph)
-    assert architecture.main([]) == 1
-    assert "a -> b -> c -> a" in capsys.readouterr().err
-
-
-def test_an_arrow_that_others_imply_is_left_out() -> None:
-    graph = {"a": frozenset("bc"), "b": frozenset("c"), "c": frozenset()}
-    assert architecture.reduced(graph) == {"a": frozenset("b"), "b": frozenset("c"), "c": frozenset()}
-
-
-def test_the_drawing_and_the_page_show_every_package() -> None:
-    graph, text = architecture.imports(), architecture.drawing()
+def test_the_page_of_the_architecture_lists_every_package() -> None:
     page = (DOCS / "background" / "architecture.md").read_text("utf-8")
-    for box in graph:
-        assert box.removeprefix("posefit_") in text, box
-        assert box.startswith("posefit_") or f"`{box}`" in page, box
-    arrows, _ = architecture.grouped(architecture.reduced(graph))
-    height = {box: level for level, row in enumerate(architecture.levels(arrows)) for box in row}
-    assert all(height[box] > height[one] for box, lower in arrows.items() for one in lower)
+    packages = {module.name for module in pkgutil.iter_modules(posefit.__path__) if not module.name.startswith("_")}
+    assert [name for name in sorted(packages) if f"`{name}`" not in page] == []

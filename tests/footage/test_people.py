@@ -62,6 +62,14 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     assert np.mean(shares, axis=0)[1 - which] < 0.05
 
 
+def test_parts_that_take_turns_are_no_time_apart() -> None:
+    people, sides = People(30.0), np.zeros((2, *SIZE[::-1]), dtype=bool)
+    sides[0, 20:100, 20:50] = sides[1, 20:100, 115:145] = True
+    for k in range(50):  # the other part begins in frame 2, thirty frames before the first one ends
+        people.add(people_in(Silhouette.of(sides[int(k % 3 == 2 if k < 32 else k > 32)])), None)
+    assert [len(person) for person in people.persons()] == [2]
+
+
 def test_memory_of_noise_is_given_back() -> None:
     people, rng = People(10.0), np.random.default_rng(0)
     for _ in range(60):

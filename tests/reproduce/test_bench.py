@@ -31,25 +31,14 @@ def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tup
     assert np.abs(ours - theirs).mean() < 1.0
 
 
-@each("name", loop.ENDLESS)
-def test_episodes_that_never_end_have_arguments_that_exist(name: str) -> None:
-    step, proposals = loop._step(name, "native")
-    step()
-    assert proposals >= loop.ENVIRONMENTS
-
-
 @pytest.mark.slow
 def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernel, "ROUNDS", 1)
     monkeypatch.setattr(kernel, "TURN", 1e-6)
     monkeypatch.setattr(loop, "SEARCHES", 1)
-    monkeypatch.setattr(loop, "SEEDS", 1)
     result = CliRunner().invoke(main, ["bench", "--threads", "1", "--json"])
     assert result.exit_code == 0, result.output
     figures = json.loads(result.stdout)
-    optimisers, steps = figures["ask_and_tell_us_per_proposal"], figures["environments_us_per_proposal"]
+    optimisers = figures["ask_and_tell_us_per_proposal"]
     assert {"sapso", "pso", "random", "cma", "particle", "scipy"} <= optimisers.keys()
-    assert steps.keys() == {f"{name} {kind}" for name in ("FitImage-v0", "Race-v0") for kind in ("native", "sync")}
-    assert min([*optimisers.values(), *steps.values()]) > 0.0
-    # the same silhouettes but for their edges
-    assert figures["mean_cost_difference_to_opencv"] < 1.0
+    assert min(optimisers.values()) > 0.0

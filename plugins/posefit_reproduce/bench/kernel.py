@@ -2,7 +2,7 @@
 
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import cv2
@@ -25,7 +25,7 @@ ROUNDS = 12  # of all jobs in turn; of each, the fastest run counts
 TURN = 0.05  # seconds; a job runs again until its turn is over
 
 
-def fastest(jobs: dict[str, Callable[[], object]]) -> dict[str, float]:
+def fastest(jobs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
     """Return the fastest run of each job in seconds; they take turns, so that a slow moment falls on all."""
     seconds = dict.fromkeys(jobs, np.inf)
     for job in jobs.values():

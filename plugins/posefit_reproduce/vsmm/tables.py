@@ -12,8 +12,7 @@ from posefit.fitting import metrics
 from posefit.geometry.skeleton import JOINTS
 from posefit_reproduce.experiment import Arrays, Claim, Results, Table, bounded, claims_table, interval
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film, film_of
-from posefit_reproduce.vsmm.experiment import ALTERNATIVES, BEST, GROUPS, LABELS, METHODS, MODELS, TUNED
-from posefit_vsmm.motion import library
+from posefit_reproduce.vsmm.experiment import GROUPS, LABELS, METHODS, MODELS, TUNED, UNRECOVERED
 from posefit_vsmm.state import AT
 
 ELBOW, HAND = JOINTS.index("rhumerus"), JOINTS.index("rwrist")  # the joints that end in elbow and hand
@@ -130,7 +129,7 @@ def _delays(labels: list[int], right_group: NDArray[np.bool_]) -> list[int]:
 
 
 def patent_tables(results: Results) -> Iterator[Table]:
-    """Yield all tables: claims, methods, film by film, labels, settings, predictions."""
+    """Yield all tables: claims, methods, film by film, labels, recovery."""
     rows: dict[str, list[dict[str, float]]] = {}
     for run in sorted(results.runs, key=lambda run: run.seed):
         rows.setdefault(f"{run.kind} {run.method}", []).append(film_figures(run.seed, results.runs[run]))
@@ -143,8 +142,7 @@ def patent_tables(results: Results) -> Iterator[Table]:
     yield films_table("films", {name: methods[name] for name in BOTH})
     for name in BOTH:
         yield labels_table(f"labels-{name}", results, name)
-    yield settings_table(films)
-    yield predictions_table()
+    yield recovery_table(films)
 
 
 def means_table(name: str, methods: Mapping[str, Films]) -> Table:
@@ -209,25 +207,10 @@ def labels_table(name: str, results: Results, method: str) -> Table:
     return Table(name, [f"% (by chance {chance:.0f})", *LABELS, "none"], rows)
 
 
-def settings_table(methods: Mapping[str, Films]) -> Table:
-    """Return by how many mm of MPJPE another setting is worse than the default, on the films that it was chosen on.
-
-    The last row is of the films that are reported.
-    """
-    figures, cells = ("mpjpe", "elbow", "hand", "model", "label", "delay", "frame"), []
-    for kind, name in (*(("tuned", name) for name in ("default", *ALTERNATIVES)), ("reported", BEST)):
-        films, first = methods[f"{kind} {name}"], 0 if kind == "tuned" else TUNED
-        worse = films["mpjpe"] - methods[f"{kind} default"]["mpjpe"]
-        means = [f"{films[figure].mean():.{FIGURES[figure][1]}f}" for figure in figures]
-        label = f"{name}, films {first} to {first + worse.size - 1}"
-        cells.append([label, bounded(interval(worse), 1), f"{(worse > 0).sum()} of {worse.size}", *means])
-    heads = ["worse by mm", "on films", "MPJPE, mm", "elbow, cm", "hand, cm", "model, %", "label, %", "longest delay"]
-    return Table("settings", ["", *heads, "CPU ms"], cells)
-
-
-def predictions_table() -> Table:
-    """Return the models' errors in degrees, one and ten frames ahead, on clips that they were not fitted to."""
-    keys = ("still_1", "identity_1", "zero_1", "still_10", "identity_10", "zero_10")
-    heads = ["degrees ahead", *(f"{name}, {count}" for count in (1, 10) for name in ("still", "default", "patent"))]
-    rows = [[name, *(f"{report[key]:.2f}" for key in keys)] for name, report in library().report.items()]
-    return Table("predictions", heads, rows)
+def recovery_table(films: Mapping[str, Films]) -> Table:
+    """Return by how many mm of MPJPE the tracker is worse without recovery, on the films that it was chosen on."""
+    with_it, without = films["tuned default"], films[f"tuned {UNRECOVERED}"]
+    worse = without["mpjpe"] - with_it["mpjpe"]
+    hands = [f"{each['hand'].mean():.1f}" for each in (with_it, without)]
+    row = [UNRECOVERED, bounded(interval(worse), 1), f"{(worse > 0).sum()} of {worse.size}", *hands]
+    return Table("recovery", ["V14", "worse by mm", "on films", "hand, cm: by default", "without"], [row])
