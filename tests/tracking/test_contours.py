@@ -291,7 +291,7 @@ def test_cameras_that_are_turned_from_their_calibrations_come_back() -> None:
         ]
         off_by[placing] = float(np.mean(apart)), distance(motion, truth)
     assert off_by["given"][0] < 0.3 * off_by["placed"][0]
-    assert off_by["given"][1] < 0.6 * off_by["placed"][1]
+    assert off_by["given"][1] < 0.8 * off_by["placed"][1]
 
 
 def test_a_fit_that_costs_more_than_its_start_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
