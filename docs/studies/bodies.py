@@ -432,22 +432,22 @@ def intervals_lines(films: Sequence[Film]) -> Iterator[str]:
 
 
 def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield errors of joints, lengths and angles, by the number of cameras."""
-    heads = ["cameras", "films", "MPJPE mm", "through", *(f"{name} %" for name in SEGMENTS)]
-    heads += ["known and exchanged %", *(f"{name.replace('_', ' ')} degrees" for name in SAGITTAL)]
+    """Yield errors of joints, of angles of walks `through`, and of lengths, by the number of cameras."""
+    heads = ["cameras", "films", "MPJPE mm", "through", *(f"{name.replace('_', ' ')}, degrees" for name in SAGITTAL)]
+    heads += [*(f"{name} %" for name in SEGMENTS), "known and exchanged %"]
     cells = []
     for views in PLACES:
         some = [row for row in rows if row["views"] == views]
-        walks = [row["mpjpe_mm"] for row in some if row["situation"] == "through"]
+        through = [row for row in some if row["situation"] == "through"]
         cells.append(
             [
                 str(views),
                 str(len(some)),
                 f"{np.median([row['mpjpe_mm'] for row in some]):.0f}",
-                f"{np.median(walks):.0f}" if walks else "-",
+                f"{np.median([row['mpjpe_mm'] for row in through]):.0f}",
+                *(f"{np.median([row['degrees'][name] for row in through]):.1f}" for name in SAGITTAL),
                 *(f"{100.0 * np.mean([abs(row['lengths'][name]) for row in some]):.1f}" for name in SEGMENTS),
                 percent(float(np.mean([row["known_exchanged"] for row in some])), 1),
-                *(f"{np.median([row['degrees'][name] for row in some]):.1f}" for name in SAGITTAL),
             ]
         )
     yield from markdown(heads, cells, 1)

@@ -48,7 +48,7 @@ class Scene:
     reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
 
     @property
-    def turns(self) -> bool:
+    def cameras_turn(self) -> bool:
         """Whether cameras may be turned a little from their calibrations, which several masks show to be off."""
         return len(self.cameras) > 1 and self.placing == "given"
 

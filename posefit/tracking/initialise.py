@@ -122,7 +122,7 @@ def fitted_build(
 
     aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
     shape = fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
-    if not scene.turns:
+    if not scene.cameras_turn:
         return shape, task.cameras
     scene = replace(scene, body=shape.body, observations=chosen, count=len(chosen), fps=task.fps)
     motion = scene.motion(frames_of(shape.body))

@@ -57,7 +57,7 @@ def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
 def with_turns(scene: Scene, calibrated: Sequence[Camera]) -> Scene:
     """Return a scene whose guesses say by how much its cameras were turned from their calibrations."""
     turns = [geodesic(camera.rotation, other.rotation) for camera, other in zip(scene.cameras, calibrated, strict=True)]
-    if not scene.turns:
+    if not scene.cameras_turn:
         return scene
     said = ", ".join(f"{np.degrees(turn):.2f}" for turn in turns)
     return replace(scene, guesses=[*scene.guesses, f"cameras turned by {said} degrees, so that their masks agree"])

@@ -70,7 +70,7 @@ def fit_contours(
         return scene, motion, shape
     parts = windows_over(len(motion), CONTOUR_WINDOW, CONTOUR_OVERLAP)
     fitted: dict[int, _Part] = {}
-    if shape is not None or scene.turns:
+    if shape is not None or scene.cameras_turn:
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
         part = fitted[best] = _fitted(scene, motion, visibility, parts[best][0], shape, beta, turned=True)
         if shape is not None and part.body is not scene.body:  # else no build fits better, and only poses are fitted
@@ -100,7 +100,7 @@ def _fitted(
     places = estimate.translations
     borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(cameras)]
     factors, height = (np.empty(0), None) if shape is None else (np.log(shape.factors), shape.height)
-    turns = np.zeros((len(cameras) if turned and scene.turns else 0, 3))
+    turns = np.zeros((len(cameras) if turned and scene.cameras_turn else 0, 3))
     spread = np.zeros(len(factors))
     part = _Part(estimate, estimate, body, factors, height, visibility.at(rows), spread, cameras, turns)
     best, least = part, _mean_cost(part, observations, beta)
@@ -122,20 +122,14 @@ def _mean_cost(part: _Part, observations: Sequence[Observation], beta: float) ->
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
     """Return a window after a Gauss-Newton step to the borders of all views."""
-    fitted, estimate, count = part.fitted, part.estimate, len(part.factors)
+    fitted, count = part.fitted, len(part.factors)
     angles = np.flatnonzero(fitted.skeleton.free).tolist()
-    poses, places, numbers = fitted.poses.copy(), fitted.translations, 3 + len(angles)
+    poses, places = fitted.poses.copy(), fitted.translations
     turned = [border.seen_by(camera) for border, camera in zip(borders, part.cameras, strict=True)]
     hessians, gradients, mixed, hessian, gradient = contour_squares(
         part.body, turned, poses, places, scale, _changes(part)
     )
-    squares, of_angles = Squares(len(fitted), numbers), slice(3, numbers)
-    squares.add(slice(None), hessians, gradients)
-    add_root(squares, estimate, part.visibility, CONTOUR_ROOT_DEVIATION, places - estimate.translations)
-    change = wrapped(poses - estimate.poses)[:, angles]
-    squares.add(of_angles, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
-    squares.add_bends(of_angles, change, fitted.fps**2 / ANGLE_ACCELERATION)
-    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.viewpoints), angles)
+    squares = _frame_squares(part, hessians, gradients, angles)
     solved = squares.steps_for(np.concatenate([squares.gradients[..., None], mixed], axis=2))
     steps, by_factor = solved[..., 0], solved[..., 1:]
     held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
@@ -149,18 +143,31 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     steps = steps - by_factor @ changes
     poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
     body = shaped(part.body, np.exp(-changes[:count]), part.height) if count else part.body
-    turns = changes[count:].reshape(-1, 3)
+    turns, cameras = changes[count:].reshape(-1, 3), part.cameras
+    if len(turns):
+        cameras = [turned_camera(*each) for each in zip(cameras, -turns, strict=True)]
     return replace(
         part,
         fitted=replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3]),
         body=body,
         factors=part.factors - changes[:count],
         spread=np.sqrt(held * np.diag(np.linalg.inv(hessian)))[:count],
-        cameras=[turned_camera(*each) for each in zip(part.cameras, -turns, strict=True)]
-        if len(turns)
-        else part.cameras,
+        cameras=cameras,
         turns=part.turns - turns,
     )
+
+
+def _frame_squares(part: _Part, hessians: Array, gradients: Array, angles: Sequence[int]) -> Squares:
+    """Return those of the borders, and of what is known of each frame's root, of its angles and of standing feet."""
+    fitted, estimate, visibility = part.fitted, part.estimate, part.visibility
+    squares, of_angles = Squares(len(fitted), 3 + len(angles)), slice(3, 3 + len(angles))
+    squares.add(slice(None), hessians, gradients)
+    add_root(squares, estimate, visibility, CONTOUR_ROOT_DEVIATION, fitted.translations - estimate.translations)
+    change = wrapped(fitted.poses - estimate.poses)[:, angles]
+    squares.add(of_angles, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
+    squares.add_bends(of_angles, change, fitted.fps**2 / ANGLE_ACCELERATION)
+    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, visibility.viewpoints), angles)
+    return squares
 
 
 def _changes(part: _Part) -> list[tuple[Array, Array]]:
