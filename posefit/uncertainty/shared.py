@@ -26,13 +26,13 @@ PARTS: Mapping[str, Sequence[str]] = {  # joints, named after the bones that end
 }
 # Standard deviations of each axis in millimetres, by one camera, by two and by more: about the root, and in the world.
 SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
-    "pelvis": ((0, 0, 0), (0, 60, 30)),
-    "hips": ((0, 15, 15), (0, 60, 30)),
-    "knees": ((30, 20, 15), (0, 80, 40)),
-    "feet": ((0, 25, 20), (0, 70, 35)),
-    "shoulders": ((15, 20, 20), (0, 60, 30)),
-    "head": ((15, 15, 20), (0, 60, 25)),
-    "arms": ((0, 20, 25), (0, 70, 50)),
+    "pelvis": ((0, 0, 0), (0, 40, 30)),
+    "hips": ((0, 15, 15), (0, 40, 25)),
+    "knees": ((30, 20, 15), (0, 50, 30)),
+    "feet": ((0, 25, 20), (0, 50, 30)),
+    "shoulders": ((15, 20, 20), (0, 40, 25)),
+    "head": ((15, 15, 20), (0, 35, 20)),
+    "arms": ((0, 25, 30), (0, 50, 40)),
 }
 DEPTH = 0.02  # of the distance from a camera that is alone, where the person's height is given
 STATURE = 0.054  # of adults' height; a person who is a tenth taller than assumed is a tenth farther away
