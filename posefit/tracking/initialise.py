@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
-from posefit.fitting.shape import Shape, fit_shape
+from posefit.fitting.shape import NAMES, SPREAD, Shape, fit_shape
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
@@ -120,14 +120,14 @@ def fitted_build(
     def frames_of(body: Body) -> list[Frame]:
         return list(follow(replace(task, body=body), chosen, np.random.default_rng(seed)))
 
+    if scene.cameras_turn:
+        filmed = replace(scene, body=task.body, observations=chosen, count=len(chosen), fps=task.fps)
+        average = Shape(task.body, np.ones(len(NAMES)), SPREAD, np.inf, height)
+        fitted = fit_contours(filmed, filmed.motion(frames_of(task.body)), Visibility.of(filmed), average, beta)
+        task = replace(task, cameras=fitted[0].cameras)
     aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
     shape = fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
-    if not scene.cameras_turn:
-        return shape, task.cameras
-    scene = replace(scene, body=shape.body, observations=chosen, count=len(chosen), fps=task.fps)
-    motion = scene.motion(frames_of(shape.body))
-    scene, _, fitted = fit_contours(scene, motion, Visibility.of(scene), shape, beta)
-    return fitted or shape, scene.cameras
+    return shape, task.cameras
 
 
 def _first_usable(observations: Sequence[Observation]) -> int:

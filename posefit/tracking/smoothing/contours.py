@@ -30,7 +30,7 @@ ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: stan
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
 CONTOUR_ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
 MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor, or of a camera's turn
-CAMERA_DEVIATION = np.radians(0.05)  # that a calibrated camera may be turned: standard deviation about each axis; ours
+CAMERA_DEVIATION = np.radians(0.03)  # that a calibrated camera may be turned: standard deviation about each axis; ours
 BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
 CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
