@@ -417,6 +417,13 @@ class ChangesTheMask(Holds, breaks="one_frame_each"):
         return super().frame(observation)
 
 
+class GivesFramesTwice(Holds, breaks="one_frame_each"):
+    def track(self, observations: Any, rng: Any) -> Any:
+        for frame in super().track(observations, rng):
+            yield frame
+            yield frame
+
+
 class ExitsInTrack(Holds, breaks="one_frame_each"):
     def frame(self, observation: Any) -> Frame:
         sys.exit(0)
