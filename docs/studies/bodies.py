@@ -503,7 +503,7 @@ def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 @click.option("--report", is_flag=True, help="Print what the folder holds instead.")
 @WORKERS
 def main(folder: Path, report: bool, workers: int | None) -> None:
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     rows = folder / "rows.jsonl"
     done = earlier(str(rows), lambda row: row["name"])
     if not report:

@@ -233,7 +233,7 @@ class Segmented(NamedTuple):
 
 
 class _Scan(NamedTuple):
-    """What the frames of a video show, whoever is followed."""
+    """What the frames of a video show, before a person is chosen."""
 
     masks: Planes  # of the largest blob
     valid: Planes

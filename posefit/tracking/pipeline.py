@@ -55,11 +55,12 @@ def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
 
 
 def with_turns(scene: Scene, calibrated: Sequence[Camera]) -> Scene:
-    """Return a scene whose guesses say by how much its cameras were turned from their calibrations."""
-    turns = [geodesic(camera.rotation, other.rotation) for camera, other in zip(scene.cameras, calibrated, strict=True)]
-    if not scene.cameras_turn:
+    """Return a scene whose guesses say by how much its cameras were turned from calibrated ones, where they were."""
+    cameras = list(zip(scene.cameras, calibrated, strict=True))
+    if all(camera is other for camera, other in cameras):
         return scene
-    said = ", ".join(f"{np.degrees(turn):.2f}" for turn in turns)
+    degrees = [np.degrees(geodesic(camera.rotation, other.rotation)) for camera, other in cameras]
+    said = ", ".join(f"{each:.2f}" for each in degrees)
     return replace(scene, guesses=[*scene.guesses, f"cameras turned by {said} degrees, so that their masks agree"])
 
 
@@ -100,6 +101,8 @@ def track_scene(
             with progress.phase("smooth"):
                 scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
         scene = with_turns(scene, given.cameras)
+        for guess in scene.guesses[len(given.guesses) :]:
+            progress.log(guess)
         with progress.phase("evaluate"):
             clock = clocks() - start_clocks + scene.reading_seconds
             track = evaluate(scene, frames, tracked, shape, method, task, options, clock)

@@ -19,6 +19,7 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
+from posefit.tracking.pipeline import with_turns
 from posefit.tracking.smoothing import contours
 from posefit.tracking.smoothing.contours import fit_contours, growth, turned_camera
 from posefit.tracking.smoothing.path import Visibility
@@ -292,6 +293,14 @@ def test_cameras_that_are_turned_from_their_calibrations_come_back() -> None:
         off_by[placing] = float(np.mean(apart)), distance(motion, truth)
     assert off_by["given"][0] < 0.6 * off_by["placed"][0]
     assert off_by["given"][1] < 0.9 * off_by["placed"][1]
+
+
+def test_by_how_much_cameras_were_turned_is_said_and_nothing_where_they_were_not() -> None:
+    scene, _ = footage(3, (0.0, 90.0))
+    assert with_turns(scene, scene.cameras) is scene
+    turned = replace(scene, cameras=[turned_camera(scene.cameras[0], np.radians([0.0, 0.3, 0.4])), scene.cameras[1]])
+    said = "cameras turned by 0.50, 0.00 degrees, so that their masks agree"  # 0.3, 0.4, 0.5: a right triangle
+    assert list(with_turns(turned, scene.cameras).guesses) == [*scene.guesses, said]
 
 
 def test_a_fit_that_costs_more_than_its_start_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
