@@ -164,7 +164,7 @@ class Person:
 def people(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> list[Person]:
     """Return the people (height, width) of a foreground, the largest first, within `roi` x, y, width, height.
 
-    There is always a first one, which is empty where nobody is; others are at least a quarter as large.
+    There is always a first one, which is empty where no person is; others are at least a quarter as large.
 
     Noise and specks go, gaps close, pieces near the largest one join it and small holes are filled. What looks like a
     shadow but lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
