@@ -26,7 +26,7 @@ from posefit.fitting.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit.fitting.landmarks import exchanged_given, exchanged_next, landmark_costs, usually_exchanged
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, JOINTS, LIMBS, root_centred
+from posefit.geometry.skeleton import ANGLES, JOINTS, LIMBS, angles_of, root_centred
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
 from posefit_exemplars.exemplars import Exemplars, Rows
@@ -41,6 +41,9 @@ CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0  # two o
 MIN_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS  # of a frame
 FRESH_SHARE = 0.45  # of the evaluations
 REFLECTED_SHARE = 0.25  # of the fresh hypotheses: reflections of the others
+LIMB_POSES, LIMB_ROUNDS = 16, 2  # of clips, whose limbs are tried in turn, and how often each limb is
+LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
+LIMB_EVALUATIONS = LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
 START_TURN = np.radians(8.0)  # that an angle is off where a fit starts: standard deviation, as all that follow
 LIBRARY_TURN = np.radians(15.0)  # that it is off similar poses of clips
 KNOWN_SHIFT, ALIGNED_SHIFT = 0.003, 0.05  # metres that a known root, and an aligned one, is off
@@ -163,7 +166,7 @@ class HypothesisFilter:
         """Yield each estimate with the pose of the likeliest sequence, up to `delay` frames later."""
         rows = None
         self._costs.clear()  # of an earlier track
-        for window in markov.windows(self._frames(estimates), self.delay):
+        for window in markov.windows(self._frames(estimates, rng.spawn(1)[0]), self.delay):
             states = [frame.states for frame in window]
             estimate, hypotheses, *_ = window[0]
             row, weights, poses = markov.viterbi_state(states), markov.state_weights(states), hypotheses.poses
@@ -173,29 +176,32 @@ class HypothesisFilter:
             paths = markov.SampledPaths.of(self._task.body.skeleton, poses[rows], hypotheses.places[rows], pose)
             yield replace(estimate, pose=pose, place=place, paths=paths)
 
-    def _frames(self, estimates: Iterable[Estimate]) -> Iterator[_FittedFrame]:
+    def _frames(self, estimates: Iterable[Estimate], rng: np.random.Generator) -> Iterator[_FittedFrame]:
         """Yield each estimate with the evaluations of its hypotheses, and these."""
         before: _FittedFrame | None = None
         latest, rows = Hypotheses.none(), np.empty(0, dtype=np.int64)
         for estimate in estimates:
             if before is not None:
                 latest, rows = before.hypotheses, self._continuing(before, estimate.frame_costs.camera_count)
-            hypotheses, noise, evaluations = self._fitted(estimate, latest, rows)
+            hypotheses, noise, evaluations = self._fitted(estimate, latest, rows, rng)
             joined = self._joined(estimate.frame_costs, hypotheses, before, noise)
             estimate = replace(estimate, evaluations=estimate.evaluations + evaluations)
             before = _FittedFrame(estimate, hypotheses, *joined)
             yield before
 
-    def _fitted(self, estimate: Estimate, latest: Hypotheses, rows: Rows) -> tuple[Hypotheses, float, float]:
+    def _fitted(
+        self, estimate: Estimate, latest: Hypotheses, rows: Rows, rng: np.random.Generator
+    ) -> tuple[Hypotheses, float, float]:
         """Return the hypotheses of a frame: fresh ones, and those that continue some `rows` of the `latest`.
 
         With them come how imprecise its masks are, and the evaluations of the fits.
         """
         frame_costs, evaluations = estimate.frame_costs, 0.0
-        fresh, continued = self._fresh(estimate, latest, rows), (latest.poses[rows], latest.places[rows])
+        fresh, continued = self._fresh(estimate, latest, rows, rng), (latest.poses[rows], latest.places[rows])
         noise = self._noise(frame_costs, *fresh)
         if frame_costs.usable:
             evaluations = len(fresh[0]) * FRESH_EVALUATIONS + len(rows) * CONTINUED_EVALUATIONS
+            evaluations += LIMB_EVALUATIONS * (frame_costs.observation.estimate is not None)
             contours = frame_costs.contours(estimate.place)
             weights = precisions(START_TURN / noise, ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT)
             fresh = fitted(self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES)
@@ -243,18 +249,43 @@ class HypothesisFilter:
             self._costs.append(FITTED_COST_SHARE * float(frame_costs.full(poses, places).min()))
         return max(float(np.quantile(self._costs or [0.0], BEST_SHARE)) / CLEAN_COST, 1.0)
 
-    def _fresh(self, estimate: Estimate, latest: Hypotheses, rows: Rows) -> tuple[Array, Array]:
-        """Return poses (n, 66) and places (n, 3): of the path, of diverse states, and reflections of the likeliest."""
+    def _fresh(
+        self, estimate: Estimate, latest: Hypotheses, rows: Rows, rng: np.random.Generator
+    ) -> tuple[Array, Array]:
+        """Return poses (n, 66) and places (n, 3): of the path, of diverse states, and reflections of the likeliest.
+
+        Where there is an earlier track, its pose is one of them, and another one is that with the limbs of some clips.
+        """
         frame_costs, (other_poses, other_places) = estimate.frame_costs, estimate.alternatives
         poses = np.concatenate([estimate.pose[None], other_poses])
         places = np.concatenate([estimate.place[None], other_places])
-        count = self.counts(frame_costs.camera_count).fresh - len(poses)  # of reflections
-        if not frame_costs.usable or count <= 0:
+        if not frame_costs.usable:
             return poses, places
-        likeliest = latest.continued(rows) if len(rows) else (poses, places)
-        reflectable, place = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
-        reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
-        return np.concatenate([poses, reflected]), np.concatenate([places, np.resize(place, (len(reflected), 3))])
+        tried, likeliest = [(poses, places)], latest.continued(rows) if len(rows) else (poses, places)
+        count = self.counts(frame_costs.camera_count).fresh - len(poses)  # of reflections
+        if count > 0:
+            reflectable, place = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
+            reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
+            tried.append((reflected, np.resize(place, (len(reflected), 3))))
+        if frame_costs.observation.estimate is not None:
+            pose, place = (array[None] for array in frame_costs.observation.estimate)
+            tried += [(pose, place), self._with_other_limbs(frame_costs, pose, place, rng)]
+        poses, places = (np.concatenate(arrays) for arrays in zip(*tried, strict=True))
+        return poses, places
+
+    def _with_other_limbs(
+        self, frame_costs: FrameCosts, pose: Array, place: Array, rng: np.random.Generator
+    ) -> tuple[Array, Array]:
+        """Return a pose (1, 66) at a place (1, 3) whose limbs are the cheapest of its own and of some poses of clips.
+
+        What one arm does says little of the other: so a few clips give many gestures.
+        """
+        places = np.repeat(place, LIMB_POSES + 1, axis=0)
+        for limb in LIMB_ANGLES * LIMB_ROUNDS:
+            poses = np.repeat(pose, LIMB_POSES + 1, axis=0)
+            poses[1:, limb] = self._exemplars.poses[self._exemplars.draw(LIMB_POSES, rng)][:, limb]
+            pose = poses[frame_costs.full(poses, places).argmin()][None]
+        return pose, place
 
     def _pulled(self, poses: Array, weights: Array, noise: float) -> tuple[Array, Array]:
         """Return what poses (n, 66) are pulled to, between themselves and similar poses of clips, and how (69,)."""

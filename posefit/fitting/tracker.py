@@ -41,6 +41,8 @@ class Observation:
     yaw: float | None = None  # radians: about which way the person faces; None where it is unknown
     # (V, 27, 3) of joints: column and row, pixels, and confidence, 0 to 1, 0 for an unknown joint; None for none at all
     landmarks: Array | None = field(default=None, repr=False)
+    # of an earlier track, to be tried among others: the pose (66,) and the root's place (3,) metres
+    estimate: tuple[Array, Array] | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,13 +79,14 @@ def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posteri
 
 
 def _setup(scene: Scene, method: Method, task: Task, options: TrackOptions) -> Setup:
+    assert options.evaluations is not None
     return Setup(
         motion=scene.name,
         method=method.name,
         settings=method.settings,
         seed=options.seed,
         train=[clip.name for clip in task.training],
-        evaluations_per_frame=task.evaluations,
+        evaluations_per_frame=options.evaluations,
         dimensions=method.dimensions(task),
         translation=task.translation,
         first_pose=options.first_pose,

@@ -6,6 +6,7 @@
 | `track_hypotheses`, `track_hypothesis` | the frames of each, and of one, by the method's tracker | this one |
 | `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
 | `smooth` | of footage: a smooth path, planted feet, poses fitted to the contours | smoothing/ |
+| `tracked_again` | of footage by several cameras: back, then onward, from what is smooth | restarts.py |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
 """
 
@@ -38,11 +39,13 @@ from posefit.tracking.restarts import (
     retrack_spins,
     reversed_task,
     stream,
+    tracked_again,
 )
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import smooth
-from posefit.tracking.trajectory import Hypothesis, cheapest, with_effort_of
+from posefit.tracking.trajectory import Hypothesis, cheapest, mean_cost, with_effort_of, with_total_effort
 
+PASSES, PASS_EVALUATIONS = 3, 2440  # of a film by several cameras, at most, and of a frame in each, at least
 MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
 
 
@@ -82,6 +85,8 @@ def track_scene(
     task = task_of(scene, options, training)
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         method = prepare(options, task)
+        passes = _passes(scene, method, options)
+        task = replace(task, evaluations=task.evaluations // passes)
         with progress.phase("build"):
             task, shape, start_clocks = initialise(scene, method, task, options, progress)
             scene = replace(scene, body=task.body, cameras=task.cameras)
@@ -94,12 +99,23 @@ def track_scene(
                 if tracked.stay is not None:
                     outside = "tracked again before frame {} and after frame {}".format(*tracked.stay)
                     progress.log(f"the body turned faster than a person can: {outside}")
-        frames = tracked.frames
+        frames, usable = tracked.frames, np.array([observation.usable for observation in scene.observations])
         if scene.count == 1 and task.before and frames[0].posterior is None:
             frames = [replace(frames[0], posterior=task.before[-1].posterior)]
         if options.smooth:
             with progress.phase("smooth"):
                 scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
+        for number in range(1, passes):
+            progress.log(f"tracking the {scene.count} frames again, {'onward' if number % 2 == 0 else 'back in time'}")
+            with progress.phase("track"):
+                latest = replace(task, body=scene.body, cameras=scene.cameras)
+                again = tracked_again(latest, scene.observations, frames, method.follow, number, options.seed)
+            with progress.phase("smooth"):
+                other, smoothed, build = smooth(scene, again, shape, method.audit.beta)
+            better = mean_cost(smoothed, usable) < mean_cost(frames, usable)
+            frames = with_total_effort([frames, smoothed], int(better))
+            if better:
+                scene, shape, tracked = other, build, tracked._replace(frames=again)
         scene = with_turns(scene, given.cameras)
         for guess in scene.guesses[len(given.guesses) :]:
             progress.log(guess)
@@ -161,6 +177,14 @@ def track_hypothesis(
         yield from reversed(joined(task.body.skeleton, behind, pivot)[1:])
         yield with_effort_of(pivot, [behind[0], pivot])
     yield from frames
+
+
+def _passes(scene: Scene, method: Method, options: TrackOptions) -> int:
+    """Return how often a film is tracked: several cameras show which of two poses is right, once it is tried."""
+    assert options.evaluations is not None
+    if len(scene.cameras) == 1 or scene.truth is not None or not (method.looks_ahead and options.smooth):
+        return 1
+    return max(min(PASSES, options.evaluations // PASS_EVALUATIONS), 1) if scene.count > 2 else 1
 
 
 def _pivot(scene: Scene, task: Task, method: Method) -> int:

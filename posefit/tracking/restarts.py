@@ -6,6 +6,7 @@
 | after a gap, or while costs are high | `relocalised`: such restarts beside the track as it is | the cheapest |
 | with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
 | where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
+| footage by several cameras | `tracked_again`: back, then onward, from what the pass before found | the cheapest |
 """
 
 from collections import deque
@@ -33,7 +34,7 @@ from posefit.tracking.trajectory import Tracked, mean_cost, with_effort_of, with
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 
-RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902}  # part of the seed of what is tracked again
+RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902, "pass": 1965}  # part of the seed of what is tracked again
 RESTARTS = 8  # searches of the first frame, at most
 MIN_WEIGHT = 0.05  # of a mode of the first frame that is tried
 JOINT_ERROR, ANGLE_ERROR = 0.06, 0.25  # metres along an axis, and radians, that the right one of searched poses is off
@@ -58,7 +59,7 @@ SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
-def stream(seed: int, kind: Literal["hypothesis", "spin", "back"], number: int) -> np.random.Generator:
+def stream(seed: int, kind: Literal["hypothesis", "spin", "back", "pass"], number: int) -> np.random.Generator:
     """Return the random generator of something that is tracked again; that of the first track is of the seed alone."""
     return np.random.default_rng([seed, RNG_STREAMS[kind], number])
 
@@ -332,6 +333,20 @@ def retrack_spins(
     new = with_total_effort([frames, new], int(better))
     new[first : last + 1] = frames[first : last + 1]
     return tracked._replace(frames=new, stay=stay if better else None)
+
+
+def tracked_again(
+    task: Task, observations: Sequence[Observation], frames: Sequence[Frame], follow: Follow, number: int, seed: int
+) -> list[Frame]:
+    """Return a track's frames tracked once more, with each of them among the poses that are tried.
+
+    Odd passes go back in time, so that what a late frame shows is known in the early ones.
+    """
+    order = range(len(frames))[:: -1 if number % 2 else 1]
+    start = replace(after(task, frames[order[0]]), before=())
+    shown = (replace(observations[k], estimate=(frames[k].pose, frames[k].translation)) for k in order)
+    again = list(follow(reversed_task(start) if number % 2 else start, shown, stream(seed, "pass", number)))
+    return again[:: order.step]
 
 
 def reversed_task(task: Task) -> Task:

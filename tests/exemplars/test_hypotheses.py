@@ -91,3 +91,27 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
     apart = np.linalg.norm(skeleton.joints(np.array([frame.pose for frame in frames])) - skeleton.joints(truth), axis=2)
     assert np.median(apart.mean(axis=1)) < 0.04
     assert all(frame.paths is not None and len(frame.paths.poses) == 24 for frame in frames)
+
+
+def test_what_an_earlier_track_had_is_tried_and_so_are_the_limbs_of_clips_on_it() -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
+    truth, arm = walk.motion.poses[:1], angles_of(LIMBS["left arm"])
+    wrong = truth.copy()
+    wrong[:, arm] += np.radians(60.0) * walk.motion.skeleton.free[arm]
+    follower = ExemplarTracker(walk.task).hypotheses
+
+    def tried(frame_costs: FrameCosts) -> Array:
+        estimate = Estimate(truth[0], walk.motion.translations[0], frame_costs, 0.0, (truth[:0], np.empty((0, 3))))
+        nothing = np.empty(0, dtype=np.int64)
+        return follower._fresh(estimate, Hypotheses.none(), nothing, np.random.default_rng(0))[0]
+
+    observation = walk.observations[0]
+    alone = tried(FrameCosts(walk.task, observation))
+    earlier = FrameCosts(walk.task, replace(observation, estimate=(wrong[0], walk.motion.translations[0])))
+    *others, same, mended = tried(earlier)
+    np.testing.assert_array_equal(others, alone)
+    np.testing.assert_array_equal(same, wrong[0])
+    costs = earlier.full(np.array([same, mended]), walk.motion.translations[[0, 0]])
+    assert costs[1] < 0.9 * costs[0]
+    kept = np.setdiff1d(np.arange(66), np.concatenate([angles_of(bones) for bones in LIMBS.values()]))
+    np.testing.assert_array_equal(mended[kept], wrong[0, kept])

@@ -279,6 +279,23 @@ def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_p
     assert track.summary["build"] is not None
     assert not any("looking for the first pose" in line for line in log)
     assert "fitting the person's build to 5 frames" in log
+    assert not any("again" in line for line in log)  # one camera leaves open which of two poses is right
     more = {"train": ["walk-a"], "restarts": 1, "body_frames": 0}
     posefit.track(tmp_path / "masks.npz", evaluations=800, progress=Progress(log.append), **more)
     assert "looking for the first pose around 1 pose with such a silhouette" in log
+
+
+@each(("evaluations", "passes"), [(2440, 1), (4880, 2)])
+def test_footage_by_several_cameras_is_tracked_again_where_evaluations_are_enough(
+    evaluations: int, passes: int, tmp_path: Path
+) -> None:
+    scene, log = scene_of(["09_01"], frames=(0, 6), size=(120, 90), view_degrees=(0.0, 90.0)), list[str]()
+    views = [[observation.silhouettes[v].mask for observation in scene.observations] for v in range(2)]
+    for v, masks in enumerate(views):
+        np.savez(tmp_path / f"{v}.npz", masks=masks)
+    given: dict[str, Any] = {"train": ["walk-a"], "body_frames": 0, "camera": scene.cameras}
+    paths = [tmp_path / "0.npz", tmp_path / "1.npz"]
+    track = posefit.track(paths, method="exemplars", evaluations=evaluations, progress=Progress(log.append), **given)
+    assert [line for line in log if "again" in line] == ["tracking the 6 frames again, back in time"] * (passes - 1)
+    assert track.summary["evaluations_per_frame"] == evaluations
+    assert track.measures.evaluations <= 6 * evaluations  # of all passes

@@ -33,6 +33,7 @@ from posefit.tracking.restarts import (
     initial_guess,
     relocalised,
     retrack_spins,
+    tracked_again,
 )
 from posefit.tracking.trajectory import (
     MIN_TYPICAL_SPEED,
@@ -433,6 +434,21 @@ def test_a_track_that_gets_no_better_is_kept(
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
     assert calls == ([list(range(11, -1, -1))] if tried else [])  # nothing comes after what stays
     assert [f.evaluations for f in kept] == [20 if tried and k < 11 else 10 for k in range(28)]
+
+
+@each(("number", "backwards"), [(1, True), (2, False)])
+def test_a_track_is_tracked_again_from_what_it_found_back_in_time_and_then_onward(number: int, backwards: bool) -> None:
+    frames = frames_facing(np.arange(28.0).tolist())
+
+    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        assert task.backwards == backwards
+        assert task.yaw == frames[27 if backwards else 0].pose[0]
+        for observation in observations:
+            assert observation.estimate is not None
+            yield frame(np.degrees(observation.estimate[0][0]) + 0.5)
+
+    again = tracked_again(SPIN_TASK, OBSERVATIONS, frames, follow, number, 0)
+    assert [np.degrees(f.pose[0]) for f in again] == pytest.approx(np.arange(28.0) + 0.5)
 
 
 def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_first_back_and_then_on() -> None:
