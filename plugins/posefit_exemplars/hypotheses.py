@@ -27,6 +27,7 @@ from posefit.fitting.landmarks import exchanged_given, exchanged_next, landmark_
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, LIMBS, angles_of, root_centred
+from posefit.geometry.symmetry import exchanged_limbs
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
 from posefit_exemplars.exemplars import Exemplars, Rows
@@ -254,7 +255,8 @@ class HypothesisFilter:
     ) -> tuple[Array, Array]:
         """Return poses (n, 66) and places (n, 3): of the path, of diverse states, and reflections of the likeliest.
 
-        Where there is an earlier track, its pose is one of them, and another one is that with the limbs of some clips.
+        Where there is an earlier track, its pose is one of them; others are that with exchanged legs, or arms, and with
+        the limbs of some clips.
         """
         frame_costs, (other_poses, other_places) = estimate.frame_costs, estimate.alternatives
         poses = np.concatenate([estimate.pose[None], other_poses])
@@ -269,7 +271,9 @@ class HypothesisFilter:
             tried.append((reflected, np.resize(place, (len(reflected), 3))))
         if frame_costs.observation.estimate is not None:
             pose, place = (array[None] for array in frame_costs.observation.estimate)
-            tried += [(pose, place), self._with_other_limbs(frame_costs, pose, place, rng)]
+            exchanged = [exchanged_limbs(self._task.body.skeleton, pose, limbs) for limbs in ("legs", "arms")]
+            tried += [(pose, place), *((other, place) for other in exchanged)]
+            tried.append(self._with_other_limbs(frame_costs, pose, place, rng))
         poses, places = (np.concatenate(arrays) for arrays in zip(*tried, strict=True))
         return poses, places
 

@@ -18,6 +18,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from posefit.fitting.driving import clocks
+from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, on_device
 from posefit.geometry.camera import Camera
@@ -43,10 +44,12 @@ from posefit.tracking.restarts import (
 )
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import smooth
-from posefit.tracking.trajectory import Hypothesis, cheapest, mean_cost, with_effort_of, with_total_effort
+from posefit.tracking.trajectory import Hypothesis, Tracked, cheapest, mean_cost, with_effort_of, with_total_effort
 
 PASSES, PASS_EVALUATIONS = 3, 2440  # of a film by several cameras, at most, and of a frame in each, at least
 MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
+
+Smoothed = tuple[Scene, list[Frame], Shape | None]
 
 
 def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
@@ -85,8 +88,7 @@ def track_scene(
     task = task_of(scene, options, training)
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         method = prepare(options, task)
-        passes = _passes(scene, method, options)
-        task = replace(task, evaluations=task.evaluations // passes)
+        task = replace(task, evaluations=task.evaluations // _passes(scene, method, options))
         with progress.phase("build"):
             task, shape, start_clocks = initialise(scene, method, task, options, progress)
             scene = replace(scene, body=task.body, cameras=task.cameras)
@@ -99,23 +101,13 @@ def track_scene(
                 if tracked.stay is not None:
                     outside = "tracked again before frame {} and after frame {}".format(*tracked.stay)
                     progress.log(f"the body turned faster than a person can: {outside}")
-        frames, usable = tracked.frames, np.array([observation.usable for observation in scene.observations])
+        frames = tracked.frames
         if scene.count == 1 and task.before and frames[0].posterior is None:
             frames = [replace(frames[0], posterior=task.before[-1].posterior)]
         if options.smooth:
             with progress.phase("smooth"):
-                scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
-        for number in range(1, passes):
-            progress.log(f"tracking the {scene.count} frames again, {'onward' if number % 2 == 0 else 'back in time'}")
-            with progress.phase("track"):
-                latest = replace(task, body=scene.body, cameras=scene.cameras)
-                again = tracked_again(latest, scene.observations, frames, method.follow, number, options.seed)
-            with progress.phase("smooth"):
-                other, smoothed, build = smooth(scene, again, shape, method.audit.beta)
-            better = mean_cost(smoothed, usable) < mean_cost(frames, usable)
-            frames = with_total_effort([frames, smoothed], int(better))
-            if better:
-                scene, shape, tracked = other, build, tracked._replace(frames=again)
+                smoothed = smooth(scene, frames, shape, method.audit.beta)
+            tracked, (scene, frames, shape) = _cheapest_pass(task, method, tracked, smoothed, options, progress)
         scene = with_turns(scene, given.cameras)
         for guess in scene.guesses[len(given.guesses) :]:
             progress.log(guess)
@@ -177,6 +169,33 @@ def track_hypothesis(
         yield from reversed(joined(task.body.skeleton, behind, pivot)[1:])
         yield with_effort_of(pivot, [behind[0], pivot])
     yield from frames
+
+
+def _cheapest_pass(
+    task: Task, method: Method, tracked: Tracked, smoothed: Smoothed, options: TrackOptions, progress: Progress
+) -> tuple[Tracked, Smoothed]:
+    """Return the cheapest of the passes of a film, and what is smoothed of it, with the effort of all."""
+    scene, frames, shape = smoothed
+    passes = _passes(scene, method, options)
+    if passes == 1:
+        return tracked, smoothed
+    usable = np.array([observation.usable for observation in scene.observations])
+
+    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        return progress.steps(method.follow(task, observations, rng), scene.count)
+
+    for number in range(1, passes):
+        progress.log(f"tracking the {scene.count} frames again, {'back in time' if number % 2 else 'onward'}")
+        with progress.phase("track"):
+            latest = replace(task, body=scene.body, cameras=scene.cameras)
+            again = tracked_again(latest, scene.observations, frames, follow, number, options.seed)
+        with progress.phase("smooth"):
+            other, others, build = smooth(scene, again, shape, method.audit.beta)
+        better = mean_cost(others, usable) < mean_cost(frames, usable)
+        frames = with_total_effort([frames, others], int(better))
+        if better:
+            scene, shape, tracked = other, build, tracked._replace(frames=again)
+    return tracked, (scene, frames, shape)
 
 
 def _passes(scene: Scene, method: Method, options: TrackOptions) -> int:

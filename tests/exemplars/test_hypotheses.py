@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
-from posefit.geometry.symmetry import turned_poses
+from posefit.geometry.symmetry import exchanged_limbs, turned_poses
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import MAX_PART_COST, PARTS, Hypotheses, step_costs
@@ -93,7 +93,7 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
     assert all(frame.paths is not None and len(frame.paths.poses) == 24 for frame in frames)
 
 
-def test_what_an_earlier_track_had_is_tried_and_so_are_the_limbs_of_clips_on_it() -> None:
+def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs() -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
     truth, arm = walk.motion.poses[:1], angles_of(LIMBS["left arm"])
     wrong = truth.copy()
@@ -108,9 +108,11 @@ def test_what_an_earlier_track_had_is_tried_and_so_are_the_limbs_of_clips_on_it(
     observation = walk.observations[0]
     alone = tried(FrameCosts(walk.task, observation))
     earlier = FrameCosts(walk.task, replace(observation, estimate=(wrong[0], walk.motion.translations[0])))
-    *others, same, mended = tried(earlier)
+    *others, same, legs, arms, mended = tried(earlier)
     np.testing.assert_array_equal(others, alone)
     np.testing.assert_array_equal(same, wrong[0])
+    for limbs, pose in (("legs", legs), ("arms", arms)):
+        np.testing.assert_array_equal(pose, exchanged_limbs(walk.motion.skeleton, wrong, limbs)[0])
     costs = earlier.full(np.array([same, mended]), walk.motion.translations[[0, 0]])
     assert costs[1] < 0.9 * costs[0]
     kept = np.setdiff1d(np.arange(66), np.concatenate([angles_of(bones) for bones in LIMBS.values()]))
