@@ -148,7 +148,7 @@ def contour_squares(
 ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
 MAX_ANGLE_STEP = np.radians(20.0)  # of a step
 POINT_SPACING = 0.04  # metres, about, between two points of a mask's border, where one frame is fitted
-STEP_EVALUATIONS = 27.0  # effort of a step of one frame, in costs of poses, which docs/studies/follow.py measures
+STEP_EVALUATIONS = 27.0  # that a step of one frame counts as; docs/studies/follow.py measures how many it takes
 
 
 def fitted(
