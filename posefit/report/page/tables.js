@@ -161,12 +161,10 @@ function allRows() {
 function runningTimes() {
   const functions = new Map(D.times.map((row) => [row.function, `${row.function} ${row.name}`]));
   const dimensions = [...new Set(D.times.map((row) => row.dimension))].sort((a, b) => a - b);
-  const time = (above, k) => {
-    const ends = (row) => row.ends[k].map((end) => (given(end) ? whole(end) : "∞")).join(" – ");
-    const show = (value, row) => [whole(value), given(row.ends[k][0]) ? make("small", {}, ends(row)) : null];
-    const about = `Expected evaluations to ${above} above the best known cost`;
-    return column(`ERT +${above}`, (row) => row.times[k], show, { about });
-  };
+  const time = (above, k) =>
+    column(`ERT +${above}`, (row) => row.times[k], whole, {
+      about: `Expected evaluations to ${above} above the best known cost`,
+    });
   const columns = [
     methodColumn("method"),
     textColumn("function", "function", (one) => functions.get(one)),
