@@ -231,7 +231,9 @@ class HypothesisFilter:
             silhouette_costs = frame_costs.full(poses, places)
             self._costs.append(float(silhouette_costs.min()))
             costs += silhouette_costs / (noise * self._temperature)
-            costs += self._library_cost * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
+            # beside an earlier track, with limbs that no clip has together, each view counts as much as clips do
+            views = 1 if frame_costs.observation.estimate is None else frame_costs.camera_count
+            costs += self._library_cost / views * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
         latest = before.hypotheses
