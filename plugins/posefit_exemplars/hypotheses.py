@@ -284,7 +284,8 @@ class HypothesisFilter:
     ) -> tuple[Array, Array]:
         """Return a pose (1, 66) at a place (1, 3) whose limbs are the cheapest of its own and of some poses of clips.
 
-        What one arm does says little of the other: so a few clips give many gestures.
+        What one arm does says little of the other: so a few clips give many gestures, as the crossover of Deutscher
+        and Reid (2005) does.
         """
         places = np.repeat(place, LIMB_POSES + 1, axis=0)
         for limb in LIMB_ANGLES * LIMB_ROUNDS:

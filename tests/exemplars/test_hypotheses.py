@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.tracker import Observation
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.geometry.symmetry import exchanged_limbs, turned_poses
 from posefit.motion import built_in
@@ -117,3 +118,21 @@ def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs(
     assert costs[1] < 0.9 * costs[0]
     kept = np.setdiff1d(np.arange(66), np.concatenate([angles_of(bones) for bones in LIMBS.values()]))
     np.testing.assert_array_equal(mended[kept], wrong[0, kept])
+
+
+def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views() -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
+    follower, observation, place = ExemplarTracker(walk.task).hypotheses, walk.observations[0], walk.motion.translations
+    poses = walk.motion.poses[[0, 0]]
+    poses[1, angles_of(LIMBS["left arm"])] += 0.5
+    hypotheses = Hypotheses.of(walk.task, poses, place[[0, 0]], np.array([-1, -1]), Hypotheses.none())
+
+    def apart(observation: Observation) -> float:
+        totals = follower._joined(FrameCosts(walk.task, observation), hypotheses, None, 1.0)[0].totals
+        return float(totals[1] - totals[0])
+
+    off = follower._exemplars.nearest(poses, 1)[1][:, 0] / 0.05**2
+    clips = 4.0 * np.log1p(0.5 * off)
+    earlier = replace(observation, estimate=(poses[0], place[0]))
+    np.testing.assert_allclose(apart(observation) - apart(earlier), 0.5 * (clips[1] - clips[0]), rtol=1e-6)
+    assert clips[1] > clips[0] + 1.0
