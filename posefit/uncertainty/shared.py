@@ -32,7 +32,7 @@ SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "feet": ((0, 30, 25), (0, 60, 35)),
     "shoulders": ((15, 20, 20), (0, 40, 25)),
     "head": ((15, 20, 15), (0, 35, 20)),
-    "arms": ((0, 30, 30), (0, 50, 40)),
+    "arms": ((0, 25, 30), (0, 50, 40)),
 }
 DEPTH = 0.02  # of the distance from a camera that is alone, where the person's height is given
 STATURE = 0.054  # of adults' height; a person who is a tenth taller than assumed is a tenth farther away
