@@ -88,7 +88,8 @@ def track_scene(
     task = task_of(scene, options, training)
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         method = prepare(options, task)
-        task = replace(task, evaluations=task.evaluations // _passes(scene, method, options))
+        passes = _passes(scene, method, task.evaluations, bool(options.smooth))
+        task = replace(task, evaluations=task.evaluations // passes)
         with progress.phase("build"):
             task, shape, start_clocks = initialise(scene, method, task, options, progress)
             scene = replace(scene, body=task.body, cameras=task.cameras)
@@ -106,8 +107,10 @@ def track_scene(
             frames = [replace(frames[0], posterior=task.before[-1].posterior)]
         if options.smooth:
             with progress.phase("smooth"):
-                smoothed = smooth(scene, frames, shape, method.audit.beta)
-            tracked, (scene, frames, shape) = _cheapest_pass(task, method, tracked, smoothed, options, progress)
+                scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
+        if passes > 1:
+            passed = tracked, (scene, frames, shape)
+            tracked, (scene, frames, shape) = _cheapest_pass(task, method, *passed, passes, options.seed, progress)
         scene = with_turns(scene, given.cameras)
         for guess in scene.guesses[len(given.guesses) :]:
             progress.log(guess)
@@ -172,13 +175,10 @@ def track_hypothesis(
 
 
 def _cheapest_pass(
-    task: Task, method: Method, tracked: Tracked, smoothed: Smoothed, options: TrackOptions, progress: Progress
+    task: Task, method: Method, tracked: Tracked, smoothed: Smoothed, passes: int, seed: int, progress: Progress
 ) -> tuple[Tracked, Smoothed]:
-    """Return the cheapest of the passes of a film, and what is smoothed of it, with the effort of all."""
+    """Return the cheapest of so many passes of a film, and what is smoothed of it, with the effort of all."""
     scene, frames, shape = smoothed
-    passes = _passes(scene, method, options)
-    if passes == 1:
-        return tracked, smoothed
     usable = np.array([observation.usable for observation in scene.observations])
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -188,7 +188,7 @@ def _cheapest_pass(
         progress.log(f"tracking the {scene.count} frames again, {'back in time' if number % 2 else 'onward'}")
         with progress.phase("track"):
             latest = replace(task, body=scene.body, cameras=scene.cameras)
-            again = tracked_again(latest, scene.observations, frames, follow, number, options.seed)
+            again = tracked_again(latest, scene.observations, frames, follow, number, seed)
         with progress.phase("smooth"):
             other, others, build = smooth(scene, again, shape, method.audit.beta)
         better = mean_cost(others, usable) < mean_cost(frames, usable)
@@ -198,12 +198,11 @@ def _cheapest_pass(
     return tracked, (scene, frames, shape)
 
 
-def _passes(scene: Scene, method: Method, options: TrackOptions) -> int:
+def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> int:
     """Return how often a film is tracked: several cameras show which of two poses is right, once it is tried."""
-    assert options.evaluations is not None
-    if len(scene.cameras) == 1 or scene.truth is not None or not (method.looks_ahead and options.smooth):
+    if len(scene.cameras) == 1 or scene.count < 3 or scene.truth is not None:
         return 1
-    return max(min(PASSES, options.evaluations // PASS_EVALUATIONS), 1) if scene.count > 2 else 1
+    return max(min(PASSES, evaluations // PASS_EVALUATIONS), 1) if method.looks_ahead and smoothed else 1
 
 
 def _pivot(scene: Scene, task: Task, method: Method) -> int:

@@ -24,7 +24,7 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.pipeline import track_hypotheses
+from posefit.tracking.pipeline import _cheapest_pass, track_hypotheses
 from posefit.tracking.restarts import (
     GUESSES,
     MAX_TURN_RATE,
@@ -35,6 +35,7 @@ from posefit.tracking.restarts import (
     retrack_spins,
     tracked_again,
 )
+from posefit.tracking.smoothing.smooth import smooth
 from posefit.tracking.trajectory import (
     MIN_TYPICAL_SPEED,
     WALKING_SPEED,
@@ -45,7 +46,7 @@ from posefit.tracking.trajectory import (
 )
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
-from tests.tracking.scenes import stopping, walk
+from tests.tracking.scenes import exact_frames, stopping, walk
 
 WALK = built_in.motion("walk", frames=30)
 SKELETON = WALK.skeleton
@@ -449,6 +450,25 @@ def test_a_track_is_tracked_again_from_what_it_found_back_in_time_and_then_onwar
 
     again = tracked_again(SPIN_TASK, OBSERVATIONS, frames, follow, number, 0)
     assert [np.degrees(f.pose[0]) for f in again] == pytest.approx(np.arange(28.0) + 0.5)
+
+
+@each("begins_right", [True, False])
+def test_the_cheapest_pass_is_kept_with_the_effort_of_all(begins_right: bool) -> None:
+    known = walk(6, (0.0, 90.0), (120, 90))
+    scene, right = replace(known, truth=None), exact_frames(known)
+    wrong = [replace(each, pose=each.pose + np.radians(20.0) * SKELETON.free) for each in right]
+    first, other = (right, wrong) if begins_right else (wrong, right)
+
+    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        assert [each.estimate is None for each in observations] == [False] * 6
+        yield from other[::-1]  # back in time
+
+    method: Any = SimpleNamespace(follow=follow, audit=SimpleNamespace(beta=0.5))
+    began, best = (smooth(scene, frames, None, 0.5) for frames in (first, right))
+    tracked, (_, frames, _) = _cheapest_pass(SPIN_TASK, method, Tracked(first, []), began, 2, 0, Progress())
+    assert list(tracked.frames) == right
+    np.testing.assert_array_equal([each.pose for each in frames], [each.pose for each in best[1]])
+    assert [each.evaluations for each in frames] == [2] * 6
 
 
 def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_first_back_and_then_on() -> None:
