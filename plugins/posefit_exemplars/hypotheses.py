@@ -63,7 +63,8 @@ _LIMBS = [np.array([JOINTS.index(bone) for bone in bones]) for bones in LIMBS.va
 _TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
 PARTS: Sequence[Rows] = [_TRUNK, *_LIMBS]  # joints
 SPEED_COSTS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}  # of speeds at which a part continues
-MAX_PART_COST = 4.0  # of a step of one part
+MAX_PART_COST = 4.0  # of a step of one part, between clean masks
+MAX_JUMP_NOISE = 3.0  # times which that is as masks are less precise, by the square of how much
 
 
 class Hypotheses(NamedTuple):
@@ -113,11 +114,12 @@ class _FittedFrame(NamedTuple):
     exchanged: Array  # (n, K) how likely left and right of groups of landmarks are exchanged
 
 
-def step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
+def step_costs(spread: float, limit: float, before: Hypotheses, after: Hypotheses) -> Array:
     """Return the costs (n, m) of steps between hypotheses of successive frames.
 
     For the trunk and each limb, half the square, over the `spread`, of its joints' distance from where the mean of both
-    rates leads, and of the difference of the rates, root mean square over all joints; at the cheapest of a few speeds.
+    rates leads, and of the difference of the rates, root mean square over all joints; at the cheapest of a few speeds,
+    and no more than the `limit`.
     """
     scale = 0.5 / (spread**2 * len(JOINTS))
     total = np.zeros((len(before.joints), len(after.joints)))
@@ -127,7 +129,7 @@ def step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
             for array in (before.joints, before.rates, after.joints, after.rates)
         )
         changes = squared_distances(rates, later_rates)
-        costs = np.full(changes.shape, MAX_PART_COST)
+        costs = np.full(changes.shape, limit)
         for speed, cost in SPEED_COSTS.items():
             half = np.float32(0.5 * speed)
             squares = squared_distances(joints + half * rates, later - half * later_rates)
@@ -237,7 +239,8 @@ class HypothesisFilter:
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
         latest = before.hypotheses
-        steps = step_costs(self._spread, latest, hypotheses) + landmarks - landmarks.min(axis=0)
+        limit = MAX_PART_COST * min(noise**2, MAX_JUMP_NOISE)  # or each mask that is wrong would pay for a jump
+        steps = step_costs(self._spread, limit, latest, hypotheses) + landmarks - landmarks.min(axis=0)
         if frame_costs.root is None:
             expected = latest.places + latest.shifts
             steps += root_deviation_costs(places, expected[:, None], frame_costs.camera_position)

@@ -18,7 +18,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from posefit.fitting.driving import clocks
-from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, on_device
 from posefit.geometry.camera import Camera
@@ -43,13 +42,13 @@ from posefit.tracking.restarts import (
     tracked_again,
 )
 from posefit.tracking.result import Track
-from posefit.tracking.smoothing.smooth import smooth
+from posefit.tracking.smoothing.legs import with_cheapest_legs
+from posefit.tracking.smoothing.smooth import Smoothed, smooth
 from posefit.tracking.trajectory import Hypothesis, Tracked, cheapest, mean_cost, with_effort_of, with_total_effort
 
 PASSES, PASS_EVALUATIONS = 3, 2440  # of a film by several cameras, at most, and of a frame in each, at least
+SHORTEST = 3  # frames that are more than single pictures
 MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
-
-Smoothed = tuple[Scene, list[Frame], Shape | None]
 
 
 def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
@@ -105,12 +104,16 @@ def track_scene(
         frames = tracked.frames
         if scene.count == 1 and task.before and frames[0].posterior is None:
             frames = [replace(frames[0], posterior=task.before[-1].posterior)]
+        smoothed = Smoothed(scene, frames, shape)
         if options.smooth:
             with progress.phase("smooth"):
-                scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
+                smoothed = smooth(*smoothed, method.audit.beta)
+                if len(scene.cameras) == 1 and scene.count >= SHORTEST:
+                    frames, smoothed = with_cheapest_legs(frames, smoothed, method.audit.beta)
+                    tracked = tracked._replace(frames=frames)
         if passes > 1:
-            passed = tracked, (scene, frames, shape)
-            tracked, (scene, frames, shape) = _cheapest_pass(task, method, *passed, passes, options.seed, progress)
+            tracked, smoothed = _cheapest_pass(task, method, tracked, smoothed, passes, options.seed, progress)
+        scene, frames, shape = smoothed
         scene = with_turns(scene, given.cameras)
         for guess in scene.guesses[len(given.guesses) :]:
             progress.log(guess)
@@ -195,12 +198,12 @@ def _cheapest_pass(
         frames = with_total_effort([frames, others], int(better))
         if better:
             scene, shape, tracked = other, build, tracked._replace(frames=again)
-    return tracked, (scene, frames, shape)
+    return tracked, Smoothed(scene, frames, shape)
 
 
 def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> int:
     """Return how often a film is tracked: several cameras show which of two poses is right, once it is tried."""
-    if len(scene.cameras) == 1 or scene.count < 3 or scene.truth is not None:
+    if len(scene.cameras) == 1 or scene.count < SHORTEST or scene.truth is not None:
         return 1
     return max(min(PASSES, evaluations // PASS_EVALUATIONS), 1) if method.looks_ahead and smoothed else 1
 

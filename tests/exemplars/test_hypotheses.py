@@ -33,7 +33,7 @@ def test_every_joint_is_in_one_part() -> None:
 
 def test_what_steps_cost_by_hand() -> None:
     def cost(code: float, rate: float, later: float, later_rate: float) -> float:
-        return float(step_costs(0.03, single(code, rate), single(later, later_rate))[0, 0])
+        return float(step_costs(0.03, MAX_PART_COST, single(code, rate), single(later, later_rate))[0, 0])
 
     np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-5)  # it goes on as it does
     np.testing.assert_allclose(cost(0.1, 0.0, 0.1, 0.0), 0.0, atol=1e-5)
@@ -46,10 +46,10 @@ def test_what_steps_cost_by_hand() -> None:
     np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5)
     assert cost(0.0, 0.0, 1.0, 0.0) == MAX_PART_COST
     # two parts that are far off cost twice as much as one
-    assert float(step_costs(0.03, single(0.0, 0.0), single(1.0, 0.0))[0, 0]) == MAX_PART_COST
+    assert float(step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), single(1.0, 0.0))[0, 0]) == MAX_PART_COST
     both = single(1.0, 0.0)
     both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
-    assert float(step_costs(0.03, single(0.0, 0.0), both)[0, 0]) == 2.0 * MAX_PART_COST
+    assert float(step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), both)[0, 0]) == 2.0 * MAX_PART_COST
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,21 +19,34 @@ from posefit.tracking.trajectory import mean_cost
 STEADY_SECONDS = 1.0 / 30.0  # standard deviation of the filter of angles that a single camera sees
 
 
-def smooth(
-    scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float
-) -> tuple[Scene, list[Frame], Shape | None]:
-    """Return a scene and its frames, smoothed, and with them the build, where it was fitted before: else it is known.
+class Smoothed(NamedTuple):
+    """Smoothed frames, and the scene and the build that they fit, where that was fitted before: else it is known."""
+
+    scene: Scene
+    frames: list[Frame]
+    shape: Shape | None
+
+
+def smooth(scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float) -> Smoothed:
+    """Return the frames of a scene, smoothed.
 
     Costs and areas are those of the smoothed frames, and their posteriors move as far as the pose and the root did.
     """
     visibility = Visibility.of(scene)
-    motion = smooth_path(steadied(scene.motion(frames), visibility), visibility)
-    scene, motion, shape = fit_contours(scene, motion, visibility, shape, beta)
+    scene, motion, shape = smoothed_motion(scene, scene.motion(frames), shape, beta)
     motion = smooth_path(motion, visibility)  # contours pull at standing feet
     smoothed = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smoothed, visibility.usable))
-    return scene, smoothed, shape
+    return Smoothed(scene, smoothed, shape)
+
+
+def smoothed_motion(
+    scene: Scene, motion: Motion, shape: Shape | None, beta: float
+) -> tuple[Scene, Motion, Shape | None]:
+    """Return a scene's motion, smoothed and fitted to the contours, with the scene and the build that it fits."""
+    visibility = Visibility.of(scene)
+    return fit_contours(scene, smooth_path(steadied(motion, visibility), visibility), visibility, shape, beta)
 
 
 def steadied(motion: Motion, visibility: Visibility) -> Motion:

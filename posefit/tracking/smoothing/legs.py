@@ -1,0 +1,137 @@
+"""Which leg is the left one, over a whole film by one camera.
+
+From the side, two legs that pass each other look like two that meet and go back, and a track takes the one for the
+other. But a body whose legs go back, or are exchanged in the middle of a stride, does not stay on the masks once its
+motion is smooth. So legs are exchanged, for a trial, from each doubtful frame on. What the trials cost, and each
+stretch between them as it is and exchanged, gives the cheapest sequence of exchanges.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.fitting.landmarks import LEGS, landmark_likelihoods, side_odds
+from posefit.fitting.tracker import Frame, Observation
+from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
+from posefit.geometry.symmetry import exchanged_limbs
+from posefit.motion.motion import Motion
+from posefit.silhouette.cost import pose_costs
+from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
+from posefit.tracking.trajectory import mean_cost
+
+ROUNDS = 3
+TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
+PASSING = 0.16  # metres, rms: exchanged legs that are so near to those of the frame before may be theirs
+JUMPING, HIGH_COST = 0.33, 1.3  # the same, where a smoothed frame costs so many times the median, the most around
+AROUND_SECONDS = 0.08  # in which one frame stands for all
+ODDS_COST = 0.5  # of landmarks: of the logarithm of the odds that legs are as they are, as errors last for frames
+LEG_JOINTS = [JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]]
+
+
+def with_cheapest_legs(tracked: list[Frame], smoothed: Smoothed, beta: float) -> tuple[list[Frame], Smoothed]:
+    """Return tracked frames whose legs, exchanged in some, are cheapest once they are smoothed, and both of these."""
+    scene, shape = smoothed.scene, smoothed.shape
+    usable = np.array([observation.usable for observation in scene.observations])
+    for _ in range(ROUNDS):
+        exchanged = legs_exchanged(smoothed.scene, tracked, beta)
+        pairs = zip(tracked, exchanged, strict=True)
+        frames = [_exchanged(smoothed.scene, frame) if other else frame for frame, other in pairs]
+        again = smooth(scene, frames, shape, beta) if exchanged.any() else smoothed
+        if mean_cost(again.frames, usable) >= mean_cost(smoothed.frames, usable):
+            break
+        tracked, smoothed = frames, again
+    return tracked, smoothed
+
+
+def legs_exchanged(scene: Scene, frames: Sequence[Frame], beta: float) -> NDArray[np.bool_]:
+    """Return in which frames (T,) legs should be exchanged, as that is cheaper."""
+    pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
+    here, there = (scene.motion(each) for each in pairs)
+    costs = _smoothed_costs(scene, here, beta)
+    added = _smoothed_costs(scene, there, beta) - costs
+    edges = doubtful(here, there, costs)
+    exchanged, reach, switches = np.zeros(len(frames), dtype=np.int64), max(round(TRIAL_SECONDS * scene.fps), 2), []
+    for edge in edges:  # in the order of time: two that are near each other may be one
+        window, later = range(max(edge - reach, 0), min(edge + reach, len(frames))), np.arange(len(frames)) >= edge
+        shown = replace(scene, observations=[scene.observations[k] for k in window])
+        trials = [[pairs[which[k]][k] for k in window] for which in (exchanged, exchanged ^ later)]
+        kept, switched = (_smoothed_costs(shown, shown.motion(trial), beta).sum() for trial in trials)
+        switch = switched - kept - np.where(exchanged, -added, added)[edge : window.stop].sum()
+        switches.append(abs(switch))
+        exchanged ^= later & (switch < 0.0)
+    starts, stops = [0, *edges], [*edges, len(frames)]
+    stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + _odds(scene, here)), starts)
+    others = np.repeat(cheapest_sequence(stretches, switches), np.subtract(stops, starts))
+    return np.asarray(exchanged != others)
+
+
+def doubtful(here: Motion, there: Motion, costs: Array) -> list[int]:
+    """Return the frames from which legs may have to be exchanged: those of `there` are near to those of the one before.
+
+    They need not be as near where the smoothed frame costs more than others.
+    """
+    legs, exchanged = (root_centred(motion.skeleton.joints(motion.poses))[:, LEG_JOINTS] for motion in (here, there))
+    off = np.append(np.inf, np.sqrt(((exchanged[1:] - legs[:-1]) ** 2).sum(axis=2).mean(axis=1)))
+    around = max(round(AROUND_SECONDS * here.fps), 1)
+
+    def least(values: Array) -> NDArray[np.bool_]:
+        """Return where values (T,) are the least around."""
+        padded = np.pad(values, around, constant_values=np.inf)
+        return np.asarray(values <= np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1).min(axis=1))
+
+    passing = (off < PASSING) & least(off)
+    jumping = (off < JUMPING) & least(-costs) & (costs > HIGH_COST * np.median(costs))
+    return [int(frame) for frame in np.flatnonzero(passing | jumping)]
+
+
+def cheapest_sequence(costs: Array, switches: Sequence[float]) -> list[int]:
+    """Return the cheapest sequence of states, each 0 or 1.
+
+    Where it is 1 it costs one of `costs` (n), and a change costs one of `switches` (n - 1).
+    """
+    totals, parents = np.array([0.0, costs[0]]), []
+    for cost, switch in zip(costs[1:], switches, strict=True):
+        paths = totals[:, None] + switch * (1.0 - np.eye(2))
+        parents.append(paths.argmin(axis=0))
+        totals = paths.min(axis=0) + np.array([0.0, cost])
+    states = [int(totals.argmin())]
+    for parent in reversed(parents):
+        states.append(int(parent[states[-1]]))
+    return states[::-1]
+
+
+def _exchanged(scene: Scene, frame: Frame) -> Frame:
+    """Return a frame with exchanged legs; so are those of its posterior."""
+    skeleton, posterior = scene.body.skeleton, frame.posterior
+    if posterior is not None:
+        posterior = replace(posterior, poses=exchanged_limbs(skeleton, posterior.poses, "legs"))
+    return replace(frame, pose=exchanged_limbs(skeleton, frame.pose[None], "legs")[0], posterior=posterior)
+
+
+def _smoothed_costs(scene: Scene, motion: Motion, beta: float) -> Array:
+    """Return the costs (T,) of a motion's frames once it is smoothed; 0 for those that show too little."""
+    scene, motion, _ = smoothed_motion(scene, motion, None, beta)
+    return np.array(
+        [_cost(scene, *each, beta) for each in zip(scene.observations, motion.poses, motion.translations, strict=True)]
+    )
+
+
+def _cost(scene: Scene, observation: Observation, pose: Array, place: Array, beta: float) -> float:
+    if not observation.usable:
+        return 0.0
+    return float(pose_costs(scene.body, scene.cameras, observation.silhouettes, pose[None], place[None], beta)[0][0])
+
+
+def _odds(scene: Scene, motion: Motion) -> Array:
+    """Return what landmarks add (T,) to the cost of frames with exchanged legs."""
+    costs = np.zeros(len(motion))
+    for k, observation in enumerate(scene.observations):
+        if observation.landmarks is not None:
+            seen = motion.skeleton, scene.cameras, observation.landmarks
+            likelihoods = landmark_likelihoods(*seen, motion.poses[k : k + 1], motion.translations[k : k + 1])
+            costs[k] = ODDS_COST * side_odds(likelihoods[0])[LEGS]
+    return costs

@@ -1,0 +1,103 @@
+"""Legs that a film by one camera exchanges: their sequence by trying all, and walks whose legs come back."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from posefit.fitting.tracker import Frame, Observation
+from posefit.footage.scene import Scene
+from posefit.geometry.symmetry import exchanged_limbs
+from posefit.silhouette.cost import BETA
+from posefit.tracking.smoothing.legs import cheapest_sequence, doubtful, legs_exchanged, with_cheapest_legs
+from posefit.tracking.smoothing.smooth import smooth
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
+from tests.tracking.scenes import exact_frames, walk
+
+FRAMES, PASSING = 24, 11  # of a walk seen from its side, and the one in which legs pass each other
+
+
+@pytest.fixture(scope="module")
+def film() -> tuple[Scene, list[Frame]]:
+    """A film, and the frames of its truth."""
+    scene = walk(FRAMES, (90.0,), (160, 160))
+    frames = exact_frames(scene)
+    observations = [Observation(list(observation.silhouettes)) for observation in scene.observations]
+    return replace(scene, truth=None, observations=observations), frames
+
+
+def exchanged(scene: Scene, frames: list[Frame], which: range) -> list[Frame]:
+    poses = exchanged_limbs(scene.body.skeleton, np.array([frame.pose for frame in frames]), "legs")
+    return [replace(frame, pose=poses[k]) if k in which else frame for k, frame in enumerate(frames)]
+
+
+def changes(flags: NDArray[np.bool_]) -> list[int]:
+    return (np.flatnonzero(np.diff(flags)) + 1).tolist()
+
+
+def test_the_cheapest_sequence_is_that_of_trying_all() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        costs, switches = rng.normal(0.0, 2.0, 7), rng.normal(1.0, 2.0, 6)
+        every = [
+            (float(np.dot(states, costs) + np.abs(np.diff(states)) @ switches), states)
+            for states in product((0, 1), repeat=7)
+        ]
+        assert cheapest_sequence(costs, switches.tolist()) == list(min(every)[1])
+
+
+def test_legs_that_pass_are_doubtful(film: tuple[Scene, list[Frame]]) -> None:
+    scene, frames = film
+    here, there = (scene.motion(each) for each in (frames, exchanged(scene, frames, range(FRAMES))))
+    assert doubtful(here, there, np.ones(FRAMES)) == [PASSING]
+    costs = np.ones(FRAMES)
+    costs[4] = 2.0  # legs are far apart there: nothing is tried however much it costs
+    assert doubtful(here, there, costs) == [PASSING]
+
+
+@pytest.mark.parametrize("wrong", [range(PASSING, FRAMES), range(PASSING), range(16, 19)])
+def test_legs_that_went_back_pass(film: tuple[Scene, list[Frame]], wrong: range) -> None:
+    """Which of the two goes ahead is not known from the side: all may be exchanged. Where they pass is, to a frame."""
+    scene, frames = film
+    found = legs_exchanged(scene, exchanged(scene, frames, wrong), BETA)
+    right = np.isin(np.arange(FRAMES), wrong)
+    assert changes(found) == pytest.approx(changes(right), abs=1)
+
+
+def test_right_legs_stay(film: tuple[Scene, list[Frame]]) -> None:
+    scene, frames = film
+    assert not changes(legs_exchanged(scene, frames, BETA))
+
+
+def test_landmarks_say_which_leg_is_the_left_one(film: tuple[Scene, list[Frame]]) -> None:
+    """Landmarks of half the frames are enough, and those of the others do not matter."""
+    scene, frames = film
+    joints = scene.motion(frames).joints
+    pixels = np.array([scene.cameras[0].project(each)[0] for each in joints])
+    marks = np.dstack([pixels, np.full(pixels.shape[:2], 0.9)])[:, None]
+    observations = [
+        replace(observation, landmarks=marks[k] if k % 2 else None) for k, observation in enumerate(scene.observations)
+    ]
+    scene = replace(scene, observations=observations)
+    assert not legs_exchanged(scene, frames, BETA).any()
+    assert legs_exchanged(scene, exchanged(scene, frames, range(FRAMES)), BETA).all()
+
+
+def test_exchanged_frames_are_smoothed_again_with_their_posteriors(film: tuple[Scene, list[Frame]]) -> None:
+    scene, frames = film
+    wrong = [
+        replace(
+            frame, posterior=Posterior(frame.pose[None], frame.translation[None], np.ones(1), False, Recalibration())
+        )
+        for frame in exchanged(scene, frames, range(PASSING, FRAMES))
+    ]
+    before = smooth(scene, wrong, None, BETA)
+    tracked, after = with_cheapest_legs(wrong, before, BETA)
+    costs = [np.mean([frame.cost for frame in each]) for each in (before.frames, after.frames)]
+    assert costs[1] < 0.8 * costs[0]
+    for frame in tracked:
+        assert frame.posterior is not None
+        assert frame.posterior.poses[0] == pytest.approx(frame.pose)
