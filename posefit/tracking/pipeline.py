@@ -6,6 +6,7 @@
 | `track_hypotheses`, `track_hypothesis` | the frames of each, and of one, by the method's tracker | this one |
 | `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
 | `smooth` | of footage: a smooth path, planted feet, poses fitted to the contours | smoothing/ |
+| `with_cheapest_legs` | of footage by one camera: the same with legs exchanged in some frames | smoothing/legs.py |
 | `tracked_again` | of footage by several cameras: back, then onward, from what is smooth | restarts.py |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
 """

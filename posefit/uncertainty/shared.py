@@ -28,13 +28,13 @@ PARTS: Mapping[str, Sequence[str]] = {  # joints, named after the bones that end
 SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "pelvis": ((0, 0, 0), (0, 35, 25)),
     "hips": ((0, 15, 15), (0, 35, 25)),
-    "knees": ((30, 20, 20), (0, 50, 35)),
+    "knees": ((0, 20, 20), (0, 50, 35)),
     "feet": ((0, 30, 25), (0, 60, 35)),
     "shoulders": ((15, 20, 20), (0, 40, 25)),
     "head": ((15, 20, 15), (0, 35, 20)),
     "arms": ((0, 25, 30), (0, 50, 40)),
 }
-DEPTH = 0.02  # of the distance from a camera that is alone, where the person's height is given
+DEPTH = 0.015  # of the distance from a camera that is alone, where the person's height is given
 STATURE = 0.054  # of adults' height; a person who is a tenth taller than assumed is a tenth farther away
 
 
