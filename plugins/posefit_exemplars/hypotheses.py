@@ -138,6 +138,14 @@ def step_costs(spread: float, limit: float, before: Hypotheses, after: Hypothese
     return total
 
 
+def jump_cost(noise: float) -> float:
+    """Return what a step of one part costs at most, between masks that are so many times less precise than clean ones.
+
+    Where they are, wrong poses fit some frames better than right ones by more, which must not pay for a jump.
+    """
+    return MAX_PART_COST * min(noise**2, MAX_JUMP_NOISE)
+
+
 class HypothesisFilter:
     """Fits the hypotheses of one frame after the other, and reports the likeliest sequence `delay` frames later."""
 
@@ -239,8 +247,7 @@ class HypothesisFilter:
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
         latest = before.hypotheses
-        limit = MAX_PART_COST * min(noise**2, MAX_JUMP_NOISE)  # or each mask that is wrong would pay for a jump
-        steps = step_costs(self._spread, limit, latest, hypotheses) + landmarks - landmarks.min(axis=0)
+        steps = step_costs(self._spread, jump_cost(noise), latest, hypotheses) + landmarks - landmarks.min(axis=0)
         if frame_costs.root is None:
             expected = latest.places + latest.shifts
             steps += root_deviation_costs(places, expected[:, None], frame_costs.camera_position)

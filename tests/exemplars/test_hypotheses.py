@@ -11,7 +11,7 @@ from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.geometry.symmetry import exchanged_limbs, turned_poses
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import MAX_PART_COST, PARTS, Hypotheses, step_costs
+from posefit_exemplars.hypotheses import MAX_PART_COST, PARTS, Hypotheses, jump_cost, step_costs
 from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.exemplars.conftest import Walk, walk_of
@@ -50,6 +50,10 @@ def test_what_steps_cost_by_hand() -> None:
     both = single(1.0, 0.0)
     both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
     assert float(step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), both)[0, 0]) == 2.0 * MAX_PART_COST
+
+
+def test_jumps_cost_more_where_masks_are_less_precise() -> None:
+    assert [jump_cost(noise) for noise in (1.0, 1.5, 2.0, 9.0)] == [4.0, 9.0, 12.0, 12.0]
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:

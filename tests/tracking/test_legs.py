@@ -14,7 +14,7 @@ from posefit.silhouette.cost import BETA
 from posefit.tracking.smoothing.legs import cheapest_sequence, doubtful, legs_exchanged, with_cheapest_legs
 from posefit.tracking.smoothing.smooth import smooth
 from posefit.uncertainty.calibration import Recalibration
-from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.modes import Posterior, unknown_sides
 from tests.tracking.scenes import exact_frames, walk
 
 FRAMES, PASSING = 24, 11  # of a walk seen from its side, and the one in which legs pass each other
@@ -101,3 +101,8 @@ def test_exchanged_frames_are_smoothed_again_with_their_posteriors(film: tuple[S
     for frame in tracked:
         assert frame.posterior is not None
         assert frame.posterior.poses[0] == pytest.approx(frame.pose)
+    share = min(PASSING, FRAMES - PASSING) / FRAMES  # of frames that say which leg is the left one, and are wrong
+    for frame in after.frames:
+        assert frame.posterior is not None
+        assert frame.posterior.weights == pytest.approx([1.0 - share, share], abs=2.0 / FRAMES)
+        assert unknown_sides(scene.body.skeleton, frame.posterior, frame.pose)

@@ -17,7 +17,7 @@ from posefit.fitting.landmarks import LEGS, landmark_likelihoods, side_odds
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
-from posefit.geometry.symmetry import exchanged_limbs
+from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import pose_costs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
@@ -33,9 +33,14 @@ LEG_JOINTS = [JOINTS.index(joint) for side in ("left", "right") for joint in LIM
 
 
 def with_cheapest_legs(tracked: list[Frame], smoothed: Smoothed, beta: float) -> tuple[list[Frame], Smoothed]:
-    """Return tracked frames whose legs, exchanged in some, are cheapest once they are smoothed, and both of these."""
+    """Return tracked frames whose legs, exchanged in some, are cheapest once they are smoothed, and both of these.
+
+    Which of two sequences it is, that one or the one with left and right exchanged, is as uncertain as the track was:
+    posteriors have both.
+    """
     scene, shape = smoothed.scene, smoothed.shape
     usable = np.array([observation.usable for observation in scene.observations])
+    changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
         exchanged = legs_exchanged(smoothed.scene, tracked, beta)
         pairs = zip(tracked, exchanged, strict=True)
@@ -43,8 +48,9 @@ def with_cheapest_legs(tracked: list[Frame], smoothed: Smoothed, beta: float) ->
         again = smooth(scene, frames, shape, beta) if exchanged.any() else smoothed
         if mean_cost(again.frames, usable) >= mean_cost(smoothed.frames, usable):
             break
-        tracked, smoothed = frames, again
-    return tracked, smoothed
+        tracked, smoothed, changed = frames, again, changed ^ exchanged
+    share = min(float(changed.mean()), 0.5)
+    return tracked, smoothed._replace(frames=[_with_both(smoothed.scene, frame, share) for frame in smoothed.frames])
 
 
 def legs_exchanged(scene: Scene, frames: Sequence[Frame], beta: float) -> NDArray[np.bool_]:
@@ -110,6 +116,17 @@ def _exchanged(scene: Scene, frame: Frame) -> Frame:
     if posterior is not None:
         posterior = replace(posterior, poses=exchanged_limbs(skeleton, posterior.poses, "legs"))
     return replace(frame, pose=exchanged_limbs(skeleton, frame.pose[None], "legs")[0], posterior=posterior)
+
+
+def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
+    """Return a frame whose posterior has a share of poses with left and right exchanged."""
+    posterior = frame.posterior
+    if posterior is None or not share:
+        return frame
+    poses = np.concatenate([posterior.poses, mirrored_poses(scene.body.skeleton, posterior.poses)])
+    weights = np.concatenate([(1.0 - share) * posterior.weights, share * posterior.weights])
+    places = np.tile(posterior.translations, (2, 1))
+    return replace(frame, posterior=replace(posterior, poses=poses, translations=places, weights=weights))
 
 
 def _smoothed_costs(scene: Scene, motion: Motion, beta: float) -> Array:
