@@ -110,8 +110,10 @@ def track_scene(
             with progress.phase("smooth"):
                 smoothed = smooth(*smoothed, method.audit.beta)
                 if len(scene.cameras) == 1 and scene.count >= SHORTEST:
-                    frames, smoothed = with_cheapest_legs(frames, smoothed, method.audit.beta)
+                    frames, smoothed, exchanged = with_cheapest_legs(frames, smoothed, method.audit.beta)
                     tracked = tracked._replace(frames=frames)
+                    if exchanged.any():
+                        progress.log(f"legs exchanged in {exchanged.sum()} frames: smooth steps then fit better")
         if passes > 1:
             tracked, smoothed = _cheapest_pass(task, method, tracked, smoothed, passes, options.seed, progress)
         scene, frames, shape = smoothed

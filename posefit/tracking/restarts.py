@@ -30,7 +30,7 @@ from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, r
 from posefit.motion.steadiness import runs
 from posefit.reading import counted
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.tracking.trajectory import Tracked, mean_cost, with_effort_of, with_total_effort
+from posefit.tracking.trajectory import Tracked, cheapest_sequence, mean_cost, with_effort_of, with_total_effort
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 
@@ -389,7 +389,7 @@ def facing_consensus(
     """Return which frames (T,) face where the whole track does, by the likeliest sequence of yaws without spins.
 
     A frame may face where it was estimated, or where its reflection does; the latter goes against its votes, one for
-    each camera that sees the person. Frames that spin have no votes, nor those that show too little. Viterbi.
+    each camera that sees the person. Frames that spin have no votes, nor those that show too little.
     """
     yaws = np.array([frame.pose[0] for frame in frames])
     steady = ~spin_mask(yaws, usable, fps)
@@ -404,17 +404,10 @@ def facing_consensus(
     ]
     both = np.column_stack([yaws[rows], 2.0 * np.array(camera_yaws) + np.pi - yaws[rows]])
     against = np.column_stack([np.zeros(len(rows)), views.sum(axis=1) * VOTES_PER_SECOND / fps])
-    totals, parents = against[0], np.zeros((len(rows), 2), dtype=np.int64)
-    for k in range(1, len(rows)):
-        turned = np.abs(wrapped(both[k] - both[k - 1][:, None]))
-        excess = np.maximum(turned - MAX_TURN_RATE * (clock[rows[k]] - clock[rows[k - 1]]) / fps, 0.0)
-        paths = totals[:, None] + EXCESS_TURN_VOTES * excess
-        parents[k] = paths.argmin(axis=0)
-        totals = paths.min(axis=0) + against[k]
-    chosen = int(totals.argmin())
-    for k in range(len(rows) - 1, -1, -1):
-        agrees[rows[k]] = chosen == 0
-        chosen = int(parents[k, chosen])
+    turned = np.abs(wrapped(both[1:, None] - both[:-1, :, None]))
+    seconds = (clock[rows[1:]] - clock[rows[:-1]]) / fps
+    excess = np.maximum(turned - MAX_TURN_RATE * seconds[:, None, None], 0.0)
+    agrees[rows] = cheapest_sequence(against, EXCESS_TURN_VOTES * excess) == 0
     return agrees
 
 

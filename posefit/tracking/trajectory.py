@@ -57,6 +57,19 @@ class TrajectoryCost:
         return self.cost + self.motion
 
 
+def cheapest_sequence(costs: Array, steps: Array) -> NDArray[np.int64]:
+    """Return the cheapest sequence (n,) of states, by their costs (n, S) and those of steps (n - 1, S, S). Viterbi."""
+    totals, parents = costs[0], []
+    for cost, step in zip(costs[1:], steps, strict=True):
+        paths = totals[:, None] + step
+        parents.append(paths.argmin(axis=0))
+        totals = paths.min(axis=0) + cost
+    states = [int(totals.argmin())]
+    for parent in reversed(parents):
+        states.append(int(parent[states[-1]]))
+    return np.array(states[::-1])
+
+
 def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
     """Return the mean cost of the frames that show enough of the person; of all frames where none does."""
     costs = np.array([frame.cost for frame in frames])

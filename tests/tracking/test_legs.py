@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.symmetry import exchanged_limbs
 from posefit.silhouette.cost import BETA
-from posefit.tracking.smoothing.legs import cheapest_sequence, doubtful, legs_exchanged, with_cheapest_legs
+from posefit.tracking.smoothing.legs import doubtful, legs_exchanged, with_cheapest_legs
 from posefit.tracking.smoothing.smooth import smooth
+from posefit.tracking.trajectory import cheapest_sequence
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, unknown_sides
 from tests.tracking.scenes import exact_frames, walk
@@ -41,12 +43,14 @@ def changes(flags: NDArray[np.bool_]) -> list[int]:
 def test_the_cheapest_sequence_is_that_of_trying_all() -> None:
     rng = np.random.default_rng(4)
     for _ in range(20):
-        costs, switches = rng.normal(0.0, 2.0, 7), rng.normal(1.0, 2.0, 6)
-        every = [
-            (float(np.dot(states, costs) + np.abs(np.diff(states)) @ switches), states)
-            for states in product((0, 1), repeat=7)
-        ]
-        assert cheapest_sequence(costs, switches.tolist()) == list(min(every)[1])
+        costs, steps = rng.normal(0.0, 2.0, (6, 2)), rng.normal(1.0, 2.0, (5, 2, 2))
+
+        def total(states: tuple[int, ...], costs: Array = costs, steps: Array = steps) -> float:
+            of_steps = sum(steps[k, states[k], states[k + 1]] for k in range(5))
+            return float(sum(costs[k, state] for k, state in enumerate(states)) + of_steps)
+
+        best = min(product((0, 1), repeat=6), key=total)
+        assert cheapest_sequence(costs, steps).tolist() == list(best)
 
 
 def test_legs_that_pass_are_doubtful(film: tuple[Scene, list[Frame]]) -> None:
@@ -95,7 +99,8 @@ def test_exchanged_frames_are_smoothed_again_with_their_posteriors(film: tuple[S
         for frame in exchanged(scene, frames, range(PASSING, FRAMES))
     ]
     before = smooth(scene, wrong, None, BETA)
-    tracked, after = with_cheapest_legs(wrong, before, BETA)
+    tracked, after, which = with_cheapest_legs(wrong, before, BETA)
+    assert changes(which) == pytest.approx([PASSING], abs=1)
     costs = [np.mean([frame.cost for frame in each]) for each in (before.frames, after.frames)]
     assert costs[1] < 0.8 * costs[0]
     for frame in tracked:

@@ -21,7 +21,7 @@ from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import pose_costs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
-from posefit.tracking.trajectory import mean_cost
+from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 
 ROUNDS = 3
 TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
@@ -32,11 +32,13 @@ ODDS_COST = 0.5  # of landmarks: of the logarithm of the odds that legs are as t
 LEG_JOINTS = [JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]]
 
 
-def with_cheapest_legs(tracked: list[Frame], smoothed: Smoothed, beta: float) -> tuple[list[Frame], Smoothed]:
-    """Return tracked frames whose legs, exchanged in some, are cheapest once they are smoothed, and both of these.
+def with_cheapest_legs(
+    tracked: list[Frame], smoothed: Smoothed, beta: float
+) -> tuple[list[Frame], Smoothed, NDArray[np.bool_]]:
+    """Return tracked frames whose legs, exchanged in some, are cheapest once they are smoothed, these, and which (T,).
 
-    Which of two sequences it is, that one or the one with left and right exchanged, is as uncertain as the track was:
-    posteriors have both.
+    Whether it is rather the sequence with left and right exchanged is as uncertain as the track was: posteriors have
+    both.
     """
     scene, shape = smoothed.scene, smoothed.shape
     usable = np.array([observation.usable for observation in scene.observations])
@@ -50,7 +52,8 @@ def with_cheapest_legs(tracked: list[Frame], smoothed: Smoothed, beta: float) ->
             break
         tracked, smoothed, changed = frames, again, changed ^ exchanged
     share = min(float(changed.mean()), 0.5)
-    return tracked, smoothed._replace(frames=[_with_both(smoothed.scene, frame, share) for frame in smoothed.frames])
+    frames = [_with_both(smoothed.scene, frame, share) for frame in smoothed.frames]
+    return tracked, smoothed._replace(frames=frames), changed
 
 
 def legs_exchanged(scene: Scene, frames: Sequence[Frame], beta: float) -> NDArray[np.bool_]:
@@ -71,7 +74,9 @@ def legs_exchanged(scene: Scene, frames: Sequence[Frame], beta: float) -> NDArra
         exchanged ^= later & (switch < 0.0)
     starts, stops = [0, *edges], [*edges, len(frames)]
     stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + _odds(scene, here)), starts)
-    others = np.repeat(cheapest_sequence(stretches, switches), np.subtract(stops, starts))
+    steps = np.reshape(switches, (-1, 1, 1)) * (1.0 - np.eye(2))
+    others = cheapest_sequence(np.column_stack([np.zeros(len(starts)), stretches]), steps)
+    others = np.repeat(others, np.subtract(stops, starts))
     return np.asarray(exchanged != others)
 
 
@@ -92,22 +97,6 @@ def doubtful(here: Motion, there: Motion, costs: Array) -> list[int]:
     passing = (off < PASSING) & least(off)
     jumping = (off < JUMPING) & least(-costs) & (costs > HIGH_COST * np.median(costs))
     return [int(frame) for frame in np.flatnonzero(passing | jumping)]
-
-
-def cheapest_sequence(costs: Array, switches: Sequence[float]) -> list[int]:
-    """Return the cheapest sequence of states, each 0 or 1.
-
-    Where it is 1 it costs one of `costs` (n), and a change costs one of `switches` (n - 1).
-    """
-    totals, parents = np.array([0.0, costs[0]]), []
-    for cost, switch in zip(costs[1:], switches, strict=True):
-        paths = totals[:, None] + switch * (1.0 - np.eye(2))
-        parents.append(paths.argmin(axis=0))
-        totals = paths.min(axis=0) + np.array([0.0, cost])
-    states = [int(totals.argmin())]
-    for parent in reversed(parents):
-        states.append(int(parent[states[-1]]))
-    return states[::-1]
 
 
 def _exchanged(scene: Scene, frame: Frame) -> Frame:
