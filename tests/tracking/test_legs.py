@@ -94,7 +94,10 @@ def test_exchanged_frames_are_smoothed_again_with_their_posteriors(film: tuple[S
     scene, frames = film
     wrong = [
         replace(
-            frame, posterior=Posterior(frame.pose[None], frame.translation[None], np.ones(1), False, Recalibration())
+            frame,
+            posterior=Posterior(
+                frame.pose[None], frame.translation[None], np.ones(1), False, Recalibration(second_side=1.0)
+            ),
         )
         for frame in exchanged(scene, frames, range(PASSING, FRAMES))
     ]

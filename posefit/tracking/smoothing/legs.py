@@ -22,6 +22,7 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.cost import pose_costs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
+from posefit.uncertainty.calibration import SECOND_SIDE, Recalibration
 
 ROUNDS = 3
 TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
@@ -108,14 +109,16 @@ def _exchanged(scene: Scene, frame: Frame) -> Frame:
 
 
 def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
-    """Return a frame whose posterior has a share of poses with left and right exchanged."""
+    """Return a frame whose posterior has a share of poses with left and right exchanged, where that is not small."""
     posterior = frame.posterior
-    if posterior is None or not share:
+    if posterior is None or share < SECOND_SIDE:
         return frame
     poses = np.concatenate([posterior.poses, mirrored_poses(scene.body.skeleton, posterior.poses)])
     weights = np.concatenate([(1.0 - share) * posterior.weights, share * posterior.weights])
     places = np.tile(posterior.translations, (2, 1))
-    return replace(frame, posterior=replace(posterior, poses=poses, translations=places, weights=weights))
+    model = replace(posterior.recalibration or Recalibration(), second_side=SECOND_SIDE)
+    both = replace(posterior, poses=poses, translations=places, weights=weights, recalibration=model)
+    return replace(frame, posterior=both)
 
 
 def _smoothed_costs(scene: Scene, motion: Motion, beta: float) -> Array:
