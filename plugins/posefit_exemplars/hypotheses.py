@@ -64,7 +64,7 @@ _TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
 PARTS: Sequence[Rows] = [_TRUNK, *_LIMBS]  # joints
 SPEED_COSTS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}  # of speeds at which a part continues
 MAX_PART_COST = 4.0  # of a step of one part, between clean masks
-MAX_JUMP_NOISE = 3.0  # times which that is as masks are less precise, by the square of how much
+MAX_JUMP_FACTOR = 3.0  # at most, by which noisy masks multiply it: the square of their noise
 
 
 class Hypotheses(NamedTuple):
@@ -143,7 +143,7 @@ def jump_cost(noise: float) -> float:
 
     Where they are, wrong poses fit some frames better than right ones by more, which must not pay for a jump.
     """
-    return MAX_PART_COST * min(noise**2, MAX_JUMP_NOISE)
+    return MAX_PART_COST * min(noise**2, MAX_JUMP_FACTOR)
 
 
 class HypothesisFilter:

@@ -109,11 +109,10 @@ def track_scene(
         if options.smooth:
             with progress.phase("smooth"):
                 smoothed = smooth(*smoothed, method.audit.beta)
-                if len(scene.cameras) == 1 and scene.count >= SHORTEST:
-                    frames, smoothed, exchanged = with_cheapest_legs(frames, smoothed, method.audit.beta)
-                    tracked = tracked._replace(frames=frames)
+                if len(scene.cameras) == 1 and scene.count >= SHORTEST and scene.truth is None:
+                    smoothed, exchanged = with_cheapest_legs(frames, smoothed, method.audit.beta)
                     if exchanged.any():
-                        progress.log(f"legs exchanged in {exchanged.sum()} frames: smooth steps then fit better")
+                        progress.log(f"legs exchanged in {exchanged.sum()} frames, where smooth ones then fit better")
         if passes > 1:
             tracked, smoothed = _cheapest_pass(task, method, tracked, smoothed, passes, options.seed, progress)
         scene, frames, shape = smoothed

@@ -2,8 +2,8 @@
 
 From the side, two legs that pass each other look like two that meet and go back, and a track takes the one for the
 other. But a body whose legs go back, or are exchanged in the middle of a stride, does not stay on the masks once its
-motion is smooth. So legs are exchanged, for a trial, from each doubtful frame on. What the trials cost, and each
-stretch between them as it is and exchanged, gives the cheapest sequence of exchanges.
+motion is smooth. So legs are exchanged, for a trial, from each doubtful frame on. The costs of these trials, and of
+each stretch between them as it is and exchanged, give the cheapest sequence of exchanges.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.cost import pose_costs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
-from posefit.uncertainty.calibration import SECOND_SIDE, Recalibration
+from posefit.uncertainty.calibration import SECOND_SIDE
 
 ROUNDS = 3
 TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
@@ -33,19 +33,17 @@ ODDS_COST = 0.5  # of landmarks: of the logarithm of the odds that legs are as t
 LEG_JOINTS = [JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]]
 
 
-def with_cheapest_legs(
-    tracked: list[Frame], smoothed: Smoothed, beta: float
-) -> tuple[list[Frame], Smoothed, NDArray[np.bool_]]:
-    """Return tracked frames whose legs, exchanged in some, are cheapest once they are smoothed, these, and which (T,).
+def with_cheapest_legs(tracked: Sequence[Frame], smoothed: Smoothed, beta: float) -> tuple[Smoothed, NDArray[np.bool_]]:
+    """Return tracked frames smoothed with their legs exchanged where that is cheaper, and in which (T,) they are.
 
-    Whether it is rather the sequence with left and right exchanged is as uncertain as the track was: posteriors have
-    both.
+    Where a fifth are, it stays open which of two sequences is right, this one or that with left and right exchanged:
+    posteriors have both.
     """
     scene, shape = smoothed.scene, smoothed.shape
     usable = np.array([observation.usable for observation in scene.observations])
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
-        exchanged = legs_exchanged(smoothed.scene, tracked, beta)
+        exchanged = legs_exchanged(smoothed.scene, tracked, usable, beta)
         pairs = zip(tracked, exchanged, strict=True)
         frames = [_exchanged(smoothed.scene, frame) if other else frame for frame, other in pairs]
         again = smooth(scene, frames, shape, beta) if exchanged.any() else smoothed
@@ -53,24 +51,23 @@ def with_cheapest_legs(
             break
         tracked, smoothed, changed = frames, again, changed ^ exchanged
     share = min(float(changed.mean()), 0.5)
-    frames = [_with_both(smoothed.scene, frame, share) for frame in smoothed.frames]
-    return tracked, smoothed._replace(frames=frames), changed
+    return smoothed._replace(frames=[_with_both(scene, frame, share) for frame in smoothed.frames]), changed
 
 
-def legs_exchanged(scene: Scene, frames: Sequence[Frame], beta: float) -> NDArray[np.bool_]:
-    """Return in which frames (T,) legs should be exchanged, as that is cheaper."""
+def legs_exchanged(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float) -> NDArray[np.bool_]:
+    """Return in which frames (T,) legs should be exchanged, as that is cheaper. `usable` frames (T,) show enough."""
     pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
     here, there = (scene.motion(each) for each in pairs)
     costs = _smoothed_costs(scene, here, beta)
     added = _smoothed_costs(scene, there, beta) - costs
-    edges = doubtful(here, there, costs)
+    edges = doubtful(here, there, costs, usable)
     exchanged, reach, switches = np.zeros(len(frames), dtype=np.int64), max(round(TRIAL_SECONDS * scene.fps), 2), []
     for edge in edges:  # in the order of time: two that are near each other may be one
-        window, later = range(max(edge - reach, 0), min(edge + reach, len(frames))), np.arange(len(frames)) >= edge
-        shown = replace(scene, observations=[scene.observations[k] for k in window])
-        trials = [[pairs[which[k]][k] for k in window] for which in (exchanged, exchanged ^ later)]
-        kept, switched = (_smoothed_costs(shown, shown.motion(trial), beta).sum() for trial in trials)
-        switch = switched - kept - np.where(exchanged, -added, added)[edge : window.stop].sum()
+        rows, later = range(max(edge - reach, 0), min(edge + reach, len(frames))), np.arange(len(frames)) >= edge
+        window = replace(scene, observations=[scene.observations[k] for k in rows])
+        trials = [[pairs[which[k]][k] for k in rows] for which in (exchanged, exchanged ^ later)]
+        same, other = (_smoothed_costs(window, window.motion(trial), beta).sum() for trial in trials)
+        switch = other - same - np.where(exchanged, -added, added)[edge : rows.stop].sum()
         switches.append(abs(switch))
         exchanged ^= later & (switch < 0.0)
     starts, stops = [0, *edges], [*edges, len(frames)]
@@ -81,10 +78,10 @@ def legs_exchanged(scene: Scene, frames: Sequence[Frame], beta: float) -> NDArra
     return np.asarray(exchanged != others)
 
 
-def doubtful(here: Motion, there: Motion, costs: Array) -> list[int]:
+def doubtful(here: Motion, there: Motion, costs: Array, usable: NDArray[np.bool_]) -> list[int]:
     """Return the frames from which legs may have to be exchanged: those of `there` are near to those of the one before.
 
-    They need not be as near where the smoothed frame costs more than others.
+    They need not be as near where the smoothed frame costs more than others. Frames that are not `usable` are left out.
     """
     legs, exchanged = (root_centred(motion.skeleton.joints(motion.poses))[:, LEG_JOINTS] for motion in (here, there))
     off = np.append(np.inf, np.sqrt(((exchanged[1:] - legs[:-1]) ** 2).sum(axis=2).mean(axis=1)))
@@ -96,8 +93,8 @@ def doubtful(here: Motion, there: Motion, costs: Array) -> list[int]:
         return np.asarray(values <= np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1).min(axis=1))
 
     passing = (off < PASSING) & least(off)
-    jumping = (off < JUMPING) & least(-costs) & (costs > HIGH_COST * np.median(costs))
-    return [int(frame) for frame in np.flatnonzero(passing | jumping)]
+    jumping = (off < JUMPING) & least(-costs) & (costs > HIGH_COST * np.median(costs[usable]))
+    return [int(frame) for frame in np.flatnonzero((passing | jumping) & usable)]
 
 
 def _exchanged(scene: Scene, frame: Frame) -> Frame:
@@ -116,7 +113,7 @@ def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
     poses = np.concatenate([posterior.poses, mirrored_poses(scene.body.skeleton, posterior.poses)])
     weights = np.concatenate([(1.0 - share) * posterior.weights, share * posterior.weights])
     places = np.tile(posterior.translations, (2, 1))
-    model = replace(posterior.recalibration or Recalibration(), second_side=SECOND_SIDE)
+    model = posterior.recalibration and replace(posterior.recalibration, second_side=0.0)
     both = replace(posterior, poses=poses, translations=places, weights=weights, recalibration=model)
     return replace(frame, posterior=both)
 
@@ -140,7 +137,7 @@ def _odds(scene: Scene, motion: Motion) -> Array:
     costs = np.zeros(len(motion))
     for k, observation in enumerate(scene.observations):
         if observation.landmarks is not None:
-            seen = motion.skeleton, scene.cameras, observation.landmarks
-            likelihoods = landmark_likelihoods(*seen, motion.poses[k : k + 1], motion.translations[k : k + 1])
+            marks = motion.skeleton, scene.cameras, observation.landmarks
+            likelihoods = landmark_likelihoods(*marks, motion.poses[k : k + 1], motion.translations[k : k + 1])
             costs[k] = ODDS_COST * side_odds(likelihoods[0])[LEGS]
     return costs
