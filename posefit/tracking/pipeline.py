@@ -109,7 +109,8 @@ def track_scene(
         if options.smooth:
             with progress.phase("smooth"):
                 smoothed = smooth(*smoothed, method.audit.beta)
-                if len(scene.cameras) == 1 and scene.count >= SHORTEST and scene.truth is None:
+                usable = sum(observation.usable for observation in scene.observations)
+                if len(scene.cameras) == 1 and usable >= SHORTEST and scene.truth is None:
                     smoothed, exchanged = with_cheapest_legs(frames, smoothed, method.audit.beta)
                     if exchanged.any():
                         progress.log(f"legs exchanged in {exchanged.sum()} frames, where smooth ones then fit better")

@@ -24,7 +24,7 @@ from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
 
-ROUNDS = 3
+ROUNDS = 3  # at most: what is exchanged in one shows the next what else is doubtful
 TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
 PASSING = 0.16  # metres, rms: exchanged legs that are so near to those of the frame before may be theirs
 JUMPING, HIGH_COST = 0.33, 1.3  # the same, where a smoothed frame costs so many times the median, the most around
