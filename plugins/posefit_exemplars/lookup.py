@@ -66,9 +66,8 @@ class Table(NamedTuple):
             small.append(small_pictures(masks_of(body, camera, part, -body.skeleton.joints(part).mean(axis=1))))
         pixels = np.concatenate(small)
         mean = pixels.mean(axis=0)
-        axes = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))[1][:, : -DIMENSIONS - 1 : -1].astype(
-            np.float32
-        )
+        _, axes = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
+        axes = axes[:, : -DIMENSIONS - 1 : -1].astype(np.float32)
         codes = (pixels - mean) @ axes
         return cls(states, mean, axes, codes, (codes**2).sum(axis=1))
 

@@ -59,10 +59,7 @@ class Measures:
     """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
 
     error_degrees: Spread | None = _figure(
-        "error",
-        "degrees",
-        2,
-        "mean absolute difference of the 66 angles from the true ones. SAPSO (8)-(10)",
+        "error", "degrees", 2, "mean absolute difference of the 66 angles from the true ones. SAPSO (8)-(10)"
     )
     geodesic_degrees: float | None = _figure(
         "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"

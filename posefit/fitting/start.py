@@ -18,9 +18,7 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.uncertainty.modes import Posterior, clusters_of, poses_apart
 
 MAX_MODES = 8
-MODE_RADIUS = (
-    0.2  # metres, the mean over joints: poses farther apart are of different modes; a library's are that rough
-)
+MODE_RADIUS = 0.2  # metres, the mean over joints, beyond which poses are of different modes: a library is that rough
 MODE_SPREAD = 0.08  # standard deviation of a mode, in half-ranges of the box
 MIN_SMALL_SIDE = 60  # pixels of the picture in which projected poses are compared
 TEMPERATURE = 2.0  # divides their costs

@@ -289,7 +289,10 @@ class SynthesisTracker:
                 latest = self._held(latest, space, observation)
                 yield latest
                 continue
-            optimiser = self._ready(optimiser, space, rng)
+            if self.next_frame == "carry" and optimiser is not None:
+                cast(Filter, optimiser).advance(space)
+            else:
+                optimiser = self.make(replace(space, start=None) if self.next_frame == "forget" else space, rng)
             problem = self.problem(space, observation)
             best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
             predictor.commit(best.proposal)
@@ -312,12 +315,6 @@ class SynthesisTracker:
         task, beta = self.task, self.prediction.beta
         silhouettes = observation.silhouettes
         return PoseProblem(task.body, task.cameras, silhouettes, space, beta=beta, threads=task.threads, blank=True)
-
-    def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
-        if self.next_frame == "carry" and optimiser is not None:
-            cast(Filter, optimiser).advance(space)
-            return optimiser
-        return self.make(replace(space, start=None) if self.next_frame == "forget" else space, rng)
 
 
 def _frame(problem: PoseProblem, best: Minimum) -> Frame:

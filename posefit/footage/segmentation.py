@@ -94,11 +94,6 @@ class Extraction:
         """The segmenter's name."""
         return segmenter_name(self.method, self.background)
 
-    @property
-    def still_background(self) -> bool:
-        """Whether the segmenter needs a still background."""
-        return registry().offer("segmenter", self.name).still_background
-
     def ways(self, cameras: int) -> "list[Extraction]":
         """Return this extraction, and for the default of a track, where "mediapipe" is installed, that beside it.
 
@@ -188,7 +183,8 @@ class PersonSegmenter:
     def quality(self) -> FrameQuality:
         """Return what compares the masks of a person with the pictures, from the first frame on."""
         background = getattr(self._segmenter, "background", None)
-        return FrameQuality(self._film.video.fps, background, still=self._how.still_background)
+        still = registry().offer("segmenter", self._how.name).still_background
+        return FrameQuality(self._film.video.fps, background, still=still)
 
     def row(self, quality: FrameQuality, image: Image, person: Person, number: int) -> dict[str, Any]:
         """Return the row of quality.csv for a person in the next frame."""
@@ -300,12 +296,8 @@ class Segmentation:
     def _scan(self, progress: Progress | None) -> _Scan:
         """Return what each frame shows: the largest blob, and the people with the quality of their masks."""
         segmenter, room = self._segmenter, self.stop - self.start
-        people, camera, facings, landmarks = (
-            People(self.video.fps),
-            CameraMotion(self.size),
-            list[float](),
-            list[Array](),
-        )
+        people, camera = People(self.video.fps), CameraMotion(self.size)
+        facings, landmarks = list[float](), list[Array]()
         blank_quality, largest_quality = segmenter.quality(), segmenter.quality()
         blanks, largest = list[dict[str, Any]](), list[dict[str, Any]]()
         masks, valid = (empty_planes(room, self.size) for _ in range(2))

@@ -7,7 +7,7 @@ vector. What the joints are is read off their names, see joint_names.py; how the
 """
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -73,9 +73,9 @@ def read_bvh(path: str | Path, *, unit: Unit | None = None, up: Up | None = None
     path = Path(path)
     known = None if unit is None else metres_of(unit)
     check_size(path, SIZE_LIMIT)
-    content = _parsed(path)
+    nodes, values, fps = _parsed(path)
     try:
-        rig = _rig(content)
+        rig = _rig(nodes, values)
         axis, turn = _upright(rig, up)
         result = retargeted(rig, turn)
     except InputError as error:
@@ -88,7 +88,7 @@ def read_bvh(path: str | Path, *, unit: Unit | None = None, up: Up | None = None
     metres = METRES[chosen] if known is None else known
     skeleton = replace(result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres)
     notes = _notes(path, result, unit or chosen, unit is None, stature, axis if up is None else "")
-    return Motion(path.stem, skeleton, result.poses, result.places * metres, content.fps, notes=tuple(notes))
+    return Motion(path.stem, skeleton, result.poses, result.places * metres, fps, notes=tuple(notes))
 
 
 def _notes(path: Path, result: Retargeted, unit: Unit, guessed: bool, stature: float, axis: str) -> list[str]:
@@ -133,15 +133,8 @@ class _Node:
     column: int = 0  # of its first channel
 
 
-@dataclass
-class _Content:
-    nodes: list[_Node]
-    values: Array  # (T, channels)
-    fps: float
-
-
-def _parsed(path: Path) -> _Content:
-    """Return what a file says. Raises InputError with file and line where it is no BVH file."""
+def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
+    """Return a file's nodes, values (T, channels) and rate. Raises InputError with the line where it is no BVH file."""
     lines = lines_of(path, LONGEST_LINE)
     nodes, width = _hierarchy(lines)
     count, frame_time = _head(lines)
@@ -164,7 +157,7 @@ def _parsed(path: Path) -> _Content:
     if not (np.abs(values) < LARGEST).all():
         raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
     rate = 1.0 / frame_time
-    return _Content(nodes, values, float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate)
+    return nodes, values, float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate
 
 
 def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
@@ -234,9 +227,8 @@ def _channels(line: Line) -> list[tuple[bool, int]]:
     return channels
 
 
-def _rig(content: _Content) -> Rig:
+def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
     """Return the joints of a file, at rest and in each frame. Raises InputError where they are not a person's."""
-    nodes, values = content.nodes, content.values
     names, parents = [node.name for node in nodes], [node.parent for node in nodes]
     joints = joints_of(names, parents)
     if isinstance(joints, list):

@@ -53,9 +53,10 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
     document = Element("OpenSimDocument", Version=VERSION)
     model = SubElement(document, "Model", name=skeleton.name)
     _text(model, "gravity", (0.0, -9.80665, 0.0))
-    _named(model, "Ground", "ground")
+    SubElement(model, "Ground", name="ground")
     bodies, joints, marked = (
-        SubElement(_named(model, kind, kind.lower()), "objects") for kind in ("BodySet", "JointSet", "MarkerSet")
+        SubElement(SubElement(model, kind, name=kind.lower()), "objects")
+        for kind in ("BodySet", "JointSet", "MarkerSet")
     )
     free = coordinates(skeleton)
     _body(bodies, "root", ROOT_KILOGRAMS, np.zeros(3), 1e-6 * np.eye(3))
@@ -91,12 +92,12 @@ def _inertia(offset: Array, radii: Array) -> tuple[float, Array, Array]:
 def _body(
     bodies: Element, name: str, mass: float, centre: Array, inertia: Array, shape: tuple[Array, Array] | None = None
 ) -> None:
-    body = _named(bodies, "Body", name)
+    body = SubElement(bodies, "Body", name=name)
     if shape is not None:
         offset, radii = shape
         length = float(np.linalg.norm(offset))
         middle = _frame(SubElement(body, "components"), f"{name}_middle", "..", 0.5 * offset, along_y(offset))
-        cylinder = _named(SubElement(middle, "attached_geometry"), "Cylinder", f"{name}_shape")
+        cylinder = SubElement(SubElement(middle, "attached_geometry"), "Cylinder", name=f"{name}_shape")
         _text(cylinder, "radius", [radii.mean()])
         _text(cylinder, "half_height", [0.5 * length])
     _text(body, "mass", [mass])
@@ -106,7 +107,7 @@ def _body(
 
 def _joint(joints: Element, kind: str, name: str, parent: str, at: Array, axes: Array) -> Element:
     """Return a joint from a point of a parent's frame to a body's origin, whose angles are about some axes (3, 3)."""
-    joint = _named(joints, kind, f"{name}_joint")
+    joint = SubElement(joints, kind, name=f"{name}_joint")
     SubElement(joint, "socket_parent_frame").text = f"{name}_parent"
     SubElement(joint, "socket_child_frame").text = f"{name}_child"
     frames = SubElement(joint, "frames")
@@ -120,18 +121,18 @@ def _mobile(joint: Element, turns: Sequence[str], axes: Array, moves: Sequence[s
     listed = SubElement(joint, "coordinates")
     for name in (*turns, *moves):
         if name:
-            coordinate = _named(listed, "Coordinate", name)
+            coordinate = SubElement(listed, "Coordinate", name=name)
             _text(coordinate, "range", _limits(name, skeleton))
     transform = SubElement(joint, "SpatialTransform")
     for kind, names, about in (("rotation", turns, axes), ("translation", moves, np.eye(3))):
         for k, (name, axis) in enumerate(zip(names, about, strict=True)):
-            along = _named(transform, "TransformAxis", f"{kind}{k + 1}")
+            along = SubElement(transform, "TransformAxis", name=f"{kind}{k + 1}")
             SubElement(along, "coordinates").text = name
             _text(along, "axis", axis)
             if name:
-                _text(_named(along, "LinearFunction", "function"), "coefficients", (1.0, 0.0))
+                _text(SubElement(along, "LinearFunction", name="function"), "coefficients", (1.0, 0.0))
             else:
-                _text(_named(along, "Constant", "function"), "value", (0.0,))
+                _text(SubElement(along, "Constant", name="function"), "value", (0.0,))
 
 
 def _limits(name: str, skeleton: Skeleton) -> Iterable[float]:
@@ -142,7 +143,7 @@ def _limits(name: str, skeleton: Skeleton) -> Iterable[float]:
 
 
 def _frame(parent: Element, name: str, of: str, at: Array, axes: Array) -> Element:
-    frame = _named(parent, "PhysicalOffsetFrame", name)
+    frame = SubElement(parent, "PhysicalOffsetFrame", name=name)
     SubElement(frame, "socket_parent").text = of
     _text(frame, "translation", at)
     _text(frame, "orientation", angles_about((0, 1, 2), axes))
@@ -150,13 +151,9 @@ def _frame(parent: Element, name: str, of: str, at: Array, axes: Array) -> Eleme
 
 
 def _marker(marked: Element, name: str, body: str, at: Array) -> None:
-    marker = _named(marked, "Marker", name)
+    marker = SubElement(marked, "Marker", name=name)
     SubElement(marker, "socket_parent_frame").text = f"/bodyset/{body}"
     _text(marker, "location", at)
-
-
-def _named(parent: Element, kind: str, name: str) -> Element:
-    return SubElement(parent, kind, name=name)
 
 
 def _text(parent: Element, kind: str, values: Iterable[float]) -> None:

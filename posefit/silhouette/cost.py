@@ -24,18 +24,14 @@ _NO_IMAGES: Bits = np.empty((0, 0, 0), dtype=np.uint64)  # where only the areas 
 T = TypeVar("T")
 
 
-def view_of(camera: Camera) -> View:
-    """Return a camera as the kernel wants it."""
-    return View(camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height)
-
-
 def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
     """Return the arguments of `kernels.count_areas` before the poses. Made once, they hold for any number of calls."""
     return _drawing(body, camera, kernels.Observed(*silhouette.bits, silhouette.pixels), _NO_IMAGES)
 
 
 def _drawing(body: Body, camera: Camera, observed: kernels.Observed, images: Bits) -> tuple[Any, ...]:
-    return body.skeleton.chain, body.radii, view_of(camera), observed, images
+    view = View(camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height)
+    return body.skeleton.chain, body.radii, view, observed, images
 
 
 def areas(

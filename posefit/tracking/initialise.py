@@ -64,15 +64,12 @@ def initialise(
     if task.yaw is None:
         task = replace(task, start=method.start)
     _warm_up(method, task, scene)
-    start, shape, body_frames = clocks(), None, options.body_frames if scene.count > 1 else 0
+    start, shape, body_frames = clocks(), None, (options.body_frames or 0) if scene.count > 1 else 0
     if options.restarts:
         searched = scene.observations, method.follow, options.restarts, options.seed
         task, _ = best_restart(task, *searched, log=progress.log)
-    if (
-        body_frames
-        and scene.count > 1
-        and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES
-    ):
+    count = len(usable_observations(scene.observations, body_frames))
+    if body_frames and count < MIN_BODY_FRAMES:
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
         needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
         progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")

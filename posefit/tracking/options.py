@@ -266,10 +266,7 @@ class TrackOptions:
         repeated=True,
     )
     evaluations: int | None = _int(
-        None,
-        "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.",
-        1,
-        "POSES",
+        None, "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.", 1, "POSES"
     )
     translation: "Translation | None" = option(
         None,

@@ -41,23 +41,14 @@ def areas_on_device(
     for k, first in enumerate(range(0, len(poses), PART)):
         part, stream = slice(first, first + PART), streams[k % 2]
         there, where = (cuda.to_device(values[part], stream=stream) for values in (poses, translations))
-        waiting.append((part, launched(drawing, there, where, stream), stream))
+        areas = cuda.device_array((len(there), 3), np.int32, stream=stream)
+        count_on_device[len(there), THREADS, stream](*drawing, there, where, areas)
+        waiting.append((part, areas, stream))
         if len(waiting) == len(streams):
             collect()
     while waiting:
         collect()
     return out
-
-
-def launched(drawing: Sequence[Any], poses: Any, translations: Any, stream: Any = 0) -> Any:
-    """Return R, B, Y (n, 3), int32, on the device, as its arrays of poses and translations are.
-
-    It returns before anything is counted; copying the result waits for it.
-    """
-    areas = cuda.device_array((len(poses), 3), np.int32, stream=stream)
-    if len(poses):
-        count_on_device[len(poses), THREADS, stream](*drawing, poses, translations, areas)
-    return areas
 
 
 def drawing_on_device(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
