@@ -17,7 +17,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion.steadiness import acceleration, slides, standing
-from posefit.silhouette.cost import BETA, areas, mismatch
+from posefit.silhouette.cost import BETA, pose_costs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, reliability
 from posefit.uncertainty.intervals import joint_intervals
@@ -230,12 +230,11 @@ def _costs(scene: Scene, training: Array, k: int, observation: Observation, beta
     assert scene.truth is not None
     poses = np.column_stack([np.tile(scene.truth.poses[k, :3], (len(training), 1)), training])
     translations = np.tile(scene.truth.translations[k], (len(poses), 1))
-    costs = np.zeros(len(poses))
-    for camera, silhouette in zip(scene.cameras, observation.silhouettes, strict=True):
-        if factor > 1:
-            camera, silhouette = coarser_camera(camera, factor), coarser_silhouette(silhouette, factor)
-        costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
-    return costs
+    cameras, silhouettes = scene.cameras, observation.silhouettes
+    if factor > 1:
+        cameras = [coarser_camera(camera, factor) for camera in cameras]
+        silhouettes = [coarser_silhouette(silhouette, factor) for silhouette in silhouettes]
+    return pose_costs(scene.body, cameras, silhouettes, poses, translations, beta)[0]
 
 
 def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -216,17 +215,20 @@ def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
 
 
 def listed(cameras: Sequence[Camera | Calibration | str | Path]) -> list[Camera | Calibration]:
-    """Return cameras, those of files read; a file with several cameras serves for several views, in its order."""
-    each = [[camera] if isinstance(camera, Camera | Calibration) else _read(camera) for camera in cameras]
-    return list(chain.from_iterable(each))
+    """Return cameras, those of files read; a file with several cameras serves for several views, in its order.
 
-
-def _read(path: str | Path) -> list[Calibration]:
-    """Return the calibrations of a file. Raises InputError where it is one of masks."""
-    if (suffix := Path(path).suffix.lower()) in (*IMAGES, *ARRAYS) or Path(path).is_dir():
-        came = "a file of masks" if suffix in ARRAYS else "an image" if suffix in IMAGES else "a folder"
-        raise InputError(f"{path}: expected a calibration of the camera, got {came}")
-    return read_calibrations(path)
+    Raises InputError where a file is one of masks.
+    """
+    known = list[Camera | Calibration]()
+    for camera in cameras:
+        if isinstance(camera, Camera | Calibration):
+            known.append(camera)
+        elif (suffix := Path(camera).suffix.lower()) in (*IMAGES, *ARRAYS) or Path(camera).is_dir():
+            came = "a file of masks" if suffix in ARRAYS else "an image" if suffix in IMAGES else "a folder"
+            raise InputError(f"{camera}: expected a calibration of the camera, got {came}")
+        else:
+            known += read_calibrations(camera)
+    return known
 
 
 def calibrated(

@@ -152,12 +152,9 @@ def _number(stream: BinaryIO) -> int:
 
 
 def _captured(capture: Any) -> Iterator[Image]:
-    while True:
-        read, image = capture.read()
-        if not read:
-            capture.release()
-            return
-        yield image
+    while (frame := capture.read())[0]:
+        yield frame[1]
+    capture.release()
 
 
 def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None]) -> Iterator[LiveMask]:

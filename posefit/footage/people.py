@@ -113,10 +113,6 @@ class Tracklet:
         """Take the row of `FrameQuality` of a frame."""
         self.rows[frame], self._usable = row, self._usable + row["usable"]
 
-    def forget_pictures(self) -> None:
-        """Free what only the next frame would need, so that memory does not grow with noise."""
-        self.latest.mask, self.quality = np.empty((0, 0), dtype=bool), None
-
     @property
     def score(self) -> float:
         """How long and steadily they are visible, times their height: 0 where they are never usable."""
@@ -140,7 +136,8 @@ class People:
             if frame - max(tracklet.detections) <= self._patience:
                 active.append(tracklet)
             else:
-                tracklet.forget_pictures()
+                # only the next frame would need them, and memory would grow with noise
+                tracklet.latest.mask, tracklet.quality = np.empty((0, 0), dtype=bool), None
         owners = _owners(active, blobs, frame)
         confirmed = [tracklet for tracklet in active if tracklet.confirmed() and tracklet not in owners.values()]
         outlines = [tracklet.outline(frame) for tracklet in confirmed] if blobs else []

@@ -77,22 +77,10 @@ def along_y(directions: Array) -> Array:
 
 
 def quaternions(rotations: Array) -> Array:
-    """Return unit quaternions (T, 4) x, y, z, w of successive rotations (T, 3, 3), each on the side of the one before.
+    """Return unit quaternions (T, 4) x, y, z, w of successive rotations (T, 3, 3), each on the side of the last."""
+    from scipy.spatial.transform import Rotation  # a quarter of a second to import
 
-    The largest of the four numbers comes from the diagonal, so that none is divided by a small one.
-    """
-    flat = rotations.reshape(-1, 9)
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = flat.T
-    rows = [
-        [1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
-        [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
-        [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
-        [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz],
-    ]
-    products = np.moveaxis(np.array(rows), -1, 0)  # 4 times the products of each two numbers
-    largest = np.diagonal(products, axis1=1, axis2=2).argmax(axis=1)
-    chosen = products[np.arange(len(flat)), largest]
-    chosen /= np.linalg.norm(chosen, axis=1, keepdims=True)
+    chosen = Rotation.from_matrix(rotations).as_quat()
     turned = np.where((chosen[1:] * chosen[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     return np.asarray(chosen * np.cumprod(np.append(1.0, turned))[:, None])
 

@@ -36,15 +36,11 @@ RECOGNISED = FileOptions()
 
 @dataclass(frozen=True)
 class SourceClip:
-    """Gives a motion at any rate, which is `clip(fps)`; before it is made, `clip.count(fps)` says how long it is."""
+    """Gives a motion at any rate, `clip.motion(fps)`; before it is made, `clip.count(fps)` says how long it is."""
 
     motion: Callable[[float], Motion] = field(repr=False)
     poses: int  # of the motion as it is stored
     fps: float | None  # None for a built-in motion, which has as many at any rate
-
-    def __call__(self, fps: float) -> Motion:
-        """Return the motion at a rate."""
-        return self.motion(fps)
 
     def count(self, fps: float) -> int:
         """Return about how many poses the motion has at a rate."""
@@ -92,7 +88,7 @@ def load_motion(source: Source, fps: float = FPS, stated: FileOptions = RECOGNIS
     for name, value in (("unit", stated.unit), ("up", stated.up)):
         if value is not None and suffix not in MOTIONS:
             raise InputError(f"{name} must be given for {' and '.join(MOTIONS)} files only, got {quoted(value)}")
-    return clip_of(source, stated)(fps)
+    return clip_of(source, stated).motion(fps)
 
 
 def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:
@@ -127,7 +123,7 @@ def training_clips(
 def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
     """Return the motions of clips at a rate. Raises InputError where they would take more memory than there may be."""
     _check_memory(sum(clip.count(fps) for clip in clips), fps)
-    return [clip(fps) for clip in clips]
+    return [clip.motion(fps) for clip in clips]
 
 
 def _check_memory(poses: int, fps: float) -> None:

@@ -248,17 +248,12 @@ def _twist(rig: Rig, name: str, bone: _Bone, frame: Array) -> Array:
 
 def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
     """Return the skeleton whose joints have the freedom of CMU's; those that turn further have all."""
-    used = {BONES[joint - 1] for joint in INNER if _beyond(joint, poses, average)}
+    beyond = (np.abs(poses) > UNUSED).any(axis=0) & ~average.free  # (66,) about axes about which CMU's do not turn
+    used = {BONES[joint - 1] for joint in INNER if beyond[angle_index(joint) :][:3].any()}
     if not used:
         return Skeleton("", offsets, average.axes, average.channels, average.limits)
     free = dict(average.channels) | dict.fromkeys(used, ("rx", "ry", "rz"))
     return Skeleton("", offsets, average.axes, tuple((name, free[name]) for name in BONES if name in free))
-
-
-def _beyond(joint: int, poses: Array, average: Skeleton) -> bool:
-    """Return whether a joint turns about an axis about which CMU's does not."""
-    angles = slice(angle_index(joint), angle_index(joint) + 3)
-    return bool((np.abs(poses[:, angles][:, ~average.free[angles]]) > UNUSED).any())
 
 
 def _bones(rig: Rig, scale: float) -> list[_Bone]:

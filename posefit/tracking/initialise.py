@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import NAMES, SPREAD, Shape, fit_shape
-from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -103,10 +103,11 @@ def fitted_build(
     is searched again, with so many `restarts`, or by the tracker itself.
     """
     observations, stride, whole = scene.observations, TRIAL_STRIDE, first_shown_whole(scene.observations)
+    first = next((k for k, observation in enumerate(observations) if observation.usable), 0)
     chosen = usable_observations(observations, frames, stride, whole)
     if len(chosen) < frames:
         chosen, stride = usable_observations(observations, frames), 1
-    elif whole - _first_usable(observations) > NEAR_SECONDS * task.fps:
+    elif whole - first > NEAR_SECONDS * task.fps:
         task = replace(task, yaw=observations[whole].yaw, first_pose=None, modes=(), before=())
         if restarts:
             reach = min(whole + TRIAL_FRAMES * TRIAL_STRIDE, len(observations))
@@ -125,10 +126,6 @@ def fitted_build(
     aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
     shape = fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
     return shape, task.cameras
-
-
-def _first_usable(observations: Sequence[Observation]) -> int:
-    return next((k for k, observation in enumerate(observations) if observation.usable), 0)
 
 
 def _warm_up(method: Method, task: Task, scene: Scene) -> None:

@@ -20,9 +20,9 @@ from tests.commands import error_of
 
 def test_people_of_the_library_are_all_their_clips_at_any_rate() -> None:
     clips = training_clips(["library:17", "walk-a"])
-    assert [clip(60.0).name for clip in clips] == ["17_03", "17_10", "walk-a"]
+    assert [clip.motion(60.0).name for clip in clips] == ["17_03", "17_10", "walk-a"]
     whole = recorded.clip("17_03").motion()
-    assert len(clips[0](15.0)) == (len(whole) + 1) // 2
+    assert len(clips[0].motion(15.0)) == (len(whole) + 1) // 2
 
 
 def test_mistakes_are_one_line() -> None:
@@ -40,20 +40,20 @@ def test_clips_of_a_folder_have_their_own_rates(tmp_path: Path) -> None:
     write_asf(tmp_path / "b.asf", built_in.average_skeleton())
     write_amc(tmp_path / "b.amc", built_in.motion("walk-b", frames=121, fps=120.0))  # as .amc files are read
     clips = training_clips([tmp_path])
-    assert [len(clip(30.0)) for clip in clips] == [21, 31]
+    assert [len(clip.motion(30.0)) for clip in clips] == [21, 31]
     assert [clip.count(30.0) for clip in clips] == [20, 30]  # about as many, before it is made
     joints = built_in.motion("walk-a", frames=41, fps=60.0).joints[::2]
-    np.testing.assert_allclose(clips[0](30.0).joints, joints, atol=1e-5)
+    np.testing.assert_allclose(clips[0].motion(30.0).joints, joints, atol=1e-5)
 
 
 def test_the_clip_that_is_followed_is_left_out(tmp_path: Path) -> None:
-    names = {clip(30.0).name for clip in training_clips(["library:16"], followed="16_15")}
+    names = {clip.motion(30.0).name for clip in training_clips(["library:16"], followed="16_15")}
     assert names == {clip.name for clip in recorded.clips(only=["16"])} - {"16_15"}
-    same = {clip(30.0).name for clip in training_clips(["library:16"], followed=Path("somewhere/16_15.amc"))}
+    same = {clip.motion(30.0).name for clip in training_clips(["library:16"], followed=Path("somewhere/16_15.amc"))}
     assert same == names
     for name in ("a", "b"):
         write_bvh(tmp_path / f"{name}.bvh", built_in.motion(f"walk-{name}", frames=5))
-    assert [clip(30.0).name for clip in training_clips([tmp_path], followed=tmp_path / "a.bvh")] == ["b"]
+    assert [clip.motion(30.0).name for clip in training_clips([tmp_path], followed=tmp_path / "a.bvh")] == ["b"]
     (tmp_path / "b.bvh").unlink()
     with pytest.raises(ValueError, match="expected a folder with another clip than the source, got that one alone"):
         training_clips([tmp_path], followed=tmp_path / "a.bvh")

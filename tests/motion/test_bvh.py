@@ -205,7 +205,7 @@ def test_a_bvh_and_an_amc_of_one_motion_are_one_source_and_one_training(tmp_path
     write_bvh(tmp_path / "a.bvh", walk)
     for source in (tmp_path / "a.amc", tmp_path / "a.bvh"):
         motion, (learned,) = load_motion(source), training_clips([source])
-        for poses in (motion.poses, learned(30.0).poses):
+        for poses in (motion.poses, learned.motion(30.0).poses):
             np.testing.assert_allclose(wrapped(poses - walk.poses), 0.0, atol=1e-7)
         np.testing.assert_allclose(motion.joints, walk.joints, atol=1e-7)
         np.testing.assert_array_equal(motion.skeleton.free, walk.skeleton.free)

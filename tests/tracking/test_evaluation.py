@@ -39,7 +39,7 @@ def measures_of(scene: Scene, training: Array | None = None, shaken_mm: float = 
 
 @pytest.mark.parametrize("size", [(320, 240), (64, 48)])
 def test_small_pictures_lead_to_the_nearest_pose(size: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
-    training = np.concatenate([clip(30.0).poses[:, 3:] for clip in training_clips(["library:02,16"])])
+    training = np.concatenate([clip.motion(30.0).poses[:, 3:] for clip in training_clips(["library:02,16"])])
     scene = walk(FRAMES, VIEWS, size)
     poses = []
     for limit in (len(training) - 1, len(training)):
