@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
+from posefit.geometry.calibration import pinhole_matrix
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.silhouette.cost import masks_of
@@ -117,10 +118,8 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
     straight = looking_at(azimuth, elevation)
     half = float(np.arccos(np.clip(rays @ ray, -1.0, 1.0)).max())
     focal = 0.5 * PICTURE / np.tan(min(1.05 * half, 1.2))
-    to_picture = np.array([[focal, 0.0, PICTURE / 2.0], [0.0, focal, PICTURE / 2.0], [0.0, 0.0, 1.0]])
-    from_image = np.linalg.inv(
-        [[camera.focal[0], 0.0, camera.centre[0]], [0.0, camera.focal[1], camera.centre[1]], [0.0, 0.0, 1.0]]
-    )
+    to_picture = pinhole_matrix([focal, focal], [PICTURE / 2.0, PICTURE / 2.0])
+    from_image = np.linalg.inv(pinhole_matrix(camera.focal, camera.centre))
     homography = to_picture @ straight.rotation @ camera.rotation.T @ from_image
     shift = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])  # OpenCV's pixel centres are whole numbers
     homography = np.linalg.inv(shift) @ homography @ shift

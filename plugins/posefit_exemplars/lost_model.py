@@ -59,7 +59,7 @@ def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> 
     values = {
         "farthest": float(distances.mean(axis=1).max()),
         "second": second_side(skeleton, frame.posterior, frame.pose),
-        "across": across(visible, float(frame.pose[0]), frame.translation),
+        "across": abs(math.sin(frame.pose[0] - facing(visible[0], frame.translation))) if len(visible) == 1 else 0.0,
         "views": float(min(len(visible), MAX_VIEWS)),
     }
     if frame.details["usable"]:
@@ -75,11 +75,6 @@ def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: b
     velocity = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
     ahead, speed = float(velocity @ [math.sin(yaw), math.cos(yaw)]), float(np.linalg.norm(velocity))
     return {"ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED), "speed": min(speed, MAX_SPEED)}
-
-
-def across(cameras: Sequence[Camera], yaw: float, place: Array) -> float:
-    """Return how far a person at a place (3,) faces across the only camera's line of sight: 1 in a side view."""
-    return abs(math.sin(yaw - facing(cameras[0], place))) if len(cameras) == 1 else 0.0
 
 
 class EvidenceMeans:

@@ -50,8 +50,7 @@ NextFrame = Literal["start", "carry", "forget"]
 
 def finite_costs(costs: Array) -> Array:
     """Return costs (n,) that any library can work with: at most 1e15 to either side, nan the worst of all."""
-    finite: Array = np.fmax(np.fmin(costs, WORST), -WORST)
-    return finite
+    return np.asarray(np.fmax(np.fmin(costs, WORST), -WORST))
 
 
 def check_tell(waiting: int, proposals: Array, costs: Array) -> None:

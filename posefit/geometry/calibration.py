@@ -124,16 +124,13 @@ class Calibration:
 
     def maps(self, size: tuple[int, int]) -> tuple[Any, Any]:
         """Return the two maps with which cv2.remap undoes the distortion of pictures scaled to `size`."""
-        matrix = self._scaled_matrix(size)
-        if self.fisheye:
-            return cv2.fisheye.initUndistortRectifyMap(
-                matrix, self.distortion[:4], np.eye(3), matrix, size, cv2.CV_32FC1
-            )
-        return cv2.initUndistortRectifyMap(matrix, self.distortion, np.eye(3), matrix, size, cv2.CV_32FC1)
+        matrix, lens = self._scaled_matrix(size), self.distortion[: 4 if self.fisheye else None]
+        maps = cv2.fisheye.initUndistortRectifyMap if self.fisheye else cv2.initUndistortRectifyMap
+        return maps(matrix, lens, np.eye(3), matrix, size, cv2.CV_32FC1)
 
     def _scaled_matrix(self, size: tuple[int, int]) -> Array:
         camera = self.camera(size, np.eye(3))
-        return _pinhole(camera.focal, camera.centre - HALF)
+        return pinhole_matrix(camera.focal, camera.centre - HALF)
 
     def straightened(self, points: Array, size: tuple[int, int]) -> Array:
         """Return points (..., 3), columns and rows of pictures scaled to `size` and a third number, undistorted."""
@@ -227,7 +224,7 @@ def _cameras(path: Path, text: str) -> list[Calibration]:
 
 def _own(path: Path) -> list[Calibration]:
     camera = Camera.from_json(path)
-    matrix, size = _pinhole(camera.focal, camera.centre - HALF), (camera.width, camera.height)
+    matrix, size = pinhole_matrix(camera.focal, camera.centre - HALF), (camera.width, camera.height)
     return [Calibration(path.stem, size, matrix, np.zeros(4), camera.rotation, camera.translation, upright=True)]
 
 
@@ -242,7 +239,7 @@ def _described(name: str, values: Mapping[str, Any]) -> list[Calibration]:
                 continue
             if {"fx", "fy", "cx", "cy"} <= known.keys():
                 axes = ([_number_of(known[kind + axis]) for axis in "xy"] for kind in "fc")
-                known["matrix"] = _pinhole(*axes).tolist()
+                known["matrix"] = pinhole_matrix(*axes).tolist()
             if _first(known, MATRIX) is not None:
                 cameras.append(_camera(name, table, known))
             elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
@@ -269,7 +266,7 @@ def _camera(name: str, values: Mapping[str, Any], known: Mapping[str, Any]) -> C
     """Return the camera that values describe, whose keys in small letters and digits are those of `known`."""
     matrix = _matrix_of(_first(known, MATRIX))
     if matrix.shape == (4,):  # as Kalibr has it
-        matrix = _pinhole(matrix[:2], matrix[2:])
+        matrix = pinhole_matrix(matrix[:2], matrix[2:])
     fisheye = _is_fisheye(known)
     numbered = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")  # in OpenCV's order
     lens = _first(known, LENS)
@@ -357,7 +354,7 @@ def _qualisys(text: str) -> list[Calibration]:
         turned = np.array([[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"])
         rotation = np.diag([1.0, -1.0, -1.0]) @ turned  # its camera looks along -z with y up
         position = np.array([float(place.get(axis, "")) for axis in "xyz"]) / 1000.0
-        size, matrix = (right - left + 1, bottom - top + 1), _pinhole(focal, centre - (left, top))
+        size, matrix = (right - left + 1, bottom - top + 1), pinhole_matrix(focal, centre - (left, top))
         name = camera.get("serial", f"camera {number}")
         calibrations.append(_stated(name, size, matrix, distortion, rotation, -rotation @ position))
     return calibrations
@@ -405,7 +402,8 @@ def _stated(
     )
 
 
-def _pinhole(focal: Sequence[float] | Array, centre: Sequence[float] | Array) -> Array:
+def pinhole_matrix(focal: Sequence[float] | Array, centre: Sequence[float] | Array) -> Array:
+    """Return the matrix (3, 3) of a camera without skew."""
     return np.array([[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]])
 
 

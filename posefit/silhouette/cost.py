@@ -149,8 +149,7 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
-    mask: Mask = masks_of(body, camera, np.asarray(pose)[None], np.asarray(translation)[None])[0]
-    return mask
+    return np.asarray(masks_of(body, camera, np.asarray(pose)[None], np.asarray(translation)[None])[0])
 
 
 def masks_of(body: Body, camera: Camera, poses: Array, translations: Array) -> Mask:

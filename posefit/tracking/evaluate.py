@@ -50,7 +50,24 @@ def evaluate(
     warnings = [*scene.warnings, *method.audit.warnings]
     if scene.truth is None and (warning := backwards_warning(backwards)):
         warnings.append(warning)
-    setup = _setup(scene, method, task, options)
+    assert options.evaluations is not None
+    setup = Setup(
+        motion=scene.name,
+        method=method.name,
+        settings=method.settings,
+        seed=options.seed,
+        train=[clip.name for clip in task.training],
+        evaluations_per_frame=options.evaluations,
+        dimensions=method.dimensions(task),
+        translation=task.translation,
+        first_pose=options.first_pose,
+        smooth=bool(options.smooth),
+        views=len(scene.cameras),
+        camera=scene.placing,
+        size_pixels=(scene.cameras[0].width, scene.cameras[0].height),
+        fps=scene.fps,
+        frames=scene.count,
+    )
     none_right = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
     log = TrackingLog(
         hypotheses=tracked.hypotheses,
@@ -76,27 +93,6 @@ def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posteri
     if scene.truth is None and model is not None:
         model = in_footage(model, len(scene.cameras), height_known)
     return replace(posterior, modes=modes_of(scene.body.skeleton, posterior), recalibration=model)
-
-
-def _setup(scene: Scene, method: Method, task: Task, options: TrackOptions) -> Setup:
-    assert options.evaluations is not None
-    return Setup(
-        motion=scene.name,
-        method=method.name,
-        settings=method.settings,
-        seed=options.seed,
-        train=[clip.name for clip in task.training],
-        evaluations_per_frame=options.evaluations,
-        dimensions=method.dimensions(task),
-        translation=task.translation,
-        first_pose=options.first_pose,
-        smooth=bool(options.smooth),
-        views=len(scene.cameras),
-        camera=scene.placing,
-        size_pixels=(scene.cameras[0].width, scene.cameras[0].height),
-        fps=scene.fps,
-        frames=scene.count,
-    )
 
 
 def _numbers(table: Table, name: str, least: float) -> list[int] | None:
