@@ -60,9 +60,8 @@ class FrameCosts:
 
     def side_odds(self, pose: Array, place: Array) -> Array | None:
         """Return the logarithms of the odds (2,) that legs, and arms, are as in a pose (66,), by all landmarks."""
-        if self.observation.landmarks is None:
-            return None
-        known = self.observation.landmarks[..., 2].any()
+        marks = self.observation.landmarks
+        known = marks is not None and marks[..., 2].any()
         return side_odds(self.landmarks(pose[None], place[None])[0]) if known else None
 
     def contours(self, place: Array) -> list[MaskContours]:

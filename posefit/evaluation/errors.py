@@ -257,8 +257,6 @@ def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
 def mode_reliability(frames: Sequence[Frame], truth: Array, skeleton: Skeleton) -> list[list[float]]:
     """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
     weighed = [(frame.modes, joints) for frame, joints in zip(frames, truth, strict=True) if frame.modes]
-    if not weighed:
-        return []
     right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed])
     likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
     return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]

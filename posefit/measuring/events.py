@@ -64,8 +64,6 @@ def low_pass(series: Array, cutoff: float, fps: float) -> Array:
     """
     width = np.sqrt(np.log(2.0)) / (2.0 * np.pi * cutoff) * fps  # frames
     reach = min(int(4.0 * width) + 1, len(series) - 1)
-    if reach < 1:
-        return np.array(series)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     before, after = 2.0 * series[0] - series[reach:0:-1], 2.0 * series[-1] - series[-2 : -reach - 2 : -1]
     longer = np.concatenate([before, series, after])

@@ -67,8 +67,7 @@ class Track:
     @property
     def content(self) -> Content:
         """What its files are made of."""
-        values = {each.name: getattr(self, each.name) for each in fields(Content)}
-        return Content(**values)
+        return Content(**{each.name: getattr(self, each.name) for each in fields(Content)})
 
     @property
     def truth(self) -> Motion | None:

@@ -51,8 +51,6 @@ class Squares:
 
         `derivatives` (T, m, n) are those of the series by the numbers of the same frame.
         """
-        if not len(frames):
-            return
         steps = weight**2 * (series[frames + 1] - series[frames])
         here, there = derivatives[frames], derivatives[frames + 1]
         self.gradients[frames] -= np.einsum("kmn,km->kn", here, steps)
