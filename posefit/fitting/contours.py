@@ -14,7 +14,7 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.silhouette.mask import Mask, coarser_camera, without_small_pieces
+from posefit.silhouette.mask import Mask, coarser_camera, padded_box, without_small_pieces
 
 FINE_PIXELS = 80.0  # pixels of a metre; of finer masks only every second pixel, third, ... is used
 FIELD_MARGIN = 48  # pixels around a mask whose distance from it is known
@@ -79,15 +79,13 @@ def _border(observation: Observation, view: int, factor: int, step: int) -> tupl
     pictures = silhouette.mask, silhouette.valid
     mask, valid = (np.ascontiguousarray(picture[first::factor, first::factor]) for picture in pictures)
     mask = without_small_pieces(mask)
-    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-    right, bottom = left + width + FIELD_MARGIN, top + height + FIELD_MARGIN
-    left, top = max(left - FIELD_MARGIN, 0), max(top - FIELD_MARGIN, 0)
-    mask, valid = mask[top:bottom, left:right], valid[top:bottom, left:right]
-    around = valid & ~mask  # the background there is known
-    if not width or not around.any():
+    box = rows, columns = padded_box(mask, FIELD_MARGIN)
+    mask, around = mask[box], valid[box] & ~mask[box]  # the background there is known
+    if not mask.any() or not around.any():
         return nothing
     pixels = np.concatenate([_between(mask, around), _between(mask.T, around.T)[:, ::-1]])
-    return pixels[::step] + np.array([left, top]), (left, top), distances_outside(mask, around)
+    corner = columns.start, rows.start
+    return pixels[::step] + np.array(corner), corner, distances_outside(mask, around)
 
 
 def distances_outside(mask: Mask, around: Mask) -> Distances:

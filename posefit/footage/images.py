@@ -37,7 +37,6 @@ class Marks(NamedTuple):
 
     values: NDArray[Any]  # (height, width): grey levels, an alpha channel, indices of a palette, or colours 0xRRGGBB
     soft: bool = False  # whether they are degrees
-    alpha: bool = False
     photo: bool = False  # a picture in many colours
 
 
@@ -127,7 +126,7 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
     if not labelled and image.has_transparency_data:
         alpha = np.asarray(image.convert("RGBA").getchannel("A"))
         if (alpha != np.iinfo(alpha.dtype).max).any():
-            return Marks(alpha, soft=True, alpha=True)
+            return Marks(alpha, soft=True)
     if image.mode in ("1", "LA"):
         image = image.convert("L")
     if image.mode in ("L", "F") or image.mode.startswith("I"):

@@ -66,8 +66,7 @@ class FrameQuality:
 
         Its area must not be far from that of the frames before either, where they are like a person's.
         """
-        left, top, right, bottom = box_of(person.mask) if person.area else (0, 0, 0, 0)
-        side = max(right - left, bottom - top)
+        side = max(cv2.boundingRect(person.mask.astype(np.uint8))[2:])
         outside = self._outside(image, person, side)
         ghost = self._is_ghost(image, person.mask)
         whole = person.area > 0 and not person.touches_border

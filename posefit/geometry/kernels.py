@@ -40,15 +40,6 @@ class Chain(NamedTuple):
     offsets: Array  # (26, 3) the bone in its own frame
 
 
-def chain(parents: NDArray[np.int64], angles: NDArray[np.int64], axes: Array, offsets: Array) -> Chain:
-    """Return the constant part of every bone's transform, from rest frames (26, 3, 3) and bone vectors (26, 3)."""
-    before = np.concatenate([np.eye(3)[None], axes])[parents]
-    turns = np.swapaxes(before, 1, 2) @ axes
-    turns[np.abs(turns - np.eye(3)).max(axis=(1, 2)) <= 1e-12] = np.eye(3)
-    in_own_frames = np.einsum("bji,bj->bi", axes, offsets)
-    return Chain(parents.astype(np.int64), angles.astype(np.int64), turns, in_own_frames)
-
-
 @inlined
 def sine_cosine_near_zero(x):
     """Return the sine and cosine of an angle from -pi/2 to pi/2. Polynomials, so that they run in vector registers."""

@@ -135,8 +135,11 @@ class Skeleton:
 
     @cached_property
     def chain(self) -> kernels.Chain:
-        """The constant arrays that the kinematics kernel wants."""
-        return kernels.chain(_STARTS, _FIRST_ANGLES, self.axes, self.offsets)
+        """The constant part of every bone's transform."""
+        before = np.concatenate([np.eye(3)[None], self.axes])[_STARTS]
+        turns = np.swapaxes(before, 1, 2) @ self.axes
+        turns[np.abs(turns - np.eye(3)).max(axis=(1, 2)) <= 1e-12] = np.eye(3)
+        return kernels.Chain(_STARTS, _FIRST_ANGLES, turns, np.einsum("bji,bj->bi", self.axes, self.offsets))
 
     def turns(self, poses: Array) -> Array:
         """Return how each bone, named by the joint it ends in, turns (27, T, 3, 3) from rest in poses (T, 66).
