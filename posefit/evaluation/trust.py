@@ -283,34 +283,6 @@ def trust_of(
     `tracked` are the tracker's frames, and `frames` these in the end, smoothed; `iou` is their overlap with
     the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
     """
-    signs = _signs(scene, tracked, frames, table, iou, training)
-    reasons = {name: value for name, value in signs.items() if isinstance(value, str)}
-    figures: dict[str, Any] = {**signs, **dict.fromkeys(reasons)}
-    ratio, stature = figures["size_ratio"], scene.body.stature
-    figures |= {
-        "frames": int((table["usable"] == 1.0).sum()),
-        "height_m": stature,
-        "size_m": None if ratio is None else ratio * stature,
-    }
-    against = signs_against(figures)
-    return Trust(
-        sentence=sentence(figures, against),
-        grade=grade_of(against),
-        against=[words for _, words in against],
-        unknown_signs=reasons,
-        **figures,
-    )
-
-
-def _signs(
-    scene: Scene,
-    tracked: Sequence[Frame],
-    frames: Sequence[Frame],
-    table: Table,
-    iou: float,
-    training: Sequence[Motion],
-) -> dict[str, float | str]:
-    """Return the figure of each of `SIGNS`, or a text: why it is unknown."""
     usable = table["usable"] == 1.0
     cut, cropped = np.array([_borders(each) for each in scene.observations]).T
     few, several, fps = usable.sum() < MIN_FRAMES, len(scene.cameras) > 1, scene.fps
@@ -320,7 +292,8 @@ def _signs(
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
     turns = np.array([frame.pose[0] - facing(camera, frame.translation) for frame in frames])
     lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
-    return {
+    # the figure of each of `SIGNS`, or a text: why it is unknown
+    signs: dict[str, float | str] = {
         "size_ratio": _figure({ONE_CAMERA: not several}, lambda: _size(scene, frames, usable), TOO_FEW),
         "depth_scatter": _figure({TOO_FEW: few}, lambda: depth_scatter(depths, usable, fps), TOO_FEW),
         "foot_share": _figure({TOO_FEW: few, IN_PLACE: in_place}, lambda: float(stands.any(axis=1)[usable].mean())),
@@ -346,6 +319,22 @@ def _signs(
         "iou": iou,
         "acceleration": _figure({TOO_FEW: few}, lambda: mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
     }
+    reasons = {name: value for name, value in signs.items() if isinstance(value, str)}
+    figures: dict[str, Any] = {**signs, **dict.fromkeys(reasons)}
+    ratio, stature = figures["size_ratio"], scene.body.stature
+    figures |= {
+        "frames": int(usable.sum()),
+        "height_m": stature,
+        "size_m": None if ratio is None else ratio * stature,
+    }
+    against = signs_against(figures)
+    return Trust(
+        sentence=sentence(figures, against),
+        grade=grade_of(against),
+        against=[words for _, words in against],
+        unknown_signs=reasons,
+        **figures,
+    )
 
 
 def _borders(observation: Observation) -> tuple[bool, bool]:

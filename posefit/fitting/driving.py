@@ -85,7 +85,11 @@ def drive(
         ahead = task.evaluations * len(reader.waiting)
         counted = math.ceil(drawn.poses / len(task.cameras)) - evaluations - ahead
         leeway = UNCOUNTED_POSES * (yielded + 1 + len(reader.waiting))
-        frame = _with_counted_evaluations(frame, yielded, counted, leeway, task.evaluations, audit)
+        if counted > frame.evaluations + leeway:
+            audit.note("evaluations", yielded, f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
+            frame = with_evaluations(frame, counted)
+        if frame.evaluations > task.evaluations:
+            audit.note("budget", yielded, f"use at most {task.evaluations:,} evaluations, got {frame.evaluations:,}")
         frame = _with_true_cost(frame, yielded, task, observation, audit)
         yielded, evaluations = yielded + 1, evaluations + frame.evaluations
         yield replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
@@ -135,16 +139,6 @@ def _check(frame: Frame, audit: Audit) -> None:
         raise audit.broken(f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}")
     if np.ndim(frame.trace) != 2 or np.shape(frame.trace)[1] != 2:
         raise audit.broken(f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}")
-
-
-def _with_counted_evaluations(frame: Frame, number: int, counted: int, leeway: int, budget: int, audit: Audit) -> Frame:
-    """Return the frame with the poses that were drawn for it; note where it reports fewer, or exceeds the budget."""
-    if counted > frame.evaluations + leeway:
-        audit.note("evaluations", number, f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
-        frame = with_evaluations(frame, counted)
-    if frame.evaluations > budget:
-        audit.note("budget", number, f"use at most {budget:,} evaluations, got {frame.evaluations:,}")
-    return frame
 
 
 def _with_true_cost(frame: Frame, number: int, task: Task, observation: Observation, audit: Audit) -> Frame:

@@ -24,7 +24,7 @@ from posefit.motion.amc import SIZE_LIMIT, VALUES
 from posefit.motion.joint_names import joints_of
 from posefit.motion.lines import LARGEST, Line, lines_of
 from posefit.motion.motion import LONGEST, Motion
-from posefit.motion.rig import STANDING, Retargeted, Rig, retargeted, upward
+from posefit.motion.rig import STANDING, Rig, retargeted, upward
 from posefit.reading import check_size, cut, quoted
 
 _LIMBS = {  # names in the CMU conversions by cgspeed, without their side
@@ -87,27 +87,20 @@ def read_bvh(path: str | Path, *, unit: Unit | None = None, up: Up | None = None
         raise InputError(f"{path}: expected {expected}, got one of {stature:g} units")
     metres = METRES[chosen] if known is None else known
     skeleton = replace(result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres)
-    notes = _notes(path, result, unit or chosen, unit is None, stature, axis if up is None else "")
-    return Motion(path.stem, skeleton, result.poses, result.places * metres, fps, notes=tuple(notes))
-
-
-def _notes(path: Path, result: Retargeted, unit: Unit, guessed: bool, stature: float, axis: str) -> list[str]:
-    """Return what a reader should know: what was guessed, what is missing, and how far joints are off."""
-    notes, metres = [], METRES[unit]
-    if guessed and unit != "m":
+    notes = []
+    if unit is None and chosen != "m":
         stands = f"as the person stands {stature:.4g} of them"
-        notes.append(f"{path}: lengths are taken for {UNIT_NAMES[unit]}, {stands}; --unit sets it")
-    elif not guessed and unit_of(stature * metres) is None:
+        notes.append(f"{path}: lengths are taken for {UNIT_NAMES[chosen]}, {stands}; --unit sets it")
+    elif unit is not None and unit_of(stature * metres) is None:
         notes.append(f"{path}: the person stands {stature * metres:.2f} m with lengths in {UNIT_NAMES[unit]}")
-    if axis not in ("", "y"):
+    if up is None and axis != "y":
         notes.append(f"{path}: {axis} is taken to be up, as the person stands along it; --up sets it")
     if result.filled:
         notes.append(f"{path}: without {', '.join(result.filled)}, which are an average person's at rest")
     if result.off * metres > MISSED:
-        notes.append(
-            f"{path}: bones change their lengths or fork; joints are up to {1e3 * result.off * metres:.1f} mm off"
-        )
-    return notes
+        off = f"{1e3 * result.off * metres:.1f} mm off"
+        notes.append(f"{path}: bones change their lengths or fork; joints are up to {off}")
+    return Motion(path.stem, skeleton, result.poses, result.places * metres, fps, notes=tuple(notes))
 
 
 def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
