@@ -21,9 +21,6 @@ from typing import Any
 from posefit.output.drawing import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
 from posefit.page.document import assembled, colour_style, one_script, part
 
-LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}
-BODY_DARK = {"left": hexadecimal(LEFT), "right": hexadecimal(RIGHT), "truth": "#98a5b3"}
-
 LIGHT = {
     "left": "#b84500",
     "right": "#0063a6",
