@@ -58,10 +58,10 @@ def committed(act: Callable[[Any], Array]) -> Array:
     return np.array(costs).T
 
 
-def trained(seed: int, steps: int) -> Callable[[Any], Array]:
+def trained(seed: int) -> Callable[[Any], Array]:
     """Return the policy of a training, the mean of its distribution."""
     model = ppo(stacked(ENVIRONMENTS)[1], seed)
-    model.learn(steps)
+    model.learn(STEPS)
     return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0])
 
 
@@ -83,18 +83,18 @@ def searched(name: str, budget: int) -> Array:
     return np.array(costs).T
 
 
-def row_of(agent: str, budget: int, seed: int, steps: int) -> dict[str, Any]:
+def row_of(agent: str, budget: int, seed: int) -> dict[str, Any]:
     """Return the costs (n, frames) that an agent or a search commits, and the CPU seconds until it can."""
     start = process_time()
     if agent in SEARCHES:
         return {"costs": searched(agent, budget), "cpu_seconds": process_time() - start}
     rng = np.random.default_rng(seed)
-    policy = trained(seed, steps) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
+    policy = trained(seed) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
     cpu = process_time() - start
     return {"costs": committed(policy), "cpu_seconds": cpu}
 
 
-def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) -> Iterator[str]:
+def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]]) -> Iterator[str]:
     """Yield the table of rows under their agents, evaluations and seeds."""
     groups: dict[tuple[str, int], list[Mapping[str, Any]]] = {}
     for (agent, budget, _), row in done.items():
@@ -102,7 +102,7 @@ def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) ->
     cells = []
     for (agent, budget), group in groups.items():
         cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
-        training = [f"{steps:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
+        training = [f"{STEPS:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
         costs = np.array([row["costs"] for row in group])  # (seeds, n, frames)
         low, high = quantiles(drawn_means(costs.mean(axis=2)))
         shown = [f"{costs[..., frames].mean():.1f}" for frames in SHOWN_FRAMES.values()]
@@ -112,17 +112,15 @@ def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) ->
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings.")
-@click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
 @WORKERS
-def main(seeds: int, steps: int, workers: int | None) -> None:
+def main(workers: int | None) -> None:
     check_learners()
     turns = [("uniform", MAX_EVALUATIONS, 0)]
     turns += [(name, budget, 0) for name in SEARCHES for budget in BUDGETS]
-    turns += [("PPO", MAX_EVALUATIONS, seed) for seed in range(seeds)]
-    jobs = {turn: partial(row_of, *turn, steps) for turn in turns}
+    turns += [("PPO", MAX_EVALUATIONS, seed) for seed in range(SEEDS)]
+    jobs = {turn: partial(row_of, *turn) for turn in turns}
     done = each(jobs, workers, bar)
-    for line in table({turn: done[turn] for turn in turns}, steps):
+    for line in table({turn: done[turn] for turn in turns}):
         click.echo(line)
 
 

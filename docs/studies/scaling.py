@@ -35,20 +35,17 @@ def viewed(problem: PoseProblem, width: int = 320, views: int = 1) -> PoseProble
     return PoseProblem(problem.body, cameras, [Silhouette.of(mask) for mask in masks], problem.space)
 
 
-def with_components(problem: PoseProblem, components: int) -> PoseProblem:
-    """Return the problem with a space of so many principal components."""
-    prior = PCA(components=components).fit(walking_angles())
-    return replace(problem, space=replace(problem.space, prior=prior))
-
-
 @click.command()
 def main() -> None:
     """Print the four curves."""
     problem = bench_problem()
+    priors = {m: PCA(components=m).fit(walking_angles()) for m in COMPONENTS}
     curves = {
         "width, pixels": {width: viewed(problem, width=width) for width in WIDTHS},
         "views": {views: viewed(problem, views=views) for views in VIEWS},
-        "dimensions": {m + 3: with_components(problem, m) for m in COMPONENTS},
+        "dimensions": {
+            m + 3: replace(problem, space=replace(problem.space, prior=prior)) for m, prior in priors.items()
+        },
         "population": dict.fromkeys(POPULATIONS, problem),
     }
     for name, problems in curves.items():

@@ -70,6 +70,11 @@ def kept(path: str | None, ended: Iterator[tuple[K, Row]], count: int) -> Iterat
         yield key, row
 
 
+def keyed(kind: Any) -> Callable[[Row], Any]:
+    """Return the function from a row to the named tuple of a kind that holds its fields."""
+    return lambda row: kind(*(row[name] for name in kind._fields))
+
+
 def measured(
     jobs: Mapping[K, Callable[[], Row]],
     path: str | None,
