@@ -3,9 +3,8 @@
 | looking for | file |
 |---|---|
 | the document and its colours | this file |
-| the data of the page | content.py |
+| the data of the page, and joints and angles as the scripts read them | content.py |
 | small pictures of footage and masks, as many as there is room for | stills.py |
-| cameras, joints and angles as the scripts read them | bodies.py |
 | the places of everything, empty; how it looks | track.html, track.css |
 | bodies of tapered cones on a canvas, seen by any camera; a view that can be turned | body.js |
 | a clock that plays frames; mouse, touch and keys that turn a view | play.js |
