@@ -18,11 +18,11 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation, TransformObservation
 
-from posefit import minimise
+from posefit import Minimum, PoseProblem, minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.fitting.box import Start
+from posefit.fitting.box import Space, Start
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import to_sb3_vec_env
@@ -125,19 +125,24 @@ def constant(training: Training) -> Policy:
 def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
     """Return the costs that an optimiser reaches on the held-out instances, blindly or from a row's proposals."""
     name = "cma" if training.agent == STARTED else training.agent
-    env, factory = made(training, INSTANCES), registry().optimiser(name)
+    env, costs = made(training, INSTANCES), []
     env.reset(options={"instance": TESTED})
-    few = {"population_size": training.budget} if training.budget < 40 else {}  # one population of sapso
-    settings, costs = planned(factory, few, training.budget), []
     for number, problem in enumerate(env.unwrapped.problems):
         space = problem.space
         if start is not None:
             best = int(np.argmin(np.array(start["proposal_costs"])[:, number]))
             mean = np.array(start["proposals"])[best, number]
             space = replace(space, start=Start(mean, np.full(len(mean), STARTED_SPREAD), np.zeros(len(mean))))
-        optimiser = factory(space, np.random.default_rng([training.seed, number]), **settings)
-        costs.append(minimise(problem.evaluate, optimiser, training.budget, budget_known=True).cost)
+        costs.append(minimum(problem, space, name, training.budget, [training.seed, number]).cost)
     return costs if start is None else np.minimum(costs, start["costs"]).tolist()
+
+
+def minimum(problem: PoseProblem, space: Space, name: str, budget: int, seed: Sequence[int]) -> Minimum:
+    """Return what an optimiser finds in a space of a problem, with one population where the budget holds no more."""
+    factory = registry().optimiser(name)
+    settings = planned(factory, {"population_size": budget} if budget < 40 else {}, budget)
+    optimiser = factory(space, np.random.default_rng(seed), **settings)
+    return minimise(problem.evaluate, optimiser, budget, budget_known=True)
 
 
 def ppo(vector: Any, seed: int) -> Any:

@@ -16,12 +16,9 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation
 
-from agents import ENVIRONMENTS, HELD_OUT, SEARCHES, SHOWN, STEPS, check_learners, ppo
-from posefit import minimise
+from agents import ENVIRONMENTS, HELD_OUT, SEARCHES, SHOWN, STEPS, check_learners, minimum, ppo
 from posefit.arrays import Array
 from posefit.cli.output import Command
-from posefit.registry import registry
-from posefit.settings import planned
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
 from posefit_envs.track import FRAMES
@@ -68,17 +65,15 @@ def trained(seed: int) -> Callable[[Any], Array]:
 def searched(name: str, budget: int) -> Array:
     """Return the costs (n, frames) that an optimiser commits in the held-out tracks."""
     env: Any = gym.make_vec(NAME, INSTANCES, evaluations_per_frame=2, errors=False)
-    factory = registry().optimiser(name)
     env.reset(options={"instance": TESTED})
-    few = {"population_size": budget} if budget < 40 else {}  # one population of sapso
-    settings, costs = planned(factory, few, budget), []
+    costs = []
     for frame in range(FRAMES):
-        best = []
-        for number, problem in enumerate(env.unwrapped.problems):
-            optimiser = factory(problem.space, np.random.default_rng([frame, number]), **settings)
-            best.append(minimise(problem.evaluate, optimiser, budget, budget_known=True))
+        best = [
+            minimum(problem, problem.space, name, budget, [frame, number]).proposal
+            for number, problem in enumerate(env.unwrapped.problems)
+        ]
         for _ in range(2):  # the fewest proposals that commit one
-            infos = env.step(np.array([minimum.proposal for minimum in best]))[-1]
+            infos = env.step(np.array(best))[-1]
         costs.append(infos["committed_cost"])
     return np.array(costs).T
 
