@@ -124,7 +124,6 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
 
 
 def composites_lines(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the table of the rows."""
     table = []
     for row in rows:
         cells = [row["situation"], str(row["views"]), row["extraction"], str(row["seed"])]

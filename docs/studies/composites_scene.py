@@ -178,7 +178,6 @@ class Posed(NamedTuple):
 
 
 def composited(picture: NDArray[np.float32], camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
-    """Return a picture with people in it."""
     image = picture * _shadow(camera, people)[..., None]
     fine = finer(camera)
     mask = np.zeros((fine.height, fine.width), dtype=bool)
@@ -210,7 +209,6 @@ def true_masks(camera: Camera, people: Sequence[Posed]) -> list[Mask]:
 
 
 def finer(camera: Camera) -> Camera:
-    """Return a camera with more pixels."""
     width, height = FINER * camera.width, FINER * camera.height
     return Camera(width, height, FINER * camera.focal, FINER * camera.centre, camera.rotation, camera.translation)
 
@@ -319,7 +317,6 @@ class Actor:
 
 
 def frames_of(name: str, start: int = 0, stop: int | None = None) -> Motion:
-    """Return frames of a recorded clip."""
     motion = recorded.clip(name).motion()
     return motion.frames(start, len(motion) if stop is None else min(stop, len(motion)))
 
@@ -356,7 +353,6 @@ def cycle(motion: Motion) -> tuple[int, int]:
 
 
 def facing_elsewhere(motion: Motion, angle: float) -> Motion:
-    """Return a motion turned about the vertical."""
     poses, (x, y, z) = motion.poses.copy(), motion.translations.T
     poses[:, 0] += angle
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -372,7 +368,6 @@ def on_ground(motion: Motion, body: Body) -> Motion:
 
 
 def moved(motion: Motion, by: Array) -> Motion:
-    """Return a motion elsewhere."""
     return Motion(motion.name, motion.skeleton, motion.poses, motion.translations + by, motion.fps)
 
 
@@ -474,7 +469,6 @@ SHOWS = {
 
 
 def situation(name: str, views: int, seed: int) -> Situation:
-    """Return a situation before so many cameras."""
     rng = np.random.default_rng([seed, views])
     turned = rng.uniform(-8.0, 8.0) + 90.0 * (name == "towards")  # degrees, so that no side view is exactly one
     target = np.array([0.0, HEIGHT, 0.0])

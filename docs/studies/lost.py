@@ -287,7 +287,6 @@ def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:
 
 
 def key_of(row: Row) -> tuple[Any, ...]:
-    """Return what a row is found by."""
     return row["group"], row["clip"], tuple(row["views_degrees"]), row["condition"]
 
 

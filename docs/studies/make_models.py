@@ -75,14 +75,12 @@ class Recorded(NamedTuple):
 
 
 def recorded(root: Path, clip: Excerpt) -> Recorded:
-    """Return what a clip holds."""
     folder, name = clip.path.split("/")
     motion = read_clip(root / folder / f"{folder}.asf", root / folder / f"{name}.amc")
     return moving(motion.frames(clip.start, clip.stop or len(motion)))
 
 
 def moving(motion: Motion) -> Recorded:
-    """Return what a motion holds."""
     states = encode(motion.poses, motion.translations)
     states[:, :3] /= leg_of(motion.skeleton)
     return Recorded(states, motion.poses, motion.fps)

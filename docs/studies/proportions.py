@@ -49,7 +49,6 @@ def moments(men: Array, women: Array) -> tuple[Array, Array]:
 
 
 def proportions_lines(men: Path, women: Path) -> Iterator[str]:
-    """Yield the spreads and the correlations."""
     spread, correlation = moments(proportions(men), proportions(women))
     heads = ["", "spread", *MEASURES]
     rows = zip(MEASURES, spread[1:], correlation[1:, 1:], strict=True)

@@ -65,7 +65,6 @@ def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, w
 
 
 def _run(experiment: "Experiment", out: str | None, workers: int) -> None:
-    """Run an experiment and print its tables."""
     from posefit_reproduce.experiment import reproduce
 
     tables = reproduce(experiment, out, workers, partial(progress, unit="run"))
