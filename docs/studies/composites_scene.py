@@ -179,7 +179,8 @@ class Posed(NamedTuple):
 
 def composited(picture: NDArray[np.float32], camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
     image = picture * _shadow(camera, people)[..., None]
-    fine = finer(camera)
+    width, height = FINER * camera.width, FINER * camera.height
+    fine = replace(camera, width=width, height=height, focal=FINER * camera.focal, centre=FINER * camera.centre)
     mask = np.zeros((fine.height, fine.width), dtype=bool)
     for one in people:
         mask |= project(one.body, fine, one.pose, one.place)
@@ -206,11 +207,6 @@ def true_masks(camera: Camera, people: Sequence[Posed]) -> list[Mask]:
         hidden = [other for other, depth in zip(whole, depths, strict=True) if depth < depths[k]]
         seen.append(mask & ~np.any(hidden, axis=0) if hidden else mask)
     return seen
-
-
-def finer(camera: Camera) -> Camera:
-    width, height = FINER * camera.width, FINER * camera.height
-    return Camera(width, height, FINER * camera.focal, FINER * camera.centre, camera.rotation, camera.translation)
 
 
 def _box(mask: Mask) -> Any:

@@ -110,9 +110,7 @@ def table_1(analysis: Analysis) -> Table:
         test = analysis.motions[motion].test.poses
         frame, images = len(test) // 2, analysis.results.of("poses", "image", motion, OURS)
         ours = [np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3) for pose in (test[frame], images[1, 0, frame])]
-        mean, letter = (
-            interval(table_1_angles(analysis, motion, *way)) for way in ((OURS, "image"), (LETTER, "image"))
-        )
+        mean, letter = (interval(table_1_angles(analysis, motion, name, "image")) for name in (OURS, LETTER))
         pose = table_1_angles(analysis, motion, "mean_pose", "track").mean()
         labels = ["paper, truth", "paper, estimate", f"truth of frame {frame}", "PCA + SAPSO"]
         errors = ["", f"{np.abs(np.subtract(*pair)).mean():.1f}", f"mean pose {pose:.1f}"]
