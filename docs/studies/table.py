@@ -21,6 +21,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.cli.output import Command, progress, say
 from posefit.evaluation.measures import MEASURES
+from posefit.statistics.intervals import LEVEL, RESAMPLES
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.engine import Limits
@@ -31,7 +32,6 @@ from posefit_reproduce.jobs import each
 
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
-RESAMPLES, LEVEL = 2000, 0.95
 SHARES = ("lost_rate", "swap_rate")
 WORKERS = click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; one a core by default.")
 LEDGER = click.option("--ledger", metavar="DIR", help="Folder of finished rows: the same command continues there.")
