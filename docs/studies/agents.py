@@ -18,16 +18,16 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation, TransformObservation
 
-from posefit import minimise
+from posefit import Minimum, PoseProblem, minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.fitting.box import Start
+from posefit.fitting.box import Space, Start
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
-from table import WORKERS, drawn_means, markdown, measured, quantiles
+from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
 NAME = "posefit_envs:posefit/FitImage-v0"
 HELD_OUT = 10_000  # the first instance of the test split
@@ -125,19 +125,24 @@ def constant(training: Training) -> Policy:
 def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
     """Return the costs that an optimiser reaches on the held-out instances, blindly or from a row's proposals."""
     name = "cma" if training.agent == STARTED else training.agent
-    env, factory = made(training, INSTANCES), registry().optimiser(name)
+    env, costs = made(training, INSTANCES), []
     env.reset(options={"instance": TESTED})
-    few = {"population_size": training.budget} if training.budget < 40 else {}  # one population of sapso
-    settings, costs = planned(factory, few, training.budget), []
     for number, problem in enumerate(env.unwrapped.problems):
         space = problem.space
         if start is not None:
             best = int(np.argmin(np.array(start["proposal_costs"])[:, number]))
             mean = np.array(start["proposals"])[best, number]
             space = replace(space, start=Start(mean, np.full(len(mean), STARTED_SPREAD), np.zeros(len(mean))))
-        optimiser = factory(space, np.random.default_rng([training.seed, number]), **settings)
-        costs.append(minimise(problem.evaluate, optimiser, training.budget, budget_known=True).cost)
+        costs.append(minimum(problem, space, name, training.budget, [training.seed, number]).cost)
     return costs if start is None else np.minimum(costs, start["costs"]).tolist()
+
+
+def minimum(problem: PoseProblem, space: Space, name: str, budget: int, seed: Sequence[int]) -> Minimum:
+    """Return what an optimiser finds in a space of a problem, with one population where the budget holds no more."""
+    factory = registry().optimiser(name)
+    settings = planned(factory, {"population_size": budget} if budget < 40 else {}, budget)
+    optimiser = factory(space, np.random.default_rng(seed), **settings)
+    return minimise(problem.evaluate, optimiser, budget, budget_known=True)
 
 
 def ppo(vector: Any, seed: int) -> Any:
@@ -159,22 +164,21 @@ def trained(training: Training) -> Policy:
     model = ppo(to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed)
     learning = training.budget
     if "cloning" in training.agent:
-        steps = min(CLONING_STEPS, training.budget)
-        cloned(model, made(training, ENVIRONMENTS), steps)
+        cloned(model, made(training, ENVIRONMENTS))
         model.policy.log_std.data.fill_(CLONED_LOG_DEVIATION)
-        learning -= steps
+        learning -= CLONING_STEPS
     if learning:
         model.learn(learning)
     return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
 
 
-def cloned(model: Any, env: Any, steps: int) -> None:
+def cloned(model: Any, env: Any) -> None:
     """Teach a model the truth in what its own proposals show (DAgger: Ross, Gordon, Bagnell, AISTATS 2011)."""
     import torch
 
     pictures, infos = env.reset(seed=model.seed)
     truths, length = infos["truth"].copy(), ROLLOUT * ENVIRONMENTS
-    for _ in range(steps // length):
+    for _ in range(CLONING_STEPS // length):
         shown, targets = [], []
         for _ in range(ROLLOUT):
             shown.append(pictures)
@@ -249,14 +253,17 @@ def picture(row: Mapping[str, Any], path: str) -> None:
 @click.option("--variant", "names", multiple=True, type=click.Choice(list(VARIANTS)), help="By default walks alone.")
 @click.option("--agent", "agents", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
 @click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
-@click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
 @click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
 @click.option("--picture", "drawn", metavar="FILE", help="A PNG of the first PPO's eight proposals.")
 @WORKERS
 def main(
-    names: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int,
-    rows: str | None, drawn: str | None, workers: int | None,
-) -> None:  # fmt: skip
+    names: tuple[str, ...],
+    agents: tuple[str, ...],
+    seeds: int,
+    rows: str | None,
+    drawn: str | None,
+    workers: int | None,
+) -> None:
     check_learners()
     if drawn is not None and "PPO" not in (agents or LEARNERS):
         raise InputError("--picture must come with the agent PPO")
@@ -265,11 +272,11 @@ def main(
         turns += [Training(variant, agent, 0, 0) for agent in CONSTANTS]
         turns += [Training(variant, agent, budget, 0) for agent in SEARCHES for budget in BUDGETS]
         turns += [
-            Training(variant, name, min(steps, CLONING_STEPS) if name == "cloning" else steps, seed)
+            Training(variant, name, CLONING_STEPS if name == "cloning" else STEPS, seed)
             for seed in range(seeds)
             for name in agents or LEARNERS
         ]
-    done = measured({turn: partial(row_of, turn) for turn in turns}, rows, turn_of, workers)
+    done = measured({turn: partial(row_of, turn) for turn in turns}, rows, keyed(Training), workers)
     for turn in turns:
         if turn.agent == "PPO":
             started = Training(turn.variant, STARTED, STARTED_BUDGET, turn.seed)
@@ -280,11 +287,6 @@ def main(
             click.echo(line)
     if drawn is not None:
         picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)
-
-
-def turn_of(row: Mapping[str, Any]) -> Training:
-    """Return the training of a row."""
-    return Training(*(row[name] for name in Training._fields))
 
 
 if __name__ == "__main__":

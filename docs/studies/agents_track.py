@@ -16,12 +16,9 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation
 
-from agents import ENVIRONMENTS, HELD_OUT, SEARCHES, SHOWN, STEPS, check_learners, ppo
-from posefit import minimise
+from agents import ENVIRONMENTS, HELD_OUT, SEARCHES, SHOWN, STEPS, check_learners, minimum, ppo
 from posefit.arrays import Array
 from posefit.cli.output import Command
-from posefit.registry import registry
-from posefit.settings import planned
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
 from posefit_envs.track import FRAMES
@@ -58,43 +55,41 @@ def committed(act: Callable[[Any], Array]) -> Array:
     return np.array(costs).T
 
 
-def trained(seed: int, steps: int) -> Callable[[Any], Array]:
+def trained(seed: int) -> Callable[[Any], Array]:
     """Return the policy of a training, the mean of its distribution."""
     model = ppo(stacked(ENVIRONMENTS)[1], seed)
-    model.learn(steps)
+    model.learn(STEPS)
     return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0])
 
 
 def searched(name: str, budget: int) -> Array:
     """Return the costs (n, frames) that an optimiser commits in the held-out tracks."""
     env: Any = gym.make_vec(NAME, INSTANCES, evaluations_per_frame=2, errors=False)
-    factory = registry().optimiser(name)
     env.reset(options={"instance": TESTED})
-    few = {"population_size": budget} if budget < 40 else {}  # one population of sapso
-    settings, costs = planned(factory, few, budget), []
+    costs = []
     for frame in range(FRAMES):
-        best = []
-        for number, problem in enumerate(env.unwrapped.problems):
-            optimiser = factory(problem.space, np.random.default_rng([frame, number]), **settings)
-            best.append(minimise(problem.evaluate, optimiser, budget, budget_known=True))
+        best = [
+            minimum(problem, problem.space, name, budget, [frame, number]).proposal
+            for number, problem in enumerate(env.unwrapped.problems)
+        ]
         for _ in range(2):  # the fewest proposals that commit one
-            infos = env.step(np.array([minimum.proposal for minimum in best]))[-1]
+            infos = env.step(np.array(best))[-1]
         costs.append(infos["committed_cost"])
     return np.array(costs).T
 
 
-def row_of(agent: str, budget: int, seed: int, steps: int) -> dict[str, Any]:
+def row_of(agent: str, budget: int, seed: int) -> dict[str, Any]:
     """Return the costs (n, frames) that an agent or a search commits, and the CPU seconds until it can."""
     start = process_time()
     if agent in SEARCHES:
         return {"costs": searched(agent, budget), "cpu_seconds": process_time() - start}
     rng = np.random.default_rng(seed)
-    policy = trained(seed, steps) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
+    policy = trained(seed) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
     cpu = process_time() - start
     return {"costs": committed(policy), "cpu_seconds": cpu}
 
 
-def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) -> Iterator[str]:
+def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]]) -> Iterator[str]:
     """Yield the table of rows under their agents, evaluations and seeds."""
     groups: dict[tuple[str, int], list[Mapping[str, Any]]] = {}
     for (agent, budget, _), row in done.items():
@@ -102,7 +97,7 @@ def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) ->
     cells = []
     for (agent, budget), group in groups.items():
         cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
-        training = [f"{steps:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
+        training = [f"{STEPS:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
         costs = np.array([row["costs"] for row in group])  # (seeds, n, frames)
         low, high = quantiles(drawn_means(costs.mean(axis=2)))
         shown = [f"{costs[..., frames].mean():.1f}" for frames in SHOWN_FRAMES.values()]
@@ -112,17 +107,15 @@ def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) ->
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings.")
-@click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
 @WORKERS
-def main(seeds: int, steps: int, workers: int | None) -> None:
+def main(workers: int | None) -> None:
     check_learners()
     turns = [("uniform", MAX_EVALUATIONS, 0)]
     turns += [(name, budget, 0) for name in SEARCHES for budget in BUDGETS]
-    turns += [("PPO", MAX_EVALUATIONS, seed) for seed in range(seeds)]
-    jobs = {turn: partial(row_of, *turn, steps) for turn in turns}
+    turns += [("PPO", MAX_EVALUATIONS, seed) for seed in range(SEEDS)]
+    jobs = {turn: partial(row_of, *turn) for turn in turns}
     done = each(jobs, workers, bar)
-    for line in table({turn: done[turn] for turn in turns}, steps):
+    for line in table({turn: done[turn] for turn in turns}):
         click.echo(line)
 
 

@@ -57,7 +57,6 @@ PARTS = ("stature", *LIMBS)
 
 
 def subject(seed: int) -> Body:
-    """Return a person of another build."""
     rng = np.random.default_rng([7, seed])
     body = varied(Body.of(built_in.average_skeleton()), PERCENT, rng)
     scale = rng.uniform(0.9, 1.1)

@@ -117,13 +117,8 @@ CHANGES: dict[str, Mapping[str, Any]] = {
     "aligned, first yaw unknown": {"translation": "aligned", "yaw_off_degrees": ALL_AROUND},
     "body 5 % off": {"body_off_percent": OFF_PERCENT},
     "damaged silhouettes": {"corruption": DAMAGE},
-    "all of these": {
-        "translation": "aligned",
-        "yaw_off_degrees": ALL_AROUND,
-        "body_off_percent": OFF_PERCENT,
-        "corruption": DAMAGE,
-    },
 }
+CHANGES["all of these"] = {name: value for change in CHANGES.values() for name, value in change.items()}
 
 
 def cell_fields(clip: Clip, views: Views, frames: int, **fields: Any) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from posefit.sweep.engine import Limits
 from posefit.tracking.front import track
 from posefit.tracking.result import Track
 from posefit.uncertainty.modes import nearer_mirrored
-from table import WORKERS, markdown, measured
+from table import WORKERS, keyed, markdown, measured
 
 Masks = NDArray[np.bool_]  # (views, T, height, width)
 
@@ -99,11 +99,6 @@ class Shot(NamedTuple):
     seed: int
 
 
-def shot_of(row: Row) -> Shot:
-    """Return whose row it is."""
-    return Shot(*(row[name] for name in Shot._fields))
-
-
 def row_of(video: str, shot: Shot) -> dict[str, Any]:
     """Return the row of a shot: it is filmed, taken out and tracked; what was refused is said in the tool's words."""
     with tempfile.TemporaryDirectory() as name:
@@ -129,7 +124,6 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
 
 
 def composites_lines(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the table of the rows."""
     table = []
     for row in rows:
         cells = [row["situation"], str(row["views"]), row["extraction"], str(row["seed"])]
@@ -157,7 +151,7 @@ def main(
     check_video(video)
     grid = product(range(seeds), situations or SHOWS, PLACES, extractions)
     shots = [Shot(shown, views, extraction, seed) for seed, shown, views, extraction in grid]
-    done = measured({shot: partial(row_of, video, shot) for shot in shots}, rows, shot_of, workers, LIMITS)
+    done = measured({shot: partial(row_of, video, shot) for shot in shots}, rows, keyed(Shot), workers, LIMITS)
     for line in composites_lines([*done.values()]):
         click.echo(line)
 

@@ -178,9 +178,9 @@ class Posed(NamedTuple):
 
 
 def composited(picture: NDArray[np.float32], camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
-    """Return a picture with people in it."""
     image = picture * _shadow(camera, people)[..., None]
-    fine = finer(camera)
+    width, height = FINER * camera.width, FINER * camera.height
+    fine = replace(camera, width=width, height=height, focal=FINER * camera.focal, centre=FINER * camera.centre)
     mask = np.zeros((fine.height, fine.width), dtype=bool)
     for one in people:
         mask |= project(one.body, fine, one.pose, one.place)
@@ -207,12 +207,6 @@ def true_masks(camera: Camera, people: Sequence[Posed]) -> list[Mask]:
         hidden = [other for other, depth in zip(whole, depths, strict=True) if depth < depths[k]]
         seen.append(mask & ~np.any(hidden, axis=0) if hidden else mask)
     return seen
-
-
-def finer(camera: Camera) -> Camera:
-    """Return a camera with more pixels."""
-    width, height = FINER * camera.width, FINER * camera.height
-    return Camera(width, height, FINER * camera.focal, FINER * camera.centre, camera.rotation, camera.translation)
 
 
 def _box(mask: Mask) -> Any:
@@ -319,7 +313,6 @@ class Actor:
 
 
 def frames_of(name: str, start: int = 0, stop: int | None = None) -> Motion:
-    """Return frames of a recorded clip."""
     motion = recorded.clip(name).motion()
     return motion.frames(start, len(motion) if stop is None else min(stop, len(motion)))
 
@@ -356,7 +349,6 @@ def cycle(motion: Motion) -> tuple[int, int]:
 
 
 def facing_elsewhere(motion: Motion, angle: float) -> Motion:
-    """Return a motion turned about the vertical."""
     poses, (x, y, z) = motion.poses.copy(), motion.translations.T
     poses[:, 0] += angle
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -372,7 +364,6 @@ def on_ground(motion: Motion, body: Body) -> Motion:
 
 
 def moved(motion: Motion, by: Array) -> Motion:
-    """Return a motion elsewhere."""
     return Motion(motion.name, motion.skeleton, motion.poses, motion.translations + by, motion.fps)
 
 
@@ -474,7 +465,6 @@ SHOWS = {
 
 
 def situation(name: str, views: int, seed: int) -> Situation:
-    """Return a situation before so many cameras."""
     rng = np.random.default_rng([seed, views])
     turned = rng.uniform(-8.0, 8.0) + 90.0 * (name == "towards")  # degrees, so that no side view is exactly one
     target = np.array([0.0, HEIGHT, 0.0])

@@ -1,6 +1,6 @@
 """The cost of following a person with the library: milliseconds a frame, memory, and a step of a fit."""
 
-import sys
+import resource
 from collections.abc import Iterator
 from dataclasses import replace
 from time import process_time
@@ -48,7 +48,8 @@ def follow_figures(frames: int) -> dict[str, float]:
         for _ in tracker.track(observations(frames), np.random.default_rng(0)):
             pass
         seconds = process_time() - began
-        return {"ms": 1e3 * seconds / frames, "mb": _peak_mb(), "step_poses": _step_poses(task, scene)}
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+        return {"ms": 1e3 * seconds / frames, "mb": peak, "step_poses": _step_poses(task, scene)}
 
 
 def _step_poses(task: Task, scene: Scene) -> float:
@@ -64,14 +65,6 @@ def _step_poses(task: Task, scene: Scene) -> float:
     )
     fit, cost = (min(repeat(job, number=1, repeat=20, timer=process_time)) for job in jobs)
     return fit / len(CONTINUED_REACHES) / cost
-
-
-def _peak_mb() -> float:
-    """Return the most memory that the process has had, in 1e6 bytes."""
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6
 
 
 @click.command(cls=Command, help=__doc__)

@@ -23,6 +23,7 @@ import numpy as np
 
 from posefit.cli.options import EXTRACTION, FRAMES, options, track_flags
 from posefit.cli.output import Command
+from posefit.cli.tracking import extraction_of
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
@@ -227,8 +228,7 @@ def main(
     FILMS are of KTH's actions, HumanEva-I or CMU's motion capture database as unpacked, or any others. Of each film 100
     frames are taken, from the first that shows the person by what its data set says, unless --frames chooses others.
     """
-    how = {"method": extraction.pop("extraction"), **extraction}
-    view = {"height": height, "extraction": Extraction(**{name: how[name] for name in how if how[name] is not None})}
+    view = {"height": height, "extraction": extraction_of(extraction, "video") or Extraction()}
     recordings = [recording_of(film) for film in films]
     for recording in recordings:
         if recording.activity is None and activity is None:

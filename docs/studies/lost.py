@@ -7,7 +7,7 @@ Follows recorded clips of many motions from all sides, with clean and with reali
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -79,30 +79,20 @@ def _disc(mask: Mask, x: int, y: int, radius: int, value: bool) -> None:
     mask[drawn.astype(bool)] = value
 
 
-@dataclass(frozen=True, eq=False)
-class MaskNoise(Sequence[Observation]):
-    """Observations with errors in the masks, independent for each camera and reproducible."""
+def with_mask_noise(observations: Sequence[Observation], seed: Sequence[int]) -> list[Observation]:
+    """Return observations with errors in the masks, independent for each camera and reproducible."""
 
-    observations: Sequence[Observation] = field(repr=False)
-    seed: Sequence[int]
-
-    def __len__(self) -> int:
-        return len(self.observations)
-
-    def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        observation = self.observations[k]
-        masks = [self._noisy(silhouette.mask, k, camera) for camera, silhouette in enumerate(observation.silhouettes)]
-        return replace(observation, silhouettes=[Silhouette.of(mask) for mask in masks])
-
-    def __iter__(self) -> Iterator[Observation]:
-        return (self[k] for k in range(len(self)))
-
-    def _noisy(self, mask: Mask, k: int, camera: int) -> Mask:
-        whole = np.random.default_rng([RNG_STREAM, *self.seed, camera])
+    def noisy(mask: Mask, k: int, camera: int) -> Silhouette:
+        whole = np.random.default_rng([RNG_STREAM, *seed, camera])
         begins = int(whole.integers(LASTING))
-        lasting = np.random.default_rng([RNG_STREAM, *self.seed, camera, 1, (k + begins) // LASTING])
-        fresh = np.random.default_rng([RNG_STREAM, *self.seed, camera, 2, k])
-        return noisy_mask(mask, RIM * whole.standard_normal(), lasting, fresh)
+        lasting = np.random.default_rng([RNG_STREAM, *seed, camera, 1, (k + begins) // LASTING])
+        fresh = np.random.default_rng([RNG_STREAM, *seed, camera, 2, k])
+        return Silhouette.of(noisy_mask(mask, RIM * whole.standard_normal(), lasting, fresh))
+
+    return [
+        replace(seen, silhouettes=[noisy(each.mask, k, camera) for camera, each in enumerate(seen.silhouettes)])
+        for k, seen in enumerate(observations)
+    ]
 
 
 CLEAN, MASKS = "as they are", "as masks are"
@@ -278,7 +268,7 @@ def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:
     scene = cell_scene(cell)
     if track.condition == MASKS:
         seed = [track.clip.instance, *track.clip.name.encode()]
-        scene = replace(scene, observations=MaskNoise(scene.observations, seed))
+        scene = replace(scene, observations=with_mask_noise(scene.observations, seed))
     result = track_of(cell, scene)
     assert result.truth is not None
     gains = 1e3 * mirrored_gain(result.truth.joints, result.motion.joints)
@@ -297,7 +287,6 @@ def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:
 
 
 def key_of(row: Row) -> tuple[Any, ...]:
-    """Return what a row is found by."""
     return row["group"], row["clip"], tuple(row["views_degrees"]), row["condition"]
 
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from sklearn.cluster import KMeans
 from sklearn.covariance import LedoitWolf
 
+from make_motions import ORIGIN
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
@@ -29,10 +30,6 @@ from posefit_vsmm import motion as models
 from posefit_vsmm.motion import FPS, LAMBDA, MotionModels, leg_of, ridge, without_heading
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode, minus
 
-ORIGIN = (
-    "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
-    "The database was created with funding from NSF EIA-0196217."
-)
 FADING = 0.07  # share of its way from the mean pose that a joint loses in a frame where nothing else is learned
 DRAWN = 400  # frames of a built-in motion
 POSES = 24  # typical poses of a model
@@ -78,14 +75,12 @@ class Recorded(NamedTuple):
 
 
 def recorded(root: Path, clip: Excerpt) -> Recorded:
-    """Return what a clip holds."""
     folder, name = clip.path.split("/")
     motion = read_clip(root / folder / f"{folder}.asf", root / folder / f"{name}.amc")
     return moving(motion.frames(clip.start, clip.stop or len(motion)))
 
 
 def moving(motion: Motion) -> Recorded:
-    """Return what a motion holds."""
     states = encode(motion.poses, motion.translations)
     states[:, :3] /= leg_of(motion.skeleton)
     return Recorded(states, motion.poses, motion.fps)

@@ -9,7 +9,7 @@ out of sight for a while.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -79,23 +79,11 @@ KINDS = (*GAPS, RETURN)
 TRANSLATIONS: tuple[Translation, ...] = ("known", "aligned")
 
 
-@dataclass(frozen=True, eq=False)
-class Hidden(Sequence[Observation]):
-    """Observations of which some show nothing, not even where the person is."""
-
-    observations: Sequence[Observation] = field(repr=False)
-    start: int
-    stop: int
-
-    def __len__(self) -> int:
-        return len(self.observations)
-
-    def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        observation = self.observations[k]
-        if not self.start <= k < self.stop:
-            return observation
-        empty = [Silhouette.of(np.zeros_like(silhouette.mask)) for silhouette in observation.silhouettes]
-        return Observation(empty, None, usable=False)
+def hidden(observations: Sequence[Observation], start: int, stop: int) -> list[Observation]:
+    """Return observations of which some show nothing, not even where the person is."""
+    empty = [Silhouette.of(np.zeros_like(silhouette.mask)) for silhouette in observations[start].silhouettes]
+    nothing = Observation(empty, None, usable=False)
+    return [nothing if start <= k < stop else observation for k, observation in enumerate(observations)]
 
 
 def trial(cell: TrackCell, views: Views, kind: str, translation: Translation) -> tuple[bool, bool]:
@@ -113,7 +101,7 @@ def with_gap(scene: Scene, frames: int) -> tuple[Scene, int]:
     """Return the scene with empty frames in its middle, and the first after them."""
     gone = (scene.count - frames) // 2
     back = gone + frames
-    return replace(scene, observations=Hidden(scene.observations, gone, back)), back
+    return replace(scene, observations=hidden(scene.observations, gone, back)), back
 
 
 def returned(scene: Scene, views: Views) -> tuple[Scene, int]:
@@ -135,7 +123,7 @@ def returned(scene: Scene, views: Views) -> tuple[Scene, int]:
     whole = synthetic(motion, views, size, [], (None, None))
     observations = rendered(motion, whole.body, whole.cameras)
     gone, back = len(truth), len(truth) + AWAY
-    return replace(whole, yaw=scene.yaw, observations=Hidden(observations, gone, back)), back
+    return replace(whole, yaw=scene.yaw, observations=hidden(observations, gone, back)), back
 
 
 def recovery_lines(workers: int | None) -> Iterator[str]:

@@ -89,7 +89,6 @@ def pieces() -> list[tuple[str, Clip]]:
 
 
 def planned_tracks() -> list[Case]:
-    """Return the tracks of all clips."""
     planned: list[Case] = []
     for k, (group, clip) in enumerate(pieces()):
         sides = [SIDES[(2 * k + turn) % len(SIDES)] for turn in (0, 1, 3)]
@@ -378,7 +377,6 @@ class Evaluation:
 
 
 def evaluated(calibration: Calibration, features: TrackFeatures) -> Evaluation:
-    """Return the evaluation of a track by a calibration."""
     none = np.array([calibration.recalibration(calibration.log(signs)).none for signs in features.evidence])
     track = features.track
     radii, halves = radii_of(calibration, features)

@@ -33,15 +33,11 @@ def proportions(table: Path) -> Array:
     """Return the logarithms of people's stature in metres and of their proportions (people, 9)."""
     with existing(table).open(encoding="latin-1", newline="") as file:
         rows = list(csv.DictReader(file))
-    columns = {name: np.array([float(row[name]) for row in rows]) for name in _measures()}
+    names = {"stature", *(name.strip("-") for of in MEASURES.values() for name in of)}
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in names}
     lengths = [sum(columns[name.strip("-")] * (-1 if name[0] == "-" else 1) for name in of) for of in MEASURES.values()]
     stature = columns["stature"]
     return np.asarray(np.log(np.column_stack([1e-3 * stature, *(length / stature for length in lengths)])))
-
-
-def _measures() -> set[str]:
-    """Return the columns that are read."""
-    return {"stature", *(name.strip("-") for of in MEASURES.values() for name in of)}
 
 
 def moments(men: Array, women: Array) -> tuple[Array, Array]:
@@ -53,7 +49,6 @@ def moments(men: Array, women: Array) -> tuple[Array, Array]:
 
 
 def proportions_lines(men: Path, women: Path) -> Iterator[str]:
-    """Yield the spreads and the correlations."""
     spread, correlation = moments(proportions(men), proportions(women))
     heads = ["", "spread", *MEASURES]
     rows = zip(MEASURES, spread[1:], correlation[1:, 1:], strict=True)

@@ -19,7 +19,7 @@ from posefit.fitting.cma import Strategy
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.policies import Policy, race_action, race_features
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES, SEARCHES
-from table import WORKERS, drawn_means, markdown, measured, quantiles
+from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
 NAME = "posefit/Race-v0"
 INSTANCES, SEEDS = 192, 2
@@ -249,11 +249,6 @@ def row_of_turn(turn: Turn) -> dict[str, Any]:
     return turn._asdict() | {"steps": steps, "costs": costs.tolist()}
 
 
-def turn_of(row: Mapping[str, Any]) -> Turn:
-    """Return the turn of a row."""
-    return Turn(*(row[name] for name in Turn._fields))
-
-
 def race_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the printed table, the highest mean first; intervals are of 95 %, a bootstrap of seeds and instances."""
     agents = dict.fromkeys(row["agent"] for row in rows)
@@ -274,7 +269,7 @@ def main(rows: str | None, workers: int | None) -> None:
     check_learners()
     turns = [Turn(agent, 0) for agent in REFERENCES]
     turns += [Turn(agent, seed) for agent in LEARNERS for seed in range(SEEDS)]
-    done = measured({turn: partial(row_of_turn, turn) for turn in turns}, rows, turn_of, workers)
+    done = measured({turn: partial(row_of_turn, turn) for turn in turns}, rows, keyed(Turn), workers)
     for line in race_lines([*done.values()]):
         click.echo(line)
 

@@ -56,7 +56,6 @@ SENTENCES = (
 
 
 def name_of(row: Row) -> str:
-    """Return what a row's method is called."""
     return str(row["spec"].get("name") or row["spec"]["method"])
 
 
@@ -134,7 +133,6 @@ def difference(values: Sequence[float], strata: Sequence[object], clusters: Sequ
 
 
 def verdicts(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the table of the paper's sentences."""
     lines = []
     for sentence in SENTENCES:
         pairs = paired(rows, sentence.method, sentence.reference, sentence.figure)

@@ -14,9 +14,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.cli.options import EXTRACTION, FRAMES, options, track_flags
 from posefit.cli.output import Command
+from posefit.cli.tracking import extraction_of
 from posefit.evaluation.errors import LOST
 from posefit.footage.masks import Range
-from posefit.footage.segmentation import Extraction
 from posefit.geometry.skeleton import BONES
 from posefit.progress import QUIET
 from posefit.tracking.front import track
@@ -78,13 +78,9 @@ def main(
     workers: int | None,
     frames: Range,
     height: float | None,
-    extraction: str | None,
-    **settings: Any,
+    **options: Any,
 ) -> None:
-    chosen = {name: value for name, value in {"method": extraction, **settings}.items() if value is not None}
-    how: dict[str, Any] = {"frames": frames, "height": height}
-    if chosen:
-        how["extraction"] = Extraction(**chosen)
+    how = {"frames": frames, "height": height, "extraction": extraction_of(options, "video")}
     jobs = {seed: partial(seed_row, film, how, seed) for seed in range(seeds)}
     for line in seeds_lines([*measured(jobs, rows, lambda row: int(row["seed"]), workers).values()]):
         click.echo(line)

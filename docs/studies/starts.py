@@ -101,7 +101,6 @@ def task_of(image: Image, training: list[Motion]) -> Task:
 
 
 def printed(heads: Sequence[str], cells: Sequence[Sequence[str]], words: int) -> None:
-    """Print a table."""
     click.echo("\n".join(markdown(heads, cells, words)))
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.cli.output import Command, progress, say
 from posefit.evaluation.measures import MEASURES
+from posefit.statistics.intervals import LEVEL, RESAMPLES
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.engine import Limits
@@ -31,7 +32,6 @@ from posefit_reproduce.jobs import each
 
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
-RESAMPLES, LEVEL = 2000, 0.95
 SHARES = ("lost_rate", "swap_rate")
 WORKERS = click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; one a core by default.")
 LEDGER = click.option("--ledger", metavar="DIR", help="Folder of finished rows: the same command continues there.")
@@ -68,6 +68,11 @@ def kept(path: str | None, ended: Iterator[tuple[K, Row]], count: int) -> Iterat
             with Path(path).open("a", encoding="utf-8") as file:
                 file.write(f"{json.dumps(row)}\n")
         yield key, row
+
+
+def keyed(kind: Any) -> Callable[[Row], Any]:
+    """Return the function from a row to the named tuple of a kind that holds its fields."""
+    return lambda row: kind(*(row[name] for name in kind._fields))
 
 
 def measured(

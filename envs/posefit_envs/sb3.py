@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium import error
 from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.wrappers.vector import DictInfoToList
 
 from posefit_envs.base import mixed
 
@@ -31,6 +32,8 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
     if vector.metadata.get("autoreset_mode") != AutoresetMode.NEXT_STEP:
         raise error.Error(f"autoreset_mode must be NEXT_STEP, got {vector.metadata.get('autoreset_mode')}")
 
+    rows_of: Any = DictInfoToList(vector)
+
     class Adapted(VecEnv):
         def __init__(self) -> None:
             self._actions: Any = None
@@ -39,8 +42,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
 
         def reset(self) -> Any:
             seeds: Any = None if all(seed is None for seed in self._seeds) else list(self._seeds)
-            observations, infos = vector.reset(seed=seeds, options=self._options[0] or None)
-            self.reset_infos = [_row(infos, i) for i in range(self.num_envs)]
+            observations, self.reset_infos = rows_of.reset(seed=seeds, options=self._options[0] or None)
             self._reset_seeds()
             self._reset_options()
             return observations
@@ -49,17 +51,16 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             self._actions = actions
 
         def step_wait(self) -> Any:
-            observations, rewards, terminated, truncated, infos = vector.step(self._actions)
-            rows = [_row(infos, i) for i in range(self.num_envs)]
+            observations, rewards, terminated, truncated, rows = rows_of.step(self._actions)
             done = terminated | truncated
             if done.any():
                 for i in np.flatnonzero(done):
                     rows[i]["terminal_observation"] = observations[i].copy()
                     rows[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
-                fresh, fresh_infos = vector.reset(options={"reset_mask": done})
+                fresh, fresh_rows = rows_of.reset(options={"reset_mask": done})
                 observations = mixed(done, fresh, observations)
                 for i in np.flatnonzero(done):
-                    self.reset_infos[i] = _row(fresh_infos, int(i))
+                    self.reset_infos[i] = fresh_rows[i]
             return observations, rewards.astype(np.float32), done, rows
 
         def close(self) -> None:
@@ -88,12 +89,3 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
                 raise error.Error(f"indices must be all of the {self.num_envs} environments, got {chosen}")
 
     return Adapted()
-
-
-def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:
-    """Return the info of environment i, of infos with their masks."""
-    return {
-        name: values[i]
-        for name, values in infos.items()
-        if not name.startswith("_") and np.asarray(infos.get(f"_{name}", np.ones(i + 1, dtype=bool)))[i]
-    }

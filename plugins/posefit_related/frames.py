@@ -1,5 +1,6 @@
 """What the trackers share: the costs of poses in a frame, first poses, and a frame from a pose."""
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -59,8 +60,6 @@ def place_of(task: Task, observation: Observation, pose: Array, place: Array) ->
 
 def _box(mask: NDArray[np.bool_]) -> tuple[Array, Array] | None:
     """Return the centre (2,) and the size (2,), columns and rows, of a mask's bounding box; None where it is empty."""
-    rows, columns = np.nonzero(np.asarray(mask))
-    if not len(rows):
-        return None
-    low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1.0
-    return (low + high) / 2.0, high - low
+    left, top, width, height = cv2.boundingRect(np.asarray(mask, dtype=np.uint8))
+    size = np.array([width, height], dtype=np.float64)
+    return (np.array([left, top]) + size / 2.0, size) if width else None

@@ -4,7 +4,6 @@
 it runs.
 """
 
-import json
 from collections.abc import Iterator, Mapping
 from functools import partial
 from importlib import import_module  # of figures, for which matplotlib may be missing
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from posefit.cli.options import JSON
-from posefit.cli.output import progress, say
+from posefit.cli.output import print_result, progress, say
 
 if TYPE_CHECKING:
     from posefit_reproduce.experiment import Experiment
@@ -65,7 +64,6 @@ def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, w
 
 
 def _run(experiment: "Experiment", out: str | None, workers: int) -> None:
-    """Run an experiment and print its tables."""
     from posefit_reproduce.experiment import reproduce
 
     tables = reproduce(experiment, out, workers, partial(progress, unit="run"))
@@ -85,7 +83,7 @@ def bench_command(threads: int | None, as_json: bool) -> None:
 
     say("timing; this takes half a minute ...")
     figures = loop_figures(threads)
-    click.echo(json.dumps(figures) if as_json else "\n".join(_named_lines(figures)))
+    print_result(_named_lines(figures), figures, as_json)
 
 
 def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:

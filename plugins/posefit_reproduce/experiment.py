@@ -51,11 +51,11 @@ class Run(NamedTuple):
         )
 
 
+@dataclass(frozen=True)
 class Results:
     """The arrays of all runs."""
 
-    def __init__(self, runs: Mapping[Run, Arrays]) -> None:
-        self.runs = runs
+    runs: Mapping[Run, Arrays]
 
     def of(self, name: str, kind: str, subject: str, method: str) -> Array:
         """Return a named array of all runs of a method, (views, seeds, ...)."""
@@ -181,7 +181,11 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
         if out is not None:
             for table in tables:
                 (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
-            _write_figures(folder, experiment.figures(results))
+            for name, figure in experiment.figures(results):
+                if isinstance(figure, np.ndarray):
+                    (folder / name).write_bytes(cv2.imencode(Path(name).suffix, figure)[1].tobytes())
+                else:
+                    figure.savefig(folder / name, dpi=130)
     return tables
 
 
@@ -231,11 +235,3 @@ def _store(perform: Callable[[Run], Arrays], run: Run, file: Path) -> Path:
 def _stored(file: Path) -> Arrays:
     with np.load(file) as stored:
         return dict(stored)
-
-
-def _write_figures(folder: Path, figures: Iterable[tuple[str, Any]]) -> None:
-    for name, figure in figures:
-        if isinstance(figure, np.ndarray):
-            (folder / name).write_bytes(cv2.imencode(Path(name).suffix, figure)[1].tobytes())
-        else:
-            figure.savefig(folder / name, dpi=130)

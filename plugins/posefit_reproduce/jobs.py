@@ -6,10 +6,8 @@ from contextlib import closing
 from typing import Any, TypeVar
 
 from posefit.errors import InputError
-from posefit.sweep.engine import Limits
+from posefit.sweep.engine import POLL_SECONDS, Limits
 from posefit.sweep.pool import Pool, cores
-
-POLL_SECONDS = 0.2  # between checks for an interruption
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 K = TypeVar("K", bound=Hashable)

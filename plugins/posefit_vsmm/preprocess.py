@@ -29,11 +29,10 @@ def lines_of(mask: Mask) -> Lines | None:
     """Return the lines of a mask (height, width); None where it is empty."""
     from skimage.morphology import skeletonize  # half a second to import
 
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
+    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    if not width:
         return None
-    top, left = rows[0], columns[0]
-    crop = np.pad(mask[top : rows[-1] + 1, left : columns[-1] + 1], 2).astype(np.uint8)
+    crop = np.pad(mask[top : top + height, left : left + width], 2).astype(np.uint8)
     closed = cv2.morphologyEx(crop, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     clean = _large_pieces(np.asarray(closed, dtype=np.uint8))  # VSMM 1.3
     corner = np.array([left - 2, top - 2], dtype=np.float64) + 0.5  # pixel centres
@@ -49,7 +48,6 @@ def lines_of(mask: Mask) -> Lines | None:
 
 
 def _large_pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a mask without its small pieces."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0  # the background

@@ -14,11 +14,7 @@ from posefit.cli.output import print_result, results_alone, say
 @click.option("--out", metavar="DIR", help="The ledger's folder: a new one, or one that a sweep goes on in.")
 @click.option("--shard", metavar="I/N", help="Run each Nth cell from the Ith, into a file of its own in DIR.")
 @options(ENGINE)
-@click.option(
-    "--dry-run",
-    is_flag=True,
-    help="Print what cells there are, and run none; with --json each cell.",
-)
+@click.option("--dry-run", is_flag=True, help="Print what cells there are, and run none; with --json each cell.")
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
 @QUIET
 @JSON

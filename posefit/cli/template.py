@@ -21,7 +21,7 @@ TAKEN = {"Frame"}  # names that a template's module has already
 def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None, commands: Sequence[str] = ()) -> Path:
     """Return the new folder with a small installable plugin, `posefit-NAME` unless another is given.
 
-    `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot
+    `commands` are the names of posefit's own, which a new one cannot have. Raises ValueError where the name cannot
     be a plugin's, or the folder is there already.
     """
     one_of("kind", kind, (*KINDS, COMMAND))

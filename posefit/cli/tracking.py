@@ -71,8 +71,7 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     logging.getLogger("posefit").disabled = quiet
     with results_alone() if as_json else nullcontext():
         result = run(progress=Progress() if quiet else Progress(say), **_arguments(options))
-    degrees = [round(math.degrees(angle), 6) for angle in result.pose]
-    more = {"pose_degrees": degrees}
+    more = {"pose_degrees": [round(math.degrees(angle), 6) for angle in result.pose]}
     _print(result.track.content, as_json, more, options["out"], verbose, "open track.html, look at summary.png")
 
 

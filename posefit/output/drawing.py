@@ -26,10 +26,7 @@ LINES = (70, 66, 64)  # of a chart
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 SIDE_VIEW_DISTANCE = 6.0  # metres
-SOLID_RADIUS, FAINTEST_RADIUS = (
-    0.05,
-    0.3,
-)  # metres of a joint's 80 % interval: where bones are solid, and where faintest
+SOLID_RADIUS, FAINTEST_RADIUS = 0.05, 0.3  # metres of a joint's 80 % interval: bones are solid, and faintest
 FAINTEST = 0.2  # how much of a faintest limb's colour is left
 _STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
 SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}

@@ -150,11 +150,11 @@ class Painter:
             if filmed is not None and number == 0:
                 drawn = filmed.copy()
                 draw_body(drawn, body, camera, pose, place, solid)
-                panel = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), height)
+                panel = panel_of(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), height)
                 zoomed = _zoomed(camera, panel)
             else:
                 mask, fitted = observation.silhouettes[number].mask, project(body, camera, pose, place)
-                panel = OVERLAP[_panel(mask.view(np.uint8) + 2 * fitted.view(np.uint8), height, sharp=True)]
+                panel = OVERLAP[panel_of(mask.view(np.uint8) + 2 * fitted.view(np.uint8), height, sharp=True)]
                 zoomed = _zoomed(camera, panel)
                 if solid is not None:
                     share = solid_map(body, zoomed, pose, place, solid)
@@ -210,7 +210,8 @@ def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:
         at += width_of(name, scale) + 24
 
 
-def _panel(image: Image, height: int, sharp: bool = False) -> Image:
+def panel_of(image: Image, height: int, sharp: bool = False) -> Image:
+    """Return a picture in another height, and an even width; a sharp one has no values between its own."""
     width = 2 * round(image.shape[1] * height / image.shape[0] / 2)
     how = cv2.INTER_NEAREST if sharp else cv2.INTER_AREA if height < image.shape[0] else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(image, (width, height), interpolation=how), dtype=np.uint8)

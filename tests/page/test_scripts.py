@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from posefit.output import page as track_page
-from posefit.page.document import SHARED, part
+from posefit.page.document import SHARED, one_script, part
 from posefit.report import page as report_page
 from posefit.report.figures import COLOURS
 
@@ -22,7 +22,7 @@ def test_every_script_is_part_of_its_page_once():
         for package, names in (("posefit.page", SHARED), (page.__name__, page.SCRIPTS)):
             texts = {one.name: one.read_text("utf-8") for one in files(package).iterdir() if one.name.endswith(".js")}
             assert sorted(texts) == sorted(f"{name}.js" for name in names)
-            assert all(page.script().count(text) == 1 for text in texts.values())
+            assert all(one_script(page.__name__, page.SCRIPTS).count(text) == 1 for text in texts.values())
 
 
 def linted(path, text):
@@ -37,12 +37,14 @@ def linted(path, text):
 
 def test_the_linter_accepts_whole_scripts_and_rejects_planted_mistakes(tmp_path):
     for page in (report_page, track_page):
-        status, output = linted(tmp_path / "page.js", page.script())
+        status, output = linted(tmp_path / "page.js", one_script(page.__name__, page.SCRIPTS))
         assert status == 0, output
         assert "on 1 file" in output
     mistakes = {"missing(1);": "no-undef", "const unused = 1;": "no-unused-vars", "if (D == null) paint();": "eqeqeq"}
     for mistake, rule in mistakes.items():
-        planted = re.sub(r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", report_page.script())
+        planted = re.sub(
+            r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", one_script(report_page.__name__, report_page.SCRIPTS)
+        )
         status, output = linted(tmp_path / "page.js", planted)
         assert status != 0
         assert rule in output

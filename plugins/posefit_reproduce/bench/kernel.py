@@ -18,7 +18,7 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import mismatch, project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import walking_angles
-from posefit_priors.pca import PCA
+from posefit_priors.pca import COMPONENTS, PCA
 
 SIZE = (320, 240)  # pixels
 ROUNDS = 12  # of all jobs in turn; of each, the fastest run counts
@@ -52,18 +52,21 @@ def processor() -> dict[str, str]:
     return {"name": names[0] if names else platform.processor() or platform.machine(), "compiled_for": compiled_for}
 
 
-def bench_problem(threads: int = 1) -> PoseProblem:
+def bench_problem(
+    threads: int = 1, *, width: int = SIZE[0], views: int = 1, components: int = COMPONENTS
+) -> PoseProblem:
     """Return the benchmark's problem: one frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
     motion = built_in.motion("walk", frames=1, fps=30.0)
     body = Body.of(motion.skeleton)
-    prior = PCA().fit(walking_angles())
+    prior = PCA(components=components).fit(walking_angles())
     joints = motion.skeleton.joints(motion.poses, motion.translations)[0]
-    camera = Camera.framing(joints, body.joint_radii(), motion.poses[0, 0] + np.radians(45.0), SIZE)
+    yaws = motion.poses[0, 0] + np.radians(45.0 + 360.0 / views * np.arange(views))
+    cameras = [Camera.framing(joints, body.joint_radii(), yaw, (width, 3 * width // 4)) for yaw in yaws]
     space = SearchSpace(
         prior, np.array([motion.poses[0, 0], 0.0, 0.0]), np.radians([45.0, 15.0, 15.0]), motion.translations[0]
     )
-    silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
-    return PoseProblem(body, [camera], [silhouette], space, threads=threads)
+    masks = [project(body, camera, motion.poses[0], motion.translations[0]) for camera in cameras]
+    return PoseProblem(body, cameras, [Silhouette.of(mask) for mask in masks], space, threads=threads)
 
 
 def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:

@@ -1,8 +1,7 @@
 """How fast is the loop? All figures from one run, so that their ratios hold on any machine."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, cast
 
 import cv2
@@ -41,8 +40,12 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "opencv": lambda: [opencv_costs(alone, few[i : i + 1]) for i in range(len(few))],
         "opencv_batched": lambda: opencv_costs(alone, few),
     }
-    with _single_threaded_opencv():
+    opencv_threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
         seconds = fastest(jobs)
+    finally:
+        cv2.setNumThreads(opencv_threads)
     return {
         "kernel_us_per_pose_1_thread": 1e6 * seconds["one"] / POSES,
         "kernel_us_per_pose_all_threads": 1e6 * seconds["all"] / POSES,
@@ -54,16 +57,6 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "size": list(SIZE),
         "cpu": processor(),
     }
-
-
-@contextmanager
-def _single_threaded_opencv() -> Iterator[None]:
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(threads)
 
 
 def ask_and_tell(space: SearchSpace) -> dict[str, float]:

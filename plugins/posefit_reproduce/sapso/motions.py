@@ -25,6 +25,7 @@ CLIPS = {
     "turn": ("16/16_17", ("16/16_15",)),
     "run": ("16/16_35", ("09/09_01", "127/127_03")),
 }
+ALL_CLIPS = [clip for test, training in CLIPS.values() for clip in (test, *training)]
 # the first frame that is followed: 16_15 begins with an arm held out that is gone 1/60 s later, and the person of 16_17
 # walks straight on for two seconds before turning by a quarter
 FIRST = {"walk": 1, "turn": 120, "run": 1}
@@ -49,7 +50,7 @@ def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotio
 
     Raises ValueError where `clips` is no folder with the CMU clips that are wanted.
     """
-    for clip in [clip for test, training in CLIPS.values() for clip in (test, *training)]:
+    for clip in ALL_CLIPS:
         if clips is not None and not (Path(clips) / f"{clip}.amc").is_file():
             raise InputError(f"clips must be a folder of CMU clips such as {clip}.amc, got {clips}, which has none")
     motions = {}
@@ -64,7 +65,7 @@ def digests(clips: str | Path | None) -> str | list[str]:
     """Return what clips are: `library`, or digests of the files of a folder that are read."""
     if clips is None:
         return "library"
-    paths = [Path(clips) / f"{clip}.amc" for test, training in CLIPS.values() for clip in (test, *training)]
+    paths = [Path(clips) / f"{clip}.amc" for clip in ALL_CLIPS]
     return [digest_of(file)[:8] for path in paths for file in (path, *sorted(path.parent.glob("*.asf")))]
 
 

@@ -110,9 +110,7 @@ def table_1(analysis: Analysis) -> Table:
         test = analysis.motions[motion].test.poses
         frame, images = len(test) // 2, analysis.results.of("poses", "image", motion, OURS)
         ours = [np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3) for pose in (test[frame], images[1, 0, frame])]
-        mean, letter = (
-            interval(table_1_angles(analysis, motion, *way)) for way in ((OURS, "image"), (LETTER, "image"))
-        )
+        mean, letter = (interval(table_1_angles(analysis, motion, name, "image")) for name in (OURS, LETTER))
         pose = table_1_angles(analysis, motion, "mean_pose", "track").mean()
         labels = ["paper, truth", "paper, estimate", f"truth of frame {frame}", "PCA + SAPSO"]
         errors = ["", f"{np.abs(np.subtract(*pair)).mean():.1f}", f"mean pose {pose:.1f}"]
@@ -164,6 +162,7 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
     # the walk with a turn is followed in the space of the straight walk
     space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
     explained = np.asarray(100.0 * space.explained[: paper.ENOUGH_COMPONENTS].sum())
+    wanted = 100.0 * paper.EXPLAINED_VARIANCE
     few, degrees, milliseconds = 100.0 * few_joints(analysis, motion), "degrees of (8)", "CPU ms a frame"
     faster = 1e3 * seconds[0] - 1e3 * seconds[1]
     claims = [
@@ -172,15 +171,7 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
         Claim("PCA + SAPSO takes less time than SAPSO", "table 2", label, faster, milliseconds),
         Claim("a track's error is about 4 degrees at most", "5.4", label, ours, degrees, paper.TRACK_DEGREES),
         Claim("a few joints make up high errors", "5.4", label, few, "% by 3 of 22", 50.0, above=True),
-        Claim(
-            "five components keep 95 % of the variance",
-            "2.1",
-            label,
-            explained,
-            "%",
-            100.0 * paper.EXPLAINED_VARIANCE,
-            True,
-        ),
+        Claim("five components keep 95 % of the variance", "2.1", label, explained, "%", wanted, above=True),
     ]
     for name, form in ((OURS, ""), (LETTER, ", the letter")):
         history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)

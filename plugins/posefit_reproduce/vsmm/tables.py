@@ -48,12 +48,6 @@ CHIEF = ("elbow_detected", "hand_detected", "mpjpe", "model", "group", "delay", 
 SWITCHING = {"group", "delay", "delay_change", "activations", "wrong_activations", "wrong_terminations"}
 
 
-def projected_cm(film: Film, truth: Array, estimate: Array) -> Array:
-    """Return how far estimated joints are from the true ones in the image, in centimetres at the true one's depth."""
-    (pixels, depths), (others, _) = film.camera.project(truth), film.camera.project(estimate)
-    return np.asarray(100.0 * np.linalg.norm((pixels - others) / film.camera.focal, axis=-1) * depths)
-
-
 def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
     """Return the errors in cm of right elbow and hand (T, 2): to the detected joints, to the truth, and in space.
 
@@ -62,10 +56,16 @@ def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
     skeleton, chosen = film.body.skeleton, [ELBOW, HAND]
     truth = skeleton.joints(film.truth.poses, film.truth.translations)[:, chosen]
     estimate = skeleton.joints(arrays["poses"], arrays["translations"])[:, chosen]
-    errors = {"": projected_cm(film, truth, estimate), "_space": 100.0 * np.linalg.norm(truth - estimate, axis=-1)}
-    pixels, depths = film.camera.project(estimate)
-    away = (pixels - arrays["joints"][:, 0, POINTS]) / film.camera.focal
-    return errors | {"_detected": 100.0 * np.linalg.norm(away, axis=-1) * depths}
+    (true_pixels, true_depths), (pixels, depths) = film.camera.project(truth), film.camera.project(estimate)
+
+    def in_cm(off_pixels: Array, depths: Array) -> Array:
+        return np.asarray(100.0 * np.linalg.norm(off_pixels / film.camera.focal, axis=-1) * depths)
+
+    return {
+        "": in_cm(true_pixels - pixels, true_depths),
+        "_space": 100.0 * np.linalg.norm(truth - estimate, axis=-1),
+        "_detected": in_cm(pixels - arrays["joints"][:, 0, POINTS], depths),
+    }
 
 
 def film_figures(seed: int, arrays: Arrays) -> dict[str, float]:

@@ -3,9 +3,8 @@
 | looking for | file |
 |---|---|
 | the document and its colours | this file |
-| the data of the page | content.py |
+| the data of the page, and joints and angles as the scripts read them | content.py |
 | small pictures of footage and masks, as many as there is room for | stills.py |
-| cameras, joints and angles as the scripts read them | bodies.py |
 | the places of everything, empty; how it looks | track.html, track.css |
 | bodies of tapered cones on a canvas, seen by any camera; a view that can be turned | body.js |
 | a clock that plays frames; mouse, touch and keys that turn a view | play.js |
@@ -20,9 +19,6 @@ from typing import Any
 
 from posefit.output.drawing import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
 from posefit.page.document import assembled, colour_style, one_script, part
-
-LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}
-BODY_DARK = {"left": hexadecimal(LEFT), "right": hexadecimal(RIGHT), "truth": "#98a5b3"}
 
 LIGHT = {
     "left": "#b84500",
@@ -56,9 +52,4 @@ _MARK = "<!doctype html>\n<!-- a track of posefit -->\n"
 def track_document(data: dict[str, Any]) -> str:
     """Return the page that shows the data of a track."""
     style = colour_style(LIGHT, DARK) + part(__package__, "track.css")
-    return assembled(_MARK, part(__package__, "track.html"), style, data, script())
-
-
-def script() -> str:
-    """Return the page's script."""
-    return one_script(__package__, SCRIPTS)
+    return assembled(_MARK, part(__package__, "track.html"), style, data, one_script(__package__, SCRIPTS))

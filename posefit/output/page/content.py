@@ -1,5 +1,6 @@
 """The data of a track's page: bodies, figures, intervals, and words."""
 
+import base64
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,6 +12,7 @@ from posefit.arrays import Array
 from posefit.evaluation.errors import FRAME, LOST, Table
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
+from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import unwrapped, wrapped
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.measuring.angles import COLUMNS, clinical_angles
@@ -18,7 +20,6 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import stride_curves
 from posefit.motion.motion import Motion
 from posefit.output.content import Content
-from posefit.output.page.bodies import camera_from_origin, in_16_bits
 from posefit.output.page.stills import Stills
 from posefit.output.picture import MIN_OTHER_WEIGHT
 from posefit.output.text import brief, gait_line, gait_rows, held_frames, undetermined
@@ -27,6 +28,7 @@ from posefit.version import __version__
 
 TENTH = 0.1  # degrees: the unit of angles in a page
 UNIT = np.radians(TENTH)
+MAX_16_BITS = 32_767
 COLUMN = ("label", "unit", "digits", "factor")  # of a figure, as the page has it
 CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "wall_seconds")
 MARKS: dict[str, Callable[[Table], NDArray[np.bool_]]] = {
@@ -159,3 +161,24 @@ def _clinical(motion: Motion, step: int) -> Array:
     """Return the clinical angles (T, n) in degrees of every `step`-th frame."""
     angles = clinical_angles(motion.skeleton, motion.poses)
     return np.column_stack([angles[name] for name in COLUMNS])[::step]
+
+
+def in_16_bits(values: Array, unit: float = 1e-3) -> str:
+    """Return numbers in 16 bits each, little-endian in base 64, as multiples of a unit: a millimetre, if in metres.
+
+    Larger values are clipped to 32,767 units; NaN is -32,768.
+    """
+    units = np.clip(np.round(np.asarray(values, dtype=np.float64) / unit), -MAX_16_BITS, MAX_16_BITS)
+    whole = np.where(np.isnan(units), -MAX_16_BITS - 1, units).astype("<i2")
+    return base64.b64encode(whole.tobytes()).decode()
+
+
+def camera_from_origin(camera: Camera, origin: Array) -> dict[str, Any]:
+    """Return a camera for points in metres from the origin."""
+    return {
+        "size": [camera.width, camera.height],
+        "focal": np.round(camera.focal, 3).tolist(),
+        "centre": np.round(camera.centre, 3).tolist(),
+        "rotation": np.round(camera.rotation, 6).tolist(),
+        "translation": np.round(camera.translation + camera.rotation @ origin, 6).tolist(),
+    }
