@@ -74,6 +74,29 @@ def legs_exchanged(scene: Scene, actor: Motion, seen: NDArray[np.bool_]) -> floa
     return float(np.mean(exchanged)) if exchanged else None
 
 
+def other_person(scene: Scene, masks: NDArray[np.bool_]) -> float | None:
+    """Return the share of the usable pictures that show more of another actor than of the first; None for one actor.
+
+    `masks` (actors, views, T, height, width) are the true ones.
+    """
+    if len(masks) == 1:
+        return None
+    others = list[bool]()
+    for k, observation in enumerate(scene.observations):
+        for view, silhouette in enumerate(observation.silhouettes):
+            first, *rest = (int((silhouette.mask & actor[view, k]).sum()) for actor in masks)
+            if observation.usable and silhouette.mask.any():
+                others.append(max(rest) > first)
+    return float(np.mean(others))
+
+
+def entered(masks: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the column and row about which an actor (T, height, width) is seen first."""
+    first = int(masks.any(axis=(1, 2)).argmax())
+    row, column = np.argwhere(masks[first]).mean(axis=0)
+    return float(column), float(row)
+
+
 Row = Mapping[str, Any]
 
 # What a table shows of a row: its head, digits, and what a value is multiplied by.
@@ -83,6 +106,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "swapped": ("swapped %", 0, 100.0),
     "said_unknown": ("unknown %", 0, 100.0),
     "known_wrong": ("known and wrong %", 0, 100.0),
+    "other_person": ("on another person %", 0, 100.0),
     "legs_exchanged": ("landmarks exchange the legs %", 0, 100.0),
     **{name: (f"{name.replace('_', ' ')} off, degrees", 1, 1.0) for name in SAGITTAL},
 }
@@ -112,15 +136,17 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
                 camera=scene.cameras,
                 extraction=None if shot.extraction == DEFAULT else Extraction(shot.extraction),
                 height=scene.actors[0].body.stature,
+                # who gives a height knows whose it is
+                person=entered(masks[0, 0]) if len(masks) > 1 else None,
                 train=[recorded.leaving_out(recorded.LIBRARY, scene.people)],
                 progress=QUIET,
             )
         except ValueError as error:
             return row | {"refused": str(error).replace(f"{folder}/", "")}
         assert result.trust is not None
-        exchanged = legs_exchanged(result.scene, scene.actors[0].motion, uncut(masks))
-        row |= track_figures(result, scene, masks) | {"legs_exchanged": exchanged}
-        return row | {"trust": result.trust.grade}
+        exchanged = legs_exchanged(result.scene, scene.actors[0].motion, uncut(masks[0]))
+        row |= track_figures(result, scene, masks[0]) | {"other_person": other_person(result.scene, masks)}
+        return row | {"legs_exchanged": exchanged, "trust": result.trust.grade}
 
 
 def composites_lines(rows: Sequence[Row]) -> Iterator[str]:

@@ -541,29 +541,28 @@ def _lasting(actor: Actor, count: int) -> Actor:
 def film(
     situation: Situation, plates: Sequence[Plate], seed: int, folder: Path
 ) -> tuple[list[Path], NDArray[np.bool_]]:
-    """Return the videos that are written to a folder, one a camera, and what is seen of the first actor.
+    """Return the videos that are written to a folder, one a camera, and what is seen of each actor.
 
-    That is a mask for each frame and camera, (views, T, height, width).
-
-    `plates` are the empty pictures of each camera.
+    That is a mask for each camera and frame, (actors, views, T, height, width). `plates` are the empty pictures of each
+    camera.
     """
     rng = np.random.default_rng([seed, 4])
     videos, masks = [], []
     fps = situation.actors[0].motion.fps
     for number, (camera, behind) in enumerate(zip(situation.cameras, plates, strict=True)):
         path = folder / f"camera-{number + 1}.mp4"
-        seen: list[Mask] = []
+        seen: list[list[Mask]] = []
         with VideoWriter(path, fps, (camera.width, camera.height)) as writer:
-            for k, (people, mask) in enumerate(_frames(situation, camera, behind)):
+            for k, (people, shown) in enumerate(_frames(situation, camera, behind)):
                 writer.write(sensed(composited(behind.frame(k), camera, people), k, rng))
-                seen.append(mask)
+                seen.append(shown)
         videos.append(path)
-        masks.append(np.stack(seen))
-    return videos, np.stack(masks)
+        masks.append(np.stack(seen, axis=1))
+    return videos, np.stack(masks, axis=1)
 
 
-def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tuple[list[Posed], Mask]]:
-    """Yield who is there in each frame, and what is seen of the first actor."""
+def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tuple[list[Posed], list[Mask]]]:
+    """Yield who is there in each frame, and what is seen of each actor."""
     clothes = [outfit(actor.outfit, behind.still.astype(np.uint8)) for actor in situation.actors]
     for k in range(len(situation)):
         people = [
@@ -571,6 +570,5 @@ def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tup
             for actor, worn in zip(situation.actors, clothes, strict=True)
             if actor.present[k]
         ]
-        masks = true_masks(camera, people)
-        there = bool(situation.actors[0].present[k])
-        yield people, masks[0] if there else np.zeros((camera.height, camera.width), dtype=bool)
+        seen, nothing = iter(true_masks(camera, people)), np.zeros((camera.height, camera.width), dtype=bool)
+        yield people, [next(seen) if actor.present[k] else nothing for actor in situation.actors]

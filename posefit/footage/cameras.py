@@ -13,7 +13,8 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.images import IMAGES
 from posefit.footage.masks import ARRAYS, PackedMasks, Views, undistorted
-from posefit.footage.quality import apparent_sizes, disagreement, extent_of, meeting
+from posefit.footage.people import Persons, part_at, paste
+from posefit.footage.quality import apparent_size, apparent_sizes, disagreement, extent_of, meeting
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, guessed_up, read_calibrations, upright
@@ -123,6 +124,47 @@ def _straight(world: Array, metres: float, known: Camera | Calibration, view: Ca
     if (known.width, known.height) != size:
         raise _of_another_size("", size, (known.width, known.height))
     return known, view
+
+
+def same_person(
+    known: Sequence[Camera | Calibration], first: CameraView, size: tuple[int, int], persons: Persons
+) -> int:
+    """Return the number of the person in another view who is followed in the first one.
+
+    It is the one whose rays meet those of the first view in a person who keeps one height, in both views and all
+    frames: rays of level cameras meet anyhow. `known` are the cameras of both, and `persons` are the people in the
+    other's masks, which have a `size`.
+    """
+    sizes, blank = (first.masks.size, size), np.zeros(size[::-1], dtype=bool)
+    fitted = [
+        camera if first.filmed or isinstance(camera, Camera) else _fitting(camera, pixels, scaled=True)
+        for camera, pixels in zip(known, sizes, strict=True)
+    ]
+    cameras = [
+        camera if isinstance(camera, Camera) else camera.camera(pixels, np.eye(3))
+        for camera, pixels in zip(fitted, sizes, strict=True)
+    ]
+    differences = list[float]()
+    for person in persons:
+        seen = list[tuple[float, Array]]()
+        for k in np.flatnonzero(first.masks.usable).tolist():
+            part = part_at(person, k)
+            if part is not None and part.detections[k][1] is None:
+                paste(part.detections[k][0], mask := blank.copy())
+                pair = first.masks.silhouette(k), Silhouette.of(mask)
+                seen.append(apparent_size(cameras, [*map(_extent, fitted, pair)]))
+        heights = np.array([np.maximum(tall, 1e-9) for _, tall in seen])
+        misses = [miss / float(np.median(heights)) for miss, _ in seen]
+        differences.append(float(np.median(misses) + np.std(np.log(heights))) if seen else np.inf)
+    return 1 + int(np.argmin(differences))
+
+
+def _extent(known: Camera | Calibration, silhouette: Silhouette) -> tuple[Array, float]:
+    """Return the middle (2,) of a silhouette as a pinhole camera has it, and its height in pixels."""
+    (middle, tall), (height, width) = extent_of(silhouette), silhouette.mask.shape
+    if not isinstance(known, Camera):
+        middle = known.straightened(np.array([*middle, 0.0]), (width, height))[:2]
+    return middle, tall
 
 
 def world_of(

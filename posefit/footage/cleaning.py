@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import PackedMasks, empty_planes
-from posefit.footage.people import Choice, People, planes_of
+from posefit.footage.people import Choice, Chooser, People, planes_of
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import MAX_HOLE_AREA, MIN_PIECE_AREA, PIECE_REACH, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
@@ -23,7 +23,7 @@ CUT_SHOWN = 0.5  # of the person's area: where the picture's edge leaves less of
 
 
 def cleaned(
-    masks: PackedMasks, name: object, holes: float | None = None, choice: Choice | None = None
+    masks: PackedMasks, name: object, holes: float | None = None, choice: Choice | Chooser | None = None
 ) -> tuple[PackedMasks, list[str]]:
     """Return the masks of one person, and warnings, in the memory of `masks`, which are overwritten.
 

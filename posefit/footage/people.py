@@ -4,7 +4,7 @@ A person goes on from frame to frame as they went, and keeps about their size an
 shows several: what lies where one of them alone is expected is theirs, and the rest of it is unknown.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import cv2
@@ -22,14 +22,17 @@ MEMORY = 0.8  # of the last step, size and colours that is kept with each frame
 COVERED = 0.3  # of where a person is expected: a blob that covers so much shows them, too
 SLACK = 0.04  # of the height: so far around where they are expected people may be
 LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
+CLEARER = 2.0  # times as many pixels of a person as of any other show whose a mask is
 MIN_DETECTIONS = 8  # frames of a person alone; what shows in fewer may be noise
 MIN_SCORE = 0.1  # of the best person's: less is noise
 COLOUR = 1.0  # what 100 grey levels of another colour count, in heights
 AREA = 0.5  # what an area e times as large counts, in heights
 
 Cut = tuple[tuple[slice, slice], NDArray[np.uint8]]  # a box of a mask, and its bits
-# a person by their number, 1 the longest visible, or by a point of where they are visible first
+# a person by their number, 1 the longest visible, or by a point of where they are when they come
 Choice = int | tuple[float, float]
+Persons = list[list["Tracklet"]]  # the parts of each person
+Chooser = Callable[[Persons], int]  # returns the number of one of several
 
 
 def cut_out(mask: Mask) -> Cut:
@@ -163,20 +166,20 @@ class People:
         self.active = active
         return present
 
-    def persons(self) -> list[list[Tracklet]]:
+    def persons(self) -> Persons:
         """Return the people, the longest and steadiest first: those parts of each that follow each other in time."""
-        persons: list[list[Tracklet]] = []
+        persons, least = Persons(), 0.5 * (self._frame + 1)
         for tracklet in sorted(self.tracklets, key=lambda tracklet: tracklet.score, reverse=True):
             apart = [
                 person
                 for person in persons
                 if not any(tracklet.detections.keys() & part.detections.keys() for part in person)
             ]
-            if apart:
+            if apart and tracklet.confirmed(least):
                 min(apart, key=lambda person: min(_distance(tracklet, part) for part in person)).append(tracklet)
             else:
                 persons.append([tracklet])
-        scores, least = [sum(part.score for part in person) for person in persons], 0.5 * (self._frame + 1)
+        scores = [sum(part.score for part in person) for person in persons]
         confirmed = [
             k
             for k, person in enumerate(persons)
@@ -191,7 +194,7 @@ class People:
         return [part for person in self.persons() for part in person if part not in parts]
 
     def chosen(
-        self, choice: Choice | None, name: Callable[[int], str], scale: float = 1.0
+        self, choice: Choice | Chooser | None, name: Callable[[int], str], scale: float = 1.0
     ) -> tuple[list[Tracklet], str]:
         """Return the parts of the person who is followed, and what there is to say where there are several.
 
@@ -201,10 +204,14 @@ class People:
         persons = self.persons()
         if not persons:
             return [], ""
-        where = [min(part.first for part in person) for person in persons]
-        number = 1 if choice is None else choice
-        if not isinstance(number, int):
-            away = [np.hypot(scale * across - number[0], scale * down - number[1]) for _, across, down in where]
+        where = [person[0].first for person in persons]  # of the part that shows them best: the others may be noise
+        number, other = 1, "--person N another"
+        if callable(choice):
+            number, other = choice(persons), "as by the first camera"
+        elif isinstance(choice, int):
+            number = choice
+        elif choice is not None:
+            away = [np.hypot(scale * across - choice[0], scale * down - choice[1]) for _, across, down in where]
             number = 1 + int(np.argmin(away))
         if not 1 <= number <= len(persons):
             raise InputError(f"person must be 1 to {len(persons)}, as many people as there are, got {number}")
@@ -212,7 +219,7 @@ class People:
             return persons[0], ""
         spots = [f"{scale * across:.0f},{scale * down:.0f} in {name(frame)}" for frame, across, down in where]
         listed = "; ".join(f"{k} at {spot}" for k, spot in enumerate(spots, 1))
-        words = f"{len(persons)} people, first visible: {listed}; person {number} is followed, --person N another"
+        words = f"{len(persons)} people: {listed}; person {number} is followed, {other}"
         return persons[number - 1], words
 
 
@@ -252,6 +259,52 @@ def part_at(parts: Sequence[Tracklet], frame: int) -> Tracklet | None:
     """Return the part of a person that a frame shows; of several, which are noise, that of the largest box."""
     shown = [part for part in parts if frame in part.detections]
     return max(shown, key=lambda part: part.detections[frame][0][1].size, default=None)
+
+
+def rows_of(
+    parts: Sequence[Tracklet], blanks: Sequence[dict[str, Any]]
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the rows of a person in all frames, and in those that do not show others before or behind them.
+
+    `blanks` are the rows of frames that do not show the person.
+    """
+    rows, apart = list[dict[str, Any]](), list[dict[str, Any]]()
+    for k, blank in enumerate(blanks):
+        part = part_at(parts, k)
+        rows.append(blank if part is None else part.rows[k])
+        if part is None or part.detections[k][1] is None:
+            apart.append(rows[-1])
+    return rows, apart
+
+
+def shown_persons(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
+    """Return which of some people the mask of each frame shows, by index: where nobody, whom the mask before shows.
+
+    None where a mask is empty, or shows more than half as much of another.
+    """
+    result, latest = list[int | None](), None
+    for k, mask in enumerate(masks):
+        shown = [part_at(parts, k) for parts in persons]
+        shares = [0 if part is None else _common(part.detections[k][0], mask) for part in shown]
+        *_, second, most = sorted(shares)
+        clear = mask.any() and most >= CLEARER * second
+        latest = shares.index(most) if clear and most else latest
+        result.append(latest if clear else None)
+    return result
+
+
+def _common(cut: Cut, mask: Mask) -> int:
+    """Return how many pixels a mask has in common with one that has been cut out."""
+    box, bits = cut
+    part = mask[box]
+    return int((part & np.unpackbits(bits, count=part.size).reshape(part.shape).view(np.bool_)).sum())
+
+
+def replace_detection(parts: Sequence[Tracklet], frame: int, mask: Mask, row: dict[str, Any]) -> None:
+    """Give a person another mask, and its row of `FrameQuality`, in a frame."""
+    part = part_at(parts, frame) or parts[0]
+    _, hidden = part.detections.get(frame, (None, None))
+    part.detections[frame], part.rows[frame] = (cut_out(mask), hidden), row
 
 
 def planes_of(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, known: Mask) -> tuple[Mask, Mask]:

@@ -245,12 +245,24 @@ def apparent_sizes(views: Views, cameras: Sequence[Camera]) -> tuple[float, Arra
     misses, heights = [], []
     for k in np.unique(np.linspace(0, len(usable) - 1, CAMERA_FRAMES).astype(int)):
         extents = [extent_of(silhouette) for silhouette in views[usable[k]].silhouettes]
-        place, away = meeting(cameras, [middle for middle, _ in extents])
-        depths = [float((camera.rotation @ place + camera.translation)[2]) for camera in cameras]
-        misses.append(2.0 * away.max())
-        per_view = zip(cameras, extents, depths, strict=True)
-        heights.append([tall * depth / camera.focal[1] for camera, (_, tall), depth in per_view])
+        miss, tall = apparent_size(cameras, extents)
+        misses.append(miss)
+        heights.append(tall)
     return float(np.median(misses)), np.asarray(np.median(heights, axis=0))
+
+
+def apparent_size(cameras: Sequence[Camera], extents: Sequence[tuple[Array, float]]) -> tuple[float, Array]:
+    """Return by how much the rays of cameras to a person miss each other, and how tall the person is in each view.
+
+    `extents` are the middle (2,) and the height of the person in each picture. What lies behind a camera has a height
+    below 0.
+    """
+    place, away = meeting(cameras, [middle for middle, _ in extents])
+    per_view = zip(cameras, extents, strict=True)
+    heights = [
+        tall * (camera.rotation @ place + camera.translation)[2] / camera.focal[1] for camera, (_, tall) in per_view
+    ]
+    return 2.0 * float(away.max()), np.array(heights)
 
 
 def disagreement(miss: float, tall: Array, stature: float) -> str | None:

@@ -18,7 +18,16 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span, unpacked
-from posefit.footage.people import Choice, People, Tracklet, part_at, planes_of
+from posefit.footage.people import (
+    Choice,
+    Chooser,
+    People,
+    Tracklet,
+    planes_of,
+    replace_detection,
+    rows_of,
+    shown_persons,
+)
 from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
@@ -239,24 +248,30 @@ class _Scan(NamedTuple):
     facings: list[float]
     landmarks: Array  # (T, 27, 3)
     camera_moves: bool
+    choice: Choice | Chooser | None  # who is followed, as `People.chosen`
 
 
 class Segmentation:
     """A pass through a video. Raises InputError where the extraction or the frames do not fit it."""
 
-    def __init__(self, video: Video, how: Extraction, frames: Range) -> None:
+    def __init__(self, video: Video, how: Extraction, frames: Range, among: Extraction | None = None) -> None:
+        """Where `how` shows one person only, `among` tells which of several it is."""
         self.start, self.stop = span(frames, video.count())
         self.video, self.how, self._segmenter = video, how, PersonSegmenter(video, how)
         self.size = self._segmenter.size
+        self._among = None if among is None else Segmentation(video, among, frames)
 
-    def read(self, progress: Progress | None = None) -> Segmented:
+    def read(self, progress: Progress | None = None, choose: Chooser | None = None) -> Segmented:
         """Return the masks of the video, which is decoded once, after the background was learned.
 
+        Of several people `choose` returns the number of the one who is followed, where the extraction names none.
         Raises InputError where no frame shows a person.
         """
         video, scan = self.video, self._scan(progress)
+        if self._among is not None:
+            scan = self._among.told_apart(scan, progress)
         count, learned = len(scan.blanks), self._segmenter.learned
-        several, rows = self._follow_person(scan)
+        several, rows, apart = self._follow_person(scan if choose is None else scan._replace(choice=choose))
         missing, damage = max(0, video.claimed - video.count()), ""
         if missing:
             damage = f"the file says that it has {missing} frames more than can be read: it seems to be damaged"
@@ -264,7 +279,7 @@ class Segmentation:
             none = "expected a person who moves before a still background, got none in any frame"
             reason = f"; {damage}" if damage else advice(self.how.name, learned=learned)
             raise InputError(f"{video.path}: {none}{reason}")
-        doubt = verdict(rows, self.how.name, learned=learned)
+        doubt = verdict(apart, self.how.name, learned=learned)
         warnings = [
             doubt and doubt.text,
             damage if missing > MISSING * count else "",
@@ -318,27 +333,44 @@ class Segmentation:
             blanks.append(self._row(blank_quality, image, empty, k))
             largest.append(self._row(largest_quality, image, blobs[0], k))
         count = len(blanks)  # the file may break off
-        return _Scan(masks[:count], valid[:count], people, largest, blanks, facings, np.array(landmarks), camera.moves)
+        shown = masks[:count], valid[:count], people, largest, blanks, facings, np.array(landmarks)
+        return _Scan(*shown, camera.moves, self.how.person)
 
-    def _follow_person(self, scan: _Scan) -> tuple[str, list[dict[str, Any]]]:
-        """Return what there is to say of several people, and the rows of the one who is followed.
+    def told_apart(self, alone: _Scan, progress: Progress | None) -> _Scan:
+        """Return a scan that shows one person only where this one shows who of several that is, and the others.
+
+        Nothing changes where this one shows one person only, or shows all of them badly. Who is in most frames of the
+        other is followed, unless a person is chosen; where it shows somebody else, this one shows them.
+        """
+        scan = self._scan(progress)
+        persons, learned = scan.people.persons(), self._segmenter.learned
+        doubted = [verdict(rows_of(person, scan.blanks)[1], self.how.name, learned=learned) for person in persons]
+        if len(persons) < 2 or scan.camera_moves or all(doubted) or not alone.masks.any():
+            return alone
+        numbers = shown_persons(persons, (unpacked(plane, self.size) for plane in alone.masks))
+        most = max(range(len(persons)), key=numbers.count)
+        parts, _ = scan.people.chosen(self.how.person or 1 + most, str, 1.0 / self._segmenter.scale)
+        landmarks, facings = np.zeros_like(alone.landmarks), [math.nan] * len(numbers)
+        for k, number in enumerate(numbers):
+            if number is not None and persons[number] == parts:
+                replace_detection(parts, k, unpacked(alone.masks[k], self.size), alone.largest[k])
+                scan.valid[k], landmarks[k], facings[k] = alone.valid[k], alone.landmarks[k], alone.facings[k]
+        return scan._replace(landmarks=landmarks, facings=facings, choice=self.how.person or 1 + most)
+
+    def _follow_person(self, scan: _Scan) -> tuple[str, list[dict[str, Any]], list[dict[str, Any]]]:
+        """Return what there is to say of several people, and the rows of the one who is followed, as `rows_of`.
 
         Of several, the scan's masks become those of this one, and the pixels of the others are unknown.
         """
         scale = 1.0 / self._segmenter.scale
-        parts, several = scan.people.chosen(self.how.person, lambda k: f"frame {self.start + k}", scale)
+        parts, several = scan.people.chosen(scan.choice, lambda k: f"frame {self.start + k}", scale)
         if not several:
-            return several, scan.largest
+            return several, scan.largest, scan.largest
         others = scan.people.others(parts)
         for k in range(len(scan.blanks)):
             planes = planes_of(parts, others, k, unpacked(scan.valid[k], self.size))
             scan.masks[k], scan.valid[k] = (np.packbits(plane) for plane in planes)
-        shown = [part_at(parts, k) for k in range(len(scan.blanks))]
-        rows = [
-            blank if part is None else part.rows[k]
-            for k, (part, blank) in enumerate(zip(shown, scan.blanks, strict=True))
-        ]
-        return several, rows
+        return several, *rows_of(parts, scan.blanks)
 
     def _row(self, quality: FrameQuality, image: Image, person: Person, k: int) -> dict[str, Any]:
         row = self._segmenter.row(quality, image, person, self.start + k)

@@ -11,7 +11,7 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.files import opencv_name
-from posefit.footage.cameras import CameraView, calibrated, combined, listed, world_of
+from posefit.footage.cameras import CameraView, calibrated, combined, listed, same_person, world_of
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.masks import ARRAYS, Range
@@ -95,8 +95,6 @@ def scene_of(
     if len(kinds) > 1:
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     (kind,) = kinds
-    if person is not None and len(sources) > 1:
-        raise InputError(f"person must be given for one camera only, got {len(sources)}")
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
@@ -119,12 +117,17 @@ def scene_of(
         if len(rates) > 1:
             raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
         known = calibrated(camera, [video.size for video in videos])
-        result = _filmed(videos, replace(extraction or Extraction(), person=person), frames, progress, scene)
+        how = replace(extraction or Extraction(), person=person)
+        result = _filmed(videos, known, how, frames, progress, scene)
     else:
         known = calibrated(camera, [None] * len(sources))
         places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
-        masks = [cleaned(read_masks(place, frames, label), name_of(place), holes, person) for place in places]
-        result = scene([CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)])
+        views = list[CameraView]()
+        for place in places:
+            masks = read_masks(place, frames, label)
+            choice = partial(same_person, [known[0], known[len(views)]], views[0], masks.size) if views else person
+            views.append(CameraView(*cleaned(masks, name_of(place), holes, choice), name=name_of(place)))
+        result = scene(views)
     result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
     return logged(result, progress)
 
@@ -169,6 +172,7 @@ def body_of(
 
 def _filmed(
     videos: Sequence[Video],
+    known: Sequence[Camera | Calibration],
     how: Extraction,
     frames: Range,
     progress: Progress,
@@ -180,7 +184,9 @@ def _filmed(
     """
     tried = list[tuple[str, Scene | None, Verdict | None]]()
     for way in how.ways(len(videos)):
-        tried.append((way.name, *_taken_out(videos, way, frames, progress, scene)))
+        among = how if len(videos) == 1 and way is not how else None
+        parts = [Segmentation(video, way, frames, among) for video in videos]  # all are checked before any is read
+        tried.append((way.name, *_taken_out(parts, known, progress, scene)))
         if tried[-1][2] is None:
             break
     name, result, doubt = min(tried, key=lambda way: 0 if way[2] is None else 1 + way[2].refused)
@@ -195,19 +201,18 @@ def _filmed(
 
 
 def _taken_out(
-    videos: Sequence[Video],
-    how: Extraction,
-    frames: Range,
+    parts: Sequence[Segmentation],
+    known: Sequence[Camera | Calibration],
     progress: Progress,
     scene: Callable[[Sequence[CameraView]], Scene],
 ) -> tuple[Scene | None, Verdict | None]:
     """Return the scene of what videos show, and the worst that is wrong with their masks; no scene of refused ones."""
     views, worst = list[CameraView](), None
-    segmentations = [Segmentation(video, how, frames) for video in videos]  # all are checked before any is read
     try:
-        for part in segmentations:
-            progress.log(f"taking the person out of {part.video.path} by {how.name}")
-            masks, _, doubt, warnings, facings, moves = part.read(progress.steps)
+        for part in parts:
+            progress.log(f"taking the person out of {part.video.path} by {part.how.name}")
+            choose = partial(same_person, [known[0], known[len(views)]], views[0], part.size) if views else None
+            masks, _, doubt, warnings, facings, moves = part.read(progress.steps, choose)
             if doubt is not None and doubt.refused:
                 return None, doubt
             worst = worst or doubt

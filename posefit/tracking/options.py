@@ -232,8 +232,7 @@ class TrackOptions:
     )
     person: "Choice | None" = option(
         None,
-        "Of several people: the number that the warning gives them, 1 the longest visible, or X,Y where they are first "
-        "visible.",
+        "Of several people: the number that the warning gives them, 1 the longest visible, or the X,Y there.",
         _person,
         "N|X,Y",
         parse=text_person,

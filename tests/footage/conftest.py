@@ -1,7 +1,8 @@
 """A synthetic video of a walk, whose masks are known."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -49,15 +50,15 @@ def truth(azimuth: float = np.pi / 2) -> list[Any]:
     return [project(body, camera(azimuth), pose, place) for pose, place in placed]
 
 
-def film(path: Path, masks: list[Any]) -> Path:
-    """Write a video of a person before a still, noisy background."""
+def film(path: Path, masks: list[Any], others: Iterable[Any] = ()) -> Path:
+    """Write a video of a person, and of another in other clothes, before a still, noisy background."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
     rng = np.random.default_rng(0)
     background = cv2.GaussianBlur(rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0)
     background = (background - background.mean()) * 4.0 + 150.0
-    for mask in masks:
+    for mask, other in zip_longest(masks, others, fillvalue=NOBODY):
         image = background + rng.normal(0.0, 2.0, background.shape)
-        image[mask] = (40.0, 30.0, 120.0)
+        image[mask], image[other] = (40.0, 30.0, 120.0), (20.0, 90.0, 20.0)
         writer.write(np.clip(image, 0, 255).astype(np.uint8))
     writer.release()
     return path

@@ -1,17 +1,22 @@
 """Real cameras: the unit of their calibrations, which one of a file is meant, what is guessed where nothing is said."""
 
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import posefit
 from posefit.footage.cameras import unit_of_heights
+from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.geometry.units import METRES, UNIT_NAMES
+from posefit.silhouette.cost import project
 from tests.cases import each
 from tests.commands import error_of, printed
-from tests.footage.conftest import camera, truth, walk
+from tests.footage.conftest import EMPTY, FRAMES, NOBODY, SIZE, camera, film, truth, walk
 from tests.footage.test_footage import toml
 
 AZIMUTHS = (np.pi / 2, 0.6)
@@ -72,6 +77,45 @@ def test_one_of_several_cameras_is_chosen_by_name(tmp_path: Path) -> None:
     assert "unit must be given for calibrations and files of motions only, got 'mm' for masks" in error_of(
         "track", source, "--unit", "mm"
     )
+
+
+@pytest.fixture(scope="module")
+def apart() -> tuple[list[Any], Any]:
+    """Return cameras, and of each what shows of two people who walk beside each other (cameras, people, T, h, w).
+
+    One camera sees the second person later, and the other the first.
+    """
+    cameras = [replace(camera(azimuth), focal=0.8 * camera(azimuth).focal) for azimuth in AZIMUTHS]
+    motion, shown = walk(), np.zeros((2, 2, FRAMES, *SIZE[::-1]), dtype=bool)
+    body = posefit.Body.of(motion.skeleton)
+    for view, person in product(range(2), range(2)):
+        for k in range(0 if view == person else 20, FRAMES):
+            aside = 0.45 - 0.9 * person
+            place = motion.translations[k] * [1.0, 1.0, 0.5] + [aside, 0.0, -aside]
+            shown[view, person, k] = project(body, cameras[view], motion.poses[k], place)
+    return cameras, shown
+
+
+@each(("kind", "person"), [("masks", None), ("masks", 1), ("masks", 2), ("video", None), ("video", 2)])
+def test_every_camera_follows_the_person_whom_the_first_one_follows(
+    apart: tuple[list[Any], Any], kind: str, person: int | None, tmp_path: Path
+) -> None:
+    cameras, shown = apart
+    sources = [tmp_path / f"{name}.{'npz' if kind == 'masks' else 'avi'}" for name in "ab"]
+    for source, people in zip(sources, shown, strict=True):
+        if kind == "masks":
+            np.savez(source, masks=people.any(axis=0).astype(np.uint8), fps=25.0)
+        else:
+            film(source, [NOBODY] * EMPTY + [*people[0]], [NOBODY] * EMPTY + [*people[1]])
+    path, how = toml(tmp_path / "two.toml", *cameras), Extraction(background=f"0:{EMPTY}")
+    view: dict[str, Any] = {"frames": (EMPTY, None), "extraction": how} if kind == "video" else {}
+    scene = scene_of(sources, camera=[path], up="y", height=1.74, person=person, **view)
+    followed = 0 if person is None else person - 1
+    for silhouette, people in zip(scene.observations[FRAMES - 5].silhouettes, shown, strict=True):
+        assert silhouette.mask.any()
+        assert (silhouette.mask & people[followed, FRAMES - 5]).sum() > 0.75 * silhouette.mask.sum()
+    assert any(f"person {followed + 1} is followed, --person N another" in warning for warning in scene.warnings)
+    assert any(f"person {2 - followed} is followed, as by the first camera" in warning for warning in scene.warnings)
 
 
 def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:

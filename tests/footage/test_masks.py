@@ -252,7 +252,7 @@ def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Pat
     for k in (*range(10), *range(20, 25)):
         np.testing.assert_array_equal(followed.silhouette(k).mask, blob(walker[k], tall=64), err_msg=str(k))
     places = "1 at 40,60 in a.npz[0]; 2 at 100,58 in a.npz[0]"
-    assert warning.endswith(f": 2 people, first visible: {places}; person 1 is followed, --person N another")
+    assert warning.endswith(f": 2 people: {places}; person 1 is followed, --person N another")
     first = followed.silhouette(0)
     assert not first.valid[blob(stander)].any()  # the other's pixels are unknown
     assert first.valid[~blob(stander)].all()

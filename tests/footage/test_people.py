@@ -1,7 +1,8 @@
 """Two people who cross: one is followed through, and the other is unknown, not background."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,14 @@ import numpy as np
 import posefit
 from posefit.footage.cleaning import people_in
 from posefit.footage.people import People, planes_of
+from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.video import Video
+from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from tests.cases import each
+from tests.footage.conftest import EMPTY, NOBODY, film, iou
 
 SIZE, FRAMES = (160, 120), 60
 WALKS = ("walk", "walk-a", "walk-b", "walk-c")
@@ -60,6 +65,35 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     wrong = [k for k, pair in enumerate(shares) if pair[1 - which] > pair[which]]
     assert len(wrong) <= 0.02 * FRAMES
     assert np.mean(shares, axis=0)[1 - which] < 0.05
+
+
+@each(("person", "followed"), [(None, 1), (1, 0), (2, 1)])
+def test_a_segmenter_that_goes_over_to_another_person_is_used_where_it_shows_the_one(
+    tmp_path: Path, segmenter: Callable[..., None], person: int | None, followed: int
+) -> None:
+    pairs = [[NOBODY] * 2] * EMPTY + [shown for _, shown, _ in crossing(0)]
+    path, over = film(tmp_path / "two.avi", *zip(*pairs, strict=True)), EMPTY + 20
+
+    class GoesOver:
+        """Shows the first person, from a frame on the second."""
+
+        def __init__(self, film: object) -> None:
+            self.pairs, self.landmarks, self.facing = enumerate(pairs), np.ones((len(JOINTS), 3)), 0.5
+
+        def segment(self, image: Any) -> tuple[Any, Any]:
+            k, pair = next(self.pairs)
+            return pair[k >= over], NOBODY
+
+    segmenter("one", GoesOver, still_background=False)
+    alone, among = Extraction("one", person=person), Extraction(background=f"0:{EMPTY}", person=person)
+    masks = Segmentation(Video.of(path), alone, (None, None), among).read().masks
+    assert masks.landmarks is not None
+    shares = np.array([[iou(masks.silhouette(k).mask, each) for each in pair] for k, pair in enumerate(pairs)])
+    given, right = masks.landmarks[:, 0, 2] > 0.0, (np.arange(len(pairs)) >= over) == followed
+    assert (shares[:, followed] < shares[:, 1 - followed]).mean() <= 0.02
+    assert not given[~right].any()
+    assert given[right & (np.arange(len(pairs)) >= EMPTY)].mean() > 0.7  # but for the meeting
+    assert np.median(shares[given, followed]) > 0.9
 
 
 def test_parts_that_take_turns_are_no_time_apart() -> None:
