@@ -417,10 +417,7 @@ def test_a_setting_that_makes_no_sense_is_one_line() -> None:
     for text, message in [
         ("sapso", "a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
         ("sapso=3", "tracker.relocalise_gap, tracker.variant, got 'sapso'"),
-        (
-            "lens.phi=4.2",
-            "a setting must name one of annealed, pca, tracker, which are in use here, got 'lens.phi'",
-        ),
+        ("lens.phi=4.2", "a setting must name one of annealed, pca, tracker, which are in use here, got 'lens.phi'"),
         ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
         ("tracker.floor=0", "floor must be above 0, got 0"),
     ]:

@@ -195,11 +195,7 @@ def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> 
 def test_proportions_are_of_as_many_men_as_women(tmp_path: Path) -> None:
     heads = sorted({"stature", *(name.strip("-") for of in proportions.MEASURES.values() for name in of)})
     men_csv = tmp_path / "men.csv"
-    person = dict.fromkeys(heads, 100.0) | {
-        "stature": 2000.0,
-        "trochanterionheight": 1100.0,
-        "cervicaleheight": 1700.0,
-    }
+    person = dict.fromkeys(heads, 100.0) | {"stature": 2000.0, "trochanterionheight": 1100.0, "cervicaleheight": 1700.0}
     people = [person | {"lateralfemoralepicondyleheight": height} for height in (500.0, 600.0)]
     men_csv.write_text("\n".join([",".join(heads), *(",".join(str(row[name]) for name in heads) for row in people)]))
     logs = proportions.proportions(men_csv)

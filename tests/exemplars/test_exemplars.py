@@ -8,14 +8,7 @@ import pytest
 from posefit.geometry.skeleton import MIRROR
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit_exemplars.exemplars import (
-    MIN_FRAME_DISTANCE,
-    Exemplars,
-    Tiles,
-    about_vertical,
-    exemplars_of,
-    mirror_image,
-)
+from posefit_exemplars.exemplars import MIN_FRAME_DISTANCE, Exemplars, Tiles, about_vertical, exemplars_of, mirror_image
 from posefit_exemplars.kernels import DIMENSIONS, frames_apart, nearest_codes
 from tests.cases import each
 

@@ -7,16 +7,7 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.kernels import sine_cosine
 from posefit.geometry.rotation import rotation_from_joint_angles
-from posefit.geometry.skeleton import (
-    ANGLES,
-    BONES,
-    INNER,
-    JOINTS,
-    LIMBS,
-    Skeleton,
-    angle_index,
-    angles_of,
-)
+from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, LIMBS, Skeleton, angle_index, angles_of
 from posefit.motion.built_in import average_skeleton
 from tests.cases import each
 from tests.geometry.turns import about, chained

@@ -113,13 +113,7 @@ def test_a_borrowed_global_generator_is_put_back() -> None:
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
 
 
-LIBRARIES = {
-    "pycma": "cma",
-    "nevergrad": "nevergrad",
-    "pymoo": "pymoo",
-    "optuna": "optuna",
-    "mediapipe": "mediapipe",
-}
+LIBRARIES = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna", "mediapipe": "mediapipe"}
 
 
 def test_an_absent_library_is_named_with_the_extra_to_install() -> None:

@@ -46,15 +46,7 @@ def test_settings_have_a_name_a_type_and_a_default() -> None:
 def test_texts_become_what_their_types_ask_for() -> None:
     given = {"count": "7", "rate": "1", "kind": "b", "name": "7", "sharp": "True", "limit": "none", "reach": "3,4.5"}
     parsed = parse("it", factory, given)
-    assert parsed == {
-        "count": 7,
-        "rate": 1,
-        "kind": "b",
-        "name": "7",
-        "sharp": True,
-        "limit": None,
-        "reach": (3, 4.5),
-    }
+    assert parsed == {"count": 7, "rate": 1, "kind": "b", "name": "7", "sharp": True, "limit": None, "reach": (3, 4.5)}
     assert parse("it", factory, {"limit": "1e-3", "anything": "4"}) == {"limit": 1e-3, "anything": 4}
 
 

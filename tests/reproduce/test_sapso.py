@@ -37,16 +37,7 @@ FIGURES = {
     "figure-7-dimensions.png",
     "figure-9-frames.png",
 }
-TABLES = {
-    "motions",
-    "table-1",
-    "table-2",
-    "flaws",
-    "claims",
-    "views",
-    "parts",
-    "turn",
-}
+TABLES = {"motions", "table-1", "table-2", "flaws", "claims", "views", "parts", "turn"}
 
 
 def run(*words: object) -> Result:
