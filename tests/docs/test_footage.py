@@ -11,11 +11,9 @@ from click.testing import CliRunner
 
 import footage_figures
 from footage_figures import LABELS, SINGLE, TALL, TRACKED, filmed_scene, main, recording_of
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit import Body, Camera, Motion
 from posefit.motion import built_in
 from posefit.motion.asf import write_asf
-from posefit.motion.motion import Motion
 from posefit.output.drawing import draw_body
 from tests.cases import each
 

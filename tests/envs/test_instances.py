@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.geometry.camera import Camera
+from posefit import Camera, project
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.silhouette.cost import project
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
 from posefit_envs.instance import SPLITS, Episode, first_episode, instance, world_of

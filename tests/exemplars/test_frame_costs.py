@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit import Observation, Silhouette, facing, mirrored_poses, reflected_poses
 from posefit.fitting.contours import fitted, precisions
-from posefit.fitting.tracker import Observation
-from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.calibration import recalibrated, stored_calibration

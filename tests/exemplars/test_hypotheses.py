@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from posefit import Observation, exchanged_limbs, turned_poses
 from posefit.arrays import Array
-from posefit.fitting.tracker import Observation
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
-from posefit.geometry.symmetry import exchanged_limbs, turned_poses
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import MAX_PART_COST, PARTS, Hypotheses, jump_cost, step_costs

@@ -7,15 +7,11 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit import Body, Camera, Observation, Silhouette, Task, project
 from posefit.arrays import Array
 from posefit.fitting.start import modes_apart
-from posefit.fitting.tracker import Observation, Task
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
-from posefit.silhouette.mask import Silhouette
 from posefit_exemplars.lookup import YAW_STEP, Lookup, looking_at
 from tests.cases import each
 

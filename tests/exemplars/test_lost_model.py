@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit.fitting.tracker import Frame
-from posefit.geometry.symmetry import mirrored_poses
+from posefit import Frame, mirrored_poses
 from posefit.uncertainty.modes import Posterior, unknown_sides
 from posefit_exemplars.lost_model import (
     EVIDENCE,

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from cmaes import CMA
 
-from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.box import Start, displacement
 from posefit.fitting.cma import CMAES, Strategy
+from posefit.plugin import Array, Start, displacement
 from posefit.testing.toy import Toy, shell
 from tests.cases import each
 

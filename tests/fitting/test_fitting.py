@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
-from posefit.arrays import Array
-from posefit.fitting.box import displacement, draw_population
+from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise, project
 from posefit.fitting.optimiser import BudgetError
 from posefit.fitting.prior import Tilt
-from posefit.fitting.problem import align
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
+from posefit.plugin import Array, align, displacement, draw_population
 from posefit_priors.pca import PCA
 from tests.cases import each
 

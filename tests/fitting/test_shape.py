@@ -5,16 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from posefit import Camera, Frame, Observation, Silhouette, pose_costs, project
 from posefit.fitting import shape
 from posefit.fitting.problem import align
 from posefit.fitting.shape import COVARIANCE, GIRTHS, LENGTHS, NAMES, PULL, Shape, fit_shape, shaped
-from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body, varied
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
-from posefit.silhouette.cost import pose_costs, project
-from posefit.silhouette.mask import Silhouette
 
 AVERAGE = Body.of(built_in.average_skeleton())
 WALK = built_in.motion("walk", frames=40).frames(0, 40)

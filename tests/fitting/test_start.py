@@ -6,14 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 
 import posefit
-from posefit.fitting.box import Start, draw_population
-from posefit.fitting.problem import PoseProblem
-from posefit.fitting.space import SearchSpace
+from posefit import PoseProblem, SearchSpace
 from posefit.fitting.start import MODE_SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
+from posefit.plugin import Posterior, Start, draw_population
 from posefit.testing.toy import Toy
-from posefit.uncertainty.modes import Posterior
 
 WALK = built_in.motion("walk-a", frames=40)
 PRIOR = posefit.prior("pca")().fit(WALK.poses[:, 3:], WALK.skeleton)

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit import SearchSpace, Task
+from posefit import Body, Motion, SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.prior import Tilt
 from posefit.fitting.tracker import Observation, Prediction, Predictor, SynthesisTracker
-from posefit.geometry.body import Body
 from posefit.motion import built_in
-from posefit.motion.motion import Motion
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_priors.pca import PCA

@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from posefit import JOINTS, Motion
 from posefit.arrays import Array
 from posefit.geometry.rotation import shortest_turn
-from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.segments import bone_rotations
-from posefit.motion.motion import Motion
 from tests.geometry.turns import about
 
 BONES = {  # of each joint of a rig: after which of posefit's joints its bone starts, and which bone it turns as

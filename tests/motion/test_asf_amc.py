@@ -8,15 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posefit import Body, Motion
 from posefit.arrays import Array
-from posefit.geometry.body import Body
 from posefit.geometry.rotation import geodesic, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Skeleton, angle_index
 from posefit.geometry.units import CMU_UNIT
 from posefit.motion import recorded
 from posefit.motion.amc import read_amc, read_clip, write_amc
 from posefit.motion.asf import parse_asf, write_asf
-from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about, chained
 

@@ -6,19 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from posefit import Body, Motion, Task, clinical_angles
 from posefit.arrays import Array
-from posefit.fitting.tracker import Task
-from posefit.geometry.body import Body
 from posefit.geometry.rotation import rotation_from_joint_angles, wrapped
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, INNER, JOINTS, PARENTS, Skeleton
 from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit
-from posefit.measuring.angles import clinical_angles
 from posefit.motion import built_in, bvh, recorded
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import NAMES, read_bvh, write_bvh
 from posefit.motion.clips import load_motion, training_clips
-from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about
 from tests.motion.rigs import STYLES, Style, joint_after, places_of, write_rig

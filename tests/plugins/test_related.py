@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.geometry.body import Body
+from posefit import Body, Silhouette
 from posefit.plugin import Observation, check_optimiser, check_prior, check_tracker, contour_fit
 from posefit.registry import registry
-from posefit.silhouette.mask import Silhouette
 from posefit.testing.tracker_rules import scene
 from posefit_related.frames import costs_of, frame_of, place_of
 from tests.cases import each

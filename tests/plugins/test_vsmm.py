@@ -6,15 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit import Body, Camera, Frame, Observation, Silhouette, Task, project
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
-from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import joint_distances
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
-from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
 from posefit_vsmm import tracker
 from posefit_vsmm.groups import TOPOLOGY, most_probable

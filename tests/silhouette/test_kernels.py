@@ -8,15 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from posefit import Body, Camera, Silhouette
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.silhouette.cost import areas, drawing_of, mismatch, project
 from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.kernels import count_areas
-from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import FAR, NEAR
 from posefit.silhouette.sharing import parts_of, work_through
 from tests.cases import each

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit import Body, Camera, areas, project
 from posefit.geometry.skeleton import ANGLES
-from posefit.silhouette.cost import areas, project
 from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette, pack, unpack
 from tests.silhouette.twin import TIE, body_distance

@@ -8,14 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit.arrays import Array
-from posefit.fitting.box import draw_population
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
-from posefit.silhouette.cost import areas, project
-from posefit.silhouette.cuda.device import moved_to
+from posefit import Body, Camera, Silhouette, areas, moved_to, project
+from posefit.plugin import Array, draw_population
 from posefit.silhouette.drawn import PoseCount
-from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import pose_problem
 from tests.cases import each
 from tests.silhouette.twin import random_poses

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from posefit import Start
-from posefit.arrays import Array
-from posefit.fitting.weights import systematic_rows, weigh
+from posefit.plugin import Array, systematic_rows, weigh
 from posefit.testing.toy import Toy
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle

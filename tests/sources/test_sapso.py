@@ -9,19 +9,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import ks_2samp
 
-from posefit import SearchSpace, Silhouette, Start, minimise
-from posefit.arrays import Array
+from posefit import Body, Camera, SearchSpace, Silhouette, Start, areas, minimise, mismatch, project
 from posefit.fitting import metrics
-from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Components
 from posefit.fitting.tracker import Prediction, Predictor, SynthesisTracker
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import rotation_from_root_angles, yaw_first
 from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import built_in
+from posefit.plugin import Array, draw_population
 from posefit.settings import settings_of
-from posefit.silhouette.cost import areas, mismatch, project
 from posefit.testing.problem import pose_problem
 from posefit.testing.toy import Toy
 from posefit.testing.tracker_rules import scene

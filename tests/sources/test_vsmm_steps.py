@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from posefit import Body, Camera, Task
 from posefit.arrays import Array
-from posefit.fitting.tracker import Task
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit_vsmm.groups import TOPOLOGY, Topology
 from posefit_vsmm.imm import Belief, Measurement

@@ -10,14 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from posefit import Frame, SearchSpace, Task
-from posefit.arrays import Array
-from posefit.fitting.box import draw_population, sample_normal
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit import Body, Camera, Frame, SearchSpace, Task, project
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
-from posefit.uncertainty.modes import Posterior
+from posefit.plugin import Array, Posterior, draw_population, sample_normal
 from posefit_filters.annealed import Annealed
 from posefit_priors.pca import PCA
 
