@@ -1,7 +1,7 @@
 """Toyama and Blake 2001, Rabiner 1989, and Godsill et al. 2004: by hand, or against all ways through a small model."""
 
 from collections import Counter
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -70,11 +70,9 @@ def test_a_state_is_as_likely_as_all_ways_to_it_together() -> None:  # RABINER19
 def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do() -> None:  # RABINER1989 (backward)
     for seed in [0, 1, 2]:
         one = model(seed)
-        for first in range(len(SIZES)):
-            for count in range(first + 1, len(SIZES) + 1):
-                np.testing.assert_allclose(
-                    state_weights(one.frames[first:count]), shares(ways(one, count), first), rtol=1e-5
-                )
+        for first, count in combinations(range(len(SIZES) + 1), 2):
+            expected = shares(ways(one, count), first)
+            np.testing.assert_allclose(state_weights(one.frames[first:count]), expected, rtol=1e-5)
 
 
 def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (Viterbi)

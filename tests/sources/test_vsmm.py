@@ -83,10 +83,8 @@ def reference(belief: Belief, seen: Array, at_mixed: bool = False) -> Belief:
     for j in range(2):
         weights = TRANSITION[:, j] * mu / c[j]
         mean = sum(w * x for w, x in zip(weights, belief.states, strict=True))
-        spread = sum(
-            w * (P + np.outer(x - mean, x - mean))
-            for w, x, P in zip(weights, belief.states, belief.covariances, strict=True)
-        )
+        sizes = zip(weights, belief.states, belief.covariances, strict=True)
+        spread = sum(w * (P + np.outer(x - mean, x - mean)) for w, x, P in sizes)
         x, P = MODELS[j].matrix @ mean, MODELS[j].matrix @ spread @ MODELS[j].matrix.T + MODELS[j].noise
         S = H @ P @ H.T + SIGMA**2 * np.eye(2)
         K = P @ H.T @ np.linalg.inv(S)
@@ -198,9 +196,7 @@ def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None: 
     states, covariances = np.outer([60.0, 55.0, 70.0], np.ones(34)), np.tile(0.01 * np.eye(34), (3, 1, 1))
     belief = Belief(states, covariances, np.log(np.full(3, 1 / 3)), np.zeros(3))
 
-    def measure(states: Array) -> Measurement:
-        return Measurement(-states, np.tile(np.eye(34), (3, 1, 1)), np.eye(34))
-
+    measure = lambda states: Measurement(-states, np.tile(np.eye(34), (3, 1, 1)), np.eye(34))  # noqa: E731
     # no mixing: each model stays as far off as it is
     after = imm_of([still] * 3, np.eye(3)).cycle(belief, measure)
     assert (after.log_likelihoods < -745.0).all()  # exp() of it is 0
