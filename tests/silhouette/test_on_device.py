@@ -22,14 +22,9 @@ pytestmark = [
 ]
 
 
-def seen_by(body: Body, camera: Camera, pose: Array, rng: np.random.Generator) -> Silhouette:
-    """Return the silhouette of a pose, of which a tenth is not known."""
-    mask = project(body, camera, pose, np.zeros(3))
-    return Silhouette.of(mask, rng.random(mask.shape) < 0.9)
-
-
 def assert_equals_the_cpu(body: Body, camera: Camera, poses: Array, places: Array) -> None:
-    silhouette = seen_by(body, camera, poses[0], np.random.default_rng(1))
+    mask = project(body, camera, poses[0], np.zeros(3))
+    silhouette = Silhouette.of(mask, np.random.default_rng(1).random(mask.shape) < 0.9)  # a tenth is not known
     expected = areas(body, camera, silhouette, poses, places)
     np.testing.assert_array_equal(areas(body, camera, moved_to(silhouette, "cuda"), poses, places), expected)
 
