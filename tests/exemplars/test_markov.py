@@ -59,8 +59,8 @@ def test_a_steady_movement_stays_in_its_order(ahead: int) -> None:
     frames = list(smoothed((steady(k) for k in range(15)), 2.0, ahead))
     assert len(frames) == 15
     for k, frame in enumerate(frames):
-        np.testing.assert_allclose(frame.pose, 0.05 * k, atol=1e-12)
-        np.testing.assert_allclose(frame.place, [0.1 * k, 1.0, -k], atol=1e-12)
+        np.testing.assert_allclose(frame.pose, steady(k).pose, atol=1e-12)
+        np.testing.assert_allclose(frame.place, steady(k).place, atol=1e-12)
 
 
 def test_means_of_yaws_go_the_short_way_round() -> None:
