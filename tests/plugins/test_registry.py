@@ -117,12 +117,8 @@ def test_an_entry_point_of_a_group_that_is_nearly_right_is_broken() -> None:
 def test_one_module_registers_methods_and_commands_and_only_the_hooks_of_the_kinds_asked_for_are_called() -> None:
     greet, part = click.Command("greet"), click.Group("part")
     module = SimpleNamespace(**vars(registering(("mine", PCA))), **vars(commands(greet, part)))
-    both = (*KINDS, COMMAND)
-    for kinds, names, found in (
-        (KINDS, ["mine"], ()),
-        ((COMMAND,), [], (greet, part)),
-        (both, ["mine"], (greet, part)),
-    ):
+    made = (greet, part)
+    for kinds, names, found in ((KINDS, ["mine"], ()), ((COMMAND,), [], made), ((*KINDS, COMMAND), ["mine"], made)):
         (plugin,) = load([point("hello", module)], kinds)
         assert [offer.name for offer in plugin.offers] == names
         assert plugin.commands == found

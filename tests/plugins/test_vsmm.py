@@ -149,12 +149,8 @@ def test_a_setting_counts_whatever_the_variant_is() -> None:
     for k in range(5, 30):
         observations[k] = blank(observations[k])
     # without recovery a track is never lost
-    for variant, recovery, lost in (
-        ("default", None, 1),
-        ("default", False, 0),
-        ("patent", None, 0),
-        ("patent", True, 1),
-    ):
+    cases = ("default", None, True), ("default", False, False), ("patent", None, False), ("patent", True, True)
+    for variant, recovery, lost in cases:
         frames = follow(task, observations, variant=variant, recovery=recovery)
         assert frames[-1].details["lost"] == lost
 
