@@ -50,6 +50,7 @@ def opencv(path: Path, placed: bool = True) -> Path:
 
 ROTATION = cv2.Rodrigues(np.array([1.4, 0.3, -0.2]))[0]  # a camera that looks along a z-up world's ground
 TRANSLATION = np.array([0.3, 1.1, 4.2])
+POSE = ROTATION, TRANSLATION
 K = [[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]]
 LENS = [0.12, -0.05, 0.001, 0.002, 0.01]
 
@@ -63,7 +64,7 @@ def matrix_text(name: str, values: object) -> str:
 PLACED = {"rotation": cv2.Rodrigues(ROTATION)[0].tolist(), "translation": TRANSLATION[:, None].tolist()}  # columns
 ENTRY = f"size = [640, 480]\nmatrix = {K}\ndistortions = {LENS}\nrotation = {PLACED['rotation']}\ntranslation = {PLACED['translation']}\nfisheye = false\n"
 LEFT_RIGHT = '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n'
-POSES = {"R": PLACED["rotation"], "Rot": ROTATION, "T": PLACED["translation"]}
+WRITTEN = {"R": PLACED["rotation"], "Rot": ROTATION, "T": PLACED["translation"]}
 
 
 def matrices(**values: object) -> str:
@@ -73,7 +74,7 @@ def matrices(**values: object) -> str:
 YAML_24 = "%YAML:1.0\nimage_Width: 640\nimage_Height: 480\n" + matrices(Camera_Matrix=K, Distortion_Coefficients=LENS)
 INTRI = LEFT_RIGHT + matrices(K_left=K, dist_left=LENS, K_right=K, dist_right=np.zeros(5))
 EXTRI = LEFT_RIGHT + "".join(
-    matrix_text(f"{kind}_{name}", value) for name in ("left", "right") for kind, value in POSES.items()
+    matrix_text(f"{kind}_{name}", value) for name in ("left", "right") for kind, value in WRITTEN.items()
 )
 ROS = (
     "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n"

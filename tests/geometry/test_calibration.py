@@ -11,19 +11,7 @@ import pytest
 from posefit.geometry.calibration import Calibration, guessed_up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from tests.cases import each
-from tests.geometry.calibrations import (
-    KINDS,
-    LENS,
-    QUALISYS,
-    ROTATION,
-    TOML,
-    TRANSLATION,
-    YAML_24,
-    K,
-    kind_written,
-    matrices,
-    opencv,
-)
+from tests.geometry.calibrations import KINDS, LENS, POSE, QUALISYS, TOML, YAML_24, K, kind_written, matrices, opencv
 from tests.geometry.turns import about
 
 
@@ -174,7 +162,7 @@ def test_cameras_of_every_program_project_as_opencv_does(tmp_path: Path, name: s
     placed = not name.startswith("ros")
     assert (one.rotation is not None) == placed
     points = np.random.default_rng(0).uniform(-0.8, 0.8, (40, 3))
-    turn, place = (ROTATION, TRANSLATION) if placed else (np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 3.0]))
+    turn, place = POSE if placed else (np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 3.0]))
     bent = cv2.projectPoints(points, turn, place, np.array(K), np.array(LENS))[0].reshape(-1, 2) + 0.5
     pixels = one.camera((640, 480), np.eye(3)).project(points if placed else points + [0.0, 0.0, -3.0])[0]
     straight = one.straightened(np.concatenate([bent, np.ones((40, 1))], axis=1), (640, 480))[:, :2]
