@@ -457,15 +457,12 @@ class Scripted:
     """An optimiser that proposes one given point of the unit box a frame, and keeps the space it was given."""
 
     def __init__(self, space: SearchSpace, point: Array) -> None:
-        self.space, self.point = space, point
-        self.asked = False
+        self.space, self.left = space, [np.empty((0, len(point))), point[None]]
 
     def ask(self) -> Array:
-        self.asked, asked = True, self.asked
-        return np.empty((0, len(self.point))) if asked else self.point[None]
+        return self.left.pop()
 
-    def tell(self, proposals: Array, costs: Array) -> None:
-        pass
+    def tell(self, proposals: Array, costs: Array) -> None: ...
 
 
 @pytest.mark.parametrize(("variant", "steps"), [("default", [0.0, 0.2, -0.1]), ("paper", [0.0, 0.0, 0.2])])
