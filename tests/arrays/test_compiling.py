@@ -66,11 +66,6 @@ def run(tmp_path: Path) -> Any:
     return ran
 
 
-def test_a_second_process_compiles_nothing(run: Any) -> None:
-    assert run() == (12.0, ["scaled"])
-    assert run() == (12.0, [])
-
-
 def test_a_change_of_another_file_of_the_package_is_no_stale_result(run: Any) -> None:
     assert run() == (12.0, ["scaled"])
     assert run(factor=2.0) == (24.0, ["scaled"])  # the file of the function itself stays
