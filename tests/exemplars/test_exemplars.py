@@ -84,7 +84,6 @@ def test_states_are_made_once_for_the_same_motions() -> None:
     made = exemplars_of([walk], SKELETON)
     assert exemplars_of([replace(walk, poses=walk.poses.copy())], SKELETON) is made
     moved, faster = replace(walk, translations=walk.translations + 1e-9), replace(walk, fps=60.0)
-    parts = ([walk.frames(0, k), walk.frames(k, 12)] for k in (4, 6))
-    for motions in ([moved], [faster], *parts):
+    for motions in ([moved], [faster], *([walk.frames(0, k), walk.frames(k, 12)] for k in (4, 6))):
         assert exemplars_of(motions, SKELETON) is not made
         made = exemplars_of(motions, SKELETON)

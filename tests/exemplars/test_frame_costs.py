@@ -19,18 +19,11 @@ from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
-SKELETON = average_skeleton()
-STILL = np.zeros(66)
-
-
-def samples(spread: float) -> Posterior:
-    poses = spread * np.random.default_rng(0).standard_normal((24, 66))
-    return Posterior(poses, np.zeros((24, 3)), np.ones(24))
-
 
 def recalibration(cost: float, usable: bool = True) -> Recalibration:
-    frame_costs: Any = SimpleNamespace(skeleton=SKELETON, camera_count=1, usable=usable)
-    return recalibrated(samples(0.1), STILL, cost, frame_costs).recalibration
+    frame_costs: Any = SimpleNamespace(skeleton=average_skeleton(), camera_count=1, usable=usable)
+    samples = Posterior(0.1 * np.random.default_rng(0).standard_normal((24, 66)), np.zeros((24, 3)), np.ones(24))
+    return recalibrated(samples, np.zeros(66), cost, frame_costs).recalibration
 
 
 def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> None:
