@@ -78,13 +78,11 @@ def main() -> int:
     options, arguments = parser.parse_known_args()
     passed = []
     with tempfile.TemporaryDirectory() as cache:
-        for machine in MACHINES:
-            if options.only and machine.name not in options.only:
-                continue
-            if not cpu().__cpu_features__.get(machine.needs):
+        for machine in (one for one in MACHINES if not options.only or one.name in options.only):
+            if cpu().__cpu_features__.get(machine.needs):
+                passed += [run(machine, seed, arguments, Path(cache)) for seed in range(options.seeds)]
+            else:
                 print(f"{machine.name}: left out, the processor has no {machine.needs}")
-                continue
-            passed += [run(machine, seed, arguments, Path(cache)) for seed in range(options.seeds)]
     return 0 if passed and all(passed) else 1
 
 

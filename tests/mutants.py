@@ -109,15 +109,12 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "copy"
         for name in COPIED:
-            if (ROOT / name).is_dir():
-                shutil.copytree(ROOT / name, copy / name)
-            else:
-                shutil.copy(ROOT / name, copy / name)
+            (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, copy / name)
         killed = 0
         for mutant in drawn:
-            lives = survives(mutant, copy)
-            killed += not lives
-            if lives:
+            if not survives(mutant, copy):
+                killed += 1
+            else:
                 print(f"LIVES {mutant.path}:{mutant.line}\n  {mutant.before}\n  {mutant.after.strip()}", flush=True)
     print(f"{killed} of {len(drawn)} mutants killed, of {len(every)} that there are")
     return int(killed < asked.least * len(drawn))

@@ -11,9 +11,8 @@ import posefit
 
 ROOT = Path(__file__).parents[1]
 FILES = [path for folder in ("posefit", "plugins", "envs") for path in sorted((ROOT / folder).rglob("*.py"))]
-PACKAGES = sorted(
-    {ROOT / "posefit", *(path.parent for path in FILES if path.parent.parent in (ROOT / "plugins", ROOT / "envs"))}
-)
+OTHERS = ROOT / "plugins", ROOT / "envs"
+PACKAGES = sorted({ROOT / "posefit", *(path.parent for path in FILES if path.parent.parent in OTHERS)})
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 
 

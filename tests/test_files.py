@@ -15,13 +15,14 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 NEW = pytest.mark.parametrize("opened", [new_folder, new_file])
 
 
-def write(building, text="a"):
-    (building / "a" if building.is_dir() else building).write_text(text)
+def content_of(path):
+    """Return the file in a folder that was made, or the file itself."""
+    return path / "a" if path.is_dir() else path
 
 
 def fail(opening, error):
     with opening as building:
-        write(building)
+        content_of(building).write_text("a")
         raise error
 
 
@@ -29,10 +30,10 @@ def fail(opening, error):
 def test_a_name_appears_when_its_content_is_whole(tmp_path, opened):
     target = tmp_path / "out.csv"
     with opened(target) as building:
-        write(building)
+        content_of(building).write_text("a")
         assert building.suffix == ".csv"
         assert not target.exists()
-    assert (target / "a" if target.is_dir() else target).read_text() == "a"
+    assert content_of(target).read_text() == "a"
     assert list(tmp_path.iterdir()) == [target]
 
 
@@ -83,13 +84,12 @@ def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypa
         monkeypatch.setattr(os, "link", refuse)
     taken = pytest.raises(ValueError, match="out: expected a new name to write to, got one that exists")
     with taken, opened(tmp_path / "out") as late:
-        write(late, "late")
+        content_of(late).write_text("late")
         with opened(tmp_path / "out") as early:
             assert early != late
-            write(early, "early")
-    target = tmp_path / "out"
-    assert (target / "a" if target.is_dir() else target).read_text() == "early"
-    assert list(tmp_path.iterdir()) == [target]
+            content_of(early).write_text("early")
+    assert content_of(tmp_path / "out").read_text() == "early"
+    assert list(tmp_path.iterdir()) == [tmp_path / "out"]
 
 
 def test_a_failure_leaves_an_earlier_file_as_it_was(tmp_path):
@@ -117,14 +117,12 @@ def test_only_marked_folders_of_this_target_that_are_not_in_use_count_as_interru
 
 
 def test_of_an_unfinished_folder_only_named_files_are_removed(tmp_path):
-    kept = Unfinished.begin(tmp_path / "out", {})
-    (kept.path / "ours").write_text("")
+    kept, removed = (Unfinished.begin(tmp_path / "out", {}) for _ in range(2))
     (kept.path / "theirs").write_text("theirs")
-    kept.remove(["ours"])
+    for unfinished in (kept, removed):
+        (unfinished.path / "ours").write_text("")
+        unfinished.remove(["ours"])
     assert [path.name for path in kept.path.iterdir()] == ["theirs"]
-    removed = Unfinished.begin(tmp_path / "out", {})
-    (removed.path / "ours").write_text("")
-    removed.remove(["ours"])
     assert not removed.path.exists()
 
 
@@ -145,14 +143,14 @@ def test_a_finished_folder_replaces_an_earlier_one_but_no_other_files(tmp_path):
 
 
 def test_of_two_unfinished_folders_for_one_new_name_the_first_to_end_has_it(tmp_path):
-    places = [Unfinished.begin(tmp_path / "out", {}) for _ in range(2)]
-    for k, place in enumerate(places):
-        (place.path / "ours").write_text(str(k))
-    places[1].finish(["ours"], replace=False)
+    late, early = (Unfinished.begin(tmp_path / "out", {}) for _ in range(2))
+    (late.path / "ours").write_text("late")
+    (early.path / "ours").write_text("early")
+    early.finish(["ours"], replace=False)
     with pytest.raises(OSError):
-        places[0].finish(["ours"], replace=False)
-    assert (tmp_path / "out" / "ours").read_text() == "1"
-    assert (places[0].path / "ours").read_text() == "0"
+        late.finish(["ours"], replace=False)
+    assert (tmp_path / "out" / "ours").read_text() == "early"
+    assert (late.path / "ours").read_text() == "late"
 
 
 def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():

@@ -4,6 +4,7 @@ import signal
 import time
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from posefit.limits import allowed_bytes, memory, timed
@@ -48,8 +49,6 @@ def test_the_outer_limit_holds_where_the_inner_one_is_longer() -> None:
 
 
 def test_more_memory_than_it_may_have_is_an_error() -> None:
-    import numpy as np
-
     with pytest.raises(MemoryError), memory(4.0):
         np.ones(10**10)
 

@@ -29,9 +29,8 @@ def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):
 
 
 def test_a_text_that_is_too_large_or_no_utf_8_is_named(tmp_path):
-    path = tmp_path / "a.toml"
+    path, pipe = tmp_path / "a.toml", tmp_path / "pipe"
     path.write_bytes(b"a = \xff")
-    pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     for place, most, message in (
         (path, 100, "a.toml: expected text in UTF-8, got byte 0xff"),

@@ -32,6 +32,6 @@ def test_its_optimiser_keeps_every_rule() -> None:
     names: dict[str, Any] = {"__name__": "spiral"}
     exec(code, names)
     report = check_optimiser(names["Spiral"])
-    broken = {one.name for one in report.of("failed")}
-    assert broken <= {"copies"}, str(report)  # a class without a module cannot be pickled
+    # a class without a module cannot be pickled
+    assert {one.name for one in report.of("failed")} <= {"copies"}, str(report)
     assert len(code.splitlines()) <= 27

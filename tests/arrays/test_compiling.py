@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,13 @@ print(scaled(np.arange(4, dtype=KIND)))
 """
 
 
+def process(folder: Path, *words: str, **variables: str) -> "subprocess.CompletedProcess[str]":
+    """Return what came of Python in a process of its own, whose cache is in a folder."""
+    own = {"NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_DISABLE_JIT": "0", "PYTHONDONTWRITEBYTECODE": "1"}
+    how = {"env": os.environ | own | variables, "capture_output": True, "text": True, "check": True}
+    return subprocess.run([sys.executable, *words], **how)
+
+
 @pytest.fixture
 def run(tmp_path: Path) -> Any:
     """Return a function that runs a process and returns the sum that it prints, and what it compiled."""
@@ -50,19 +58,12 @@ def run(tmp_path: Path) -> Any:
 
     def ran(factor: float = 1.0, before: str = "", kind: str = "float", **variables: str) -> tuple[float, list[str]]:
         (tmp_path / "package/constants.py").write_text(f"FACTOR = {factor}\n")
-        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
         path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-        environment |= {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **variables}
-        command = [sys.executable, "-c", before + RUN.replace("KIND", kind)]
-        lines = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split("\n")
+        words = ["-c", before + RUN.replace("KIND", kind)]
+        lines = process(tmp_path, *words, PYTHONPATH=path, **variables).stdout.split("\n")
         return float(lines[-2]), [line.removeprefix("compiled ") for line in lines if line.startswith("compiled")]
 
     return ran
-
-
-def test_a_second_process_compiles_nothing(run: Any) -> None:
-    assert run() == (12.0, ["scaled"])
-    assert run() == (12.0, [])
 
 
 def test_a_change_of_another_file_of_the_package_is_no_stale_result(run: Any) -> None:
@@ -121,15 +122,11 @@ if __name__ == "__main__":
 def test_compiling_is_announced_once_in_the_process_that_a_user_started(tmp_path: Path) -> None:
     (tmp_path / "posefit_loops.py").write_text(LOOPS.replace("from constants import FACTOR", "FACTOR = 1.0"))
     (tmp_path / "script.py").write_text(ANNOUNCED)
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
-    environment["PYTHONDONTWRITEBYTECODE"] = "1"
     announced = {}
     for word in ("child", "quiet", "", "again"):
         if word != "again":
             shutil.rmtree(tmp_path / "cache", ignore_errors=True)
-        command = [sys.executable, str(tmp_path / "script.py"), word]
-        ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        announced[word] = ran.stderr.splitlines()
+        announced[word] = process(tmp_path, str(tmp_path / "script.py"), word).stderr.splitlines()
     message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
     assert announced == {"child": [], "quiet": [], "": [message], "again": []}
 
@@ -148,8 +145,6 @@ def test_without_room_every_process_compiles(run: Any) -> None:
 
 
 def test_two_processes_at_once_lose_nothing(run: Any) -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
     with ThreadPoolExecutor(2) as pool:
         assert [total for total, _ in pool.map(lambda kind: run(kind=kind), ("float", "int"))] == [12.0, 12.0]
     assert [run(kind=kind) for kind in ("float", "int")] == [(12.0, [])] * 2

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
@@ -30,8 +32,8 @@ from tests.geometry.turns import about
 from tests.motion.rigs import STYLES, write_rig
 from tests.plugins.test_registry import point, registering
 
-FEW = ["--evaluations", "50"]
-QUICK = [*FEW, "--size", "120x90"]
+QUICK = ["--evaluations", "50", "--size", "120x90"]
+LITTLE = ["--method", "sapso", "--train", "walk-a", "--evaluations", "100", "--size", "120x90"]
 FILES = {
     "poses.npz", "track.amc", "track.bvh", "track.trc", "track.c3d", "track.glb", "track.mot", "model.osim",
     "angles.csv", "gait.csv", "skeleton.asf", "camera.json", "frames.csv", "summary.json", "overlay.mp4", "summary.png", "track.html",
@@ -76,23 +78,19 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
     difference = (again.poses - stored["poses"] + np.pi) % (2 * np.pi) - np.pi
     np.testing.assert_allclose(difference, 0.0, atol=1e-8)
     np.testing.assert_allclose(again.translations, stored["translations"], atol=1e-9)
-    rows = csv_rows(out / "frames.csv")
-    assert len(rows) == 5
+    errors = [float(row["error_degrees"]) for row in csv_rows(out / "frames.csv")]
+    assert len(errors) == 5
     summary = json.loads((out / "summary.json").read_text())
-    assert np.mean([float(row["error_degrees"]) for row in rows]) == pytest.approx(summary["error_degrees"]["mean"])
+    assert np.mean(errors) == pytest.approx(summary["error_degrees"]["mean"])
     video = cv2.VideoCapture(str(out / "overlay.mp4"))
-    frames = 0
-    while video.read()[0]:
-        frames += 1
-    assert frames == 5
+    assert [video.read()[0] for _ in range(6)] == [True] * 5 + [False]
     assert cv2.imread(str(out / "summary.png")).shape[1] > 600
     assert posefit.Camera.from_json(out / "camera.json").width == 120
-    assert error_of("track", out).endswith(
-        "expected a source, got a track's folder: give the source that it was made from"
-    )
-    assert error_of("track", "walk", "--camera", out / "poses.npz").endswith(
-        "a calibration of the camera, got a file of masks"
-    )
+    for words, message in (
+        ([out], "expected a source, got a track's folder: give the source that it was made from"),
+        (["walk", "--camera", out / "poses.npz"], "a calibration of the camera, got a file of masks"),
+    ):
+        assert error_of("track", *words).endswith(message)
 
 
 def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None:
@@ -114,8 +112,7 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
 def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for _ in range(2):
-        words = ["track", "walk", "--frames", "0:2", "--out", "walk", "--force"]
-        assert printed(*words, *QUICK)["translation"] == "known"
+        assert printed("track", "walk", "--frames", "0:2", "--out", "walk", "--force", *QUICK)["translation"] == "known"
 
 
 def test_a_shell_completes_methods_and_motions() -> None:
@@ -138,7 +135,7 @@ def test_a_result_has_three_lines_and_messages_only_where_they_are_wanted() -> N
 def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(tmp_path: Path) -> None:
     walk, out = recorded.clip("16_15").motion().frames(0, 12), tmp_path / "out"
     path = write_rig(tmp_path / "rig.bvh", walk, STYLES["mixamo"], 100.0, about(0, np.pi / 2))
-    words = ["--method", "sapso", "--train", "walk-a", "--frames", "5:8", "--evaluations", "100", "--size", "120x90"]
+    words = ["--frames", "5:8", *LITTLE]
     assert run("track", path, "--out", out, *words).exit_code == 0
     summary = json.loads((out / "summary.json").read_text())
     unit, axis = summary["warnings"]
@@ -158,8 +155,7 @@ def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(t
 def test_an_amc_is_tracked_with_the_asf_beside_it_at_cmus_rate_or_one_that_is_given(clip: tuple[Path, Path]) -> None:
     text = clip[1].read_text()
     clip[1].write_text(text[text.index(":FULLY") :])
-    words = ["--method", "sapso", "--train", "walk-a", "--evaluations", "100", "--size", "120x90"]
-    assumed, given = printed("track", clip[1], *words), printed("track", clip[1], "--rate", "60", *words)
+    assumed, given = printed("track", clip[1], *LITTLE), printed("track", clip[1], "--rate", "60", *LITTLE)
     assert (assumed["frames"], given["frames"]) == (3, 6)
     assert "120 frames a second are assumed" in assumed["warnings"][0]
     assert given["warnings"] == []
@@ -185,13 +181,13 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     (out / "precious.txt").write_text("mine")
     assert "got one with precious.txt, which is none of posefit's" in error_of(*force, out)
     (out / "precious.txt").unlink()
-    (out / "gait.csv").rename(tmp_path / "gait.csv")
+    gait = (out / "gait.csv").rename(tmp_path / "gait.csv")
     (out / "gait.csv").mkdir()
     (out / "gait.csv" / "precious.txt").write_text("mine")
     assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
     assert (out / "gait.csv" / "precious.txt").read_text() == "mine"
     shutil.rmtree(out / "gait.csv")
-    (out / "gait.csv").symlink_to(tmp_path / "gait.csv")
+    (out / "gait.csv").symlink_to(gait)
     assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
     assert (link.is_symlink(), sorted(path.name for path in out.iterdir())) == (True, before)
 
@@ -239,8 +235,8 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
 def test_plugins_are_listed_with_their_origin_and_settings() -> None:
     rows = {row["name"]: row for row in json.loads(run("plugins", "--json").stdout)}
     sapso = rows["sapso"]
-    assert (sapso["kind"], sapso["distribution"], sapso["next_frame"]) == ("optimiser", "posefit", "start")
-    assert sapso["version"] == posefit.__version__
+    origin = {"kind": "optimiser", "distribution": "posefit", "next_frame": "start", "version": posefit.__version__}
+    assert origin.items() <= {name: value for name, value in sapso.items() if name != "settings"}.items()
     assert {"name": "cooling", "type": "float", "default": 0.95} in sapso["settings"]
     assert {"name": "limits", "type": "asf | training", "default": "asf"} in rows["full"]["settings"]
     text = run("plugins").stdout
@@ -250,11 +246,12 @@ def test_plugins_are_listed_with_their_origin_and_settings() -> None:
 
 
 def test_one_plugin_is_shown_with_what_each_setting_means_whatever_its_kind() -> None:
-    text = run("plugins", "show", "sapso").stdout
-    words = " ".join(text.split())
-    assert "--set sapso.cooling: float = 0.95 (gamma) factor on the temperature" in words
-    assert "--set full.limits: asf | training = asf" in " ".join(run("plugins", "show", "full").stdout.split())
-    assert "It has no settings." in run("plugins", "show", "masks").stdout
+    for name, words in (
+        ("sapso", "--set sapso.cooling: float = 0.95 (gamma) factor on the temperature"),
+        ("full", "--set full.limits: asf | training = asf"),
+        ("masks", "It has no settings."),
+    ):
+        assert words in " ".join(run("plugins", "show", name).stdout.split())
     message = error_of("plugins", "show", "sapzo")
     assert "plugin must be one of annealed, " in message
     assert message.endswith("got 'sapzo'; did you mean 'sapso'?")
@@ -324,14 +321,17 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
     report = json.loads(run("check", "prior", "pca", "--set", "components=4", "--json").stdout)
     passed = {"check": "ranges", "outcome": "passed", "detail": "4 latents", "traceback": ""}
     assert passed in report["results"]
-    assert "optimiser must be one of" in error_of("check", "optimiser", "nothing")
-    assert error_of("check", "optimiser", "mixture").endswith("got 'mixture'; its kind is segmenter")
-    assert error_of("check", "optimiser", "pca").endswith("got 'pca'; its kind is prior")
-    assert error_of("check", "optimizer", "sapso").endswith("got 'optimizer'; did you mean 'optimiser'?")
-    assert error_of("track", "walk", "--method", "mixture").endswith("got 'mixture'; its kind is segmenter")
-    assert error_of("track", "walk", "--method", "pca").endswith("got 'pca'; as a prior it is @pca")
-    assert "a setting of pca must be one of" in error_of("check", "prior", "pca", "--set", "colour=red")
-    assert "a setting must be SETTING=VALUE" in error_of("check", "prior", "pca", "--set", "colour")
+    for command, message in (
+        ("check optimiser nothing", "optimiser must be one of .*"),
+        ("check optimiser mixture", "got 'mixture'; its kind is segmenter"),
+        ("check optimiser pca", "got 'pca'; its kind is prior"),
+        ("check optimizer sapso", r"got 'optimizer'; did you mean 'optimiser'\?"),
+        ("track walk --method mixture", "got 'mixture'; its kind is segmenter"),
+        ("track walk --method pca", "got 'pca'; as a prior it is @pca"),
+        ("check prior pca --set colour=red", "a setting of pca must be one of .*"),
+        ("check prior pca --set colour", "a setting must be SETTING=VALUE.*"),
+    ):
+        assert re.search(f"{message}$", error_of(*command.split())), command
 
 
 def installed(kind: str, name: str, folder: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
@@ -397,9 +397,7 @@ def test_a_new_plugin_has_names_of_its_own_and_replaces_nothing(tmp_path: Path) 
 
 
 @each(("name", "class_name"), [("none", "NoneTracker"), ("true", "TrueTracker"), ("frame", "FrameTracker")])
-def test_a_new_plugins_class_has_a_name_that_python_and_the_template_leave_free(
-    name: str, class_name: str, tmp_path: Path
-) -> None:
+def test_a_new_plugins_class_has_a_name_that_is_free(name: str, class_name: str, tmp_path: Path) -> None:
     assert run("plugins", "new", name, "--kind", "tracker", "--out", tmp_path / "x").exit_code == 0
     text = (tmp_path / "x" / f"posefit_{name}.py").read_text()
     assert f"class {class_name}:" in text
@@ -417,10 +415,7 @@ def test_a_setting_that_makes_no_sense_is_one_line() -> None:
     for text, message in [
         ("sapso", "a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
         ("sapso=3", "tracker.relocalise_gap, tracker.variant, got 'sapso'"),
-        (
-            "lens.phi=4.2",
-            "a setting must name one of annealed, pca, tracker, which are in use here, got 'lens.phi'",
-        ),
+        ("lens.phi=4.2", "a setting must name one of annealed, pca, tracker, which are in use here, got 'lens.phi'"),
         ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
         ("tracker.floor=0", "floor must be above 0, got 0"),
     ]:
@@ -455,14 +450,8 @@ def test_names_from_outside_do_not_steer_the_terminal(capsys: pytest.CaptureFixt
     assert error_of("track", "a\x1b[31m\nb.amc").startswith(r"posefit: a\x1b[31m\nb.amc: expected ")
 
 
-def test_a_mistake_is_one_line_and_a_fault_of_the_program_is_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert error_of("track", "wlak").startswith("posefit: motion must be")
-    shown = run("--debug", "track", "wlak")
-    assert isinstance(shown.exception, InputError)
-
-    def broken(*_: object, **__: object) -> None:
-        raise ValueError("operands could not be broadcast together")
-
-    monkeypatch.setattr("posefit.tracking.front.track_scene", broken)
-    fault = run("track", "walk", "--frames", "0:1")
-    assert type(fault.exception) is ValueError
+def test_a_mistake_is_a_traceback_for_who_debugs_and_a_fault_of_the_program_always(monkeypatch: Any) -> None:
+    assert isinstance(run("--debug", "track", "wlak").exception, InputError)
+    fault = ValueError("operands could not be broadcast together")
+    monkeypatch.setattr("posefit.tracking.front.track_scene", Mock(side_effect=fault))
+    assert type(run("track", "walk", "--frames", "0:1").exception) is ValueError

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -33,16 +34,15 @@ def shell(command: str, **variables: str) -> subprocess.CompletedProcess[str]:
 
 def test_messages_that_nobody_can_read_end_no_work(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN)
+    sweep = f"sweep {tmp_path}/plan.toml --workers 1"
     for number, redirected in enumerate(("2>/dev/full", "<&- 2>&-")):
         out = tmp_path / str(number)
-        ran = shell(f"posefit {TRACK} --json --out {out} {redirected}")
-        assert ran.returncode == 0
-        assert json.loads(ran.stdout)["frames"] == 2
+        for command, name, count in ((f"{TRACK} --out {out}", "frames", 2), (f"{sweep} --out {out}-rows", "done", 1)):
+            ran = shell(f"posefit {command} --json {redirected}")
+            assert ran.returncode == 0
+            assert json.loads(ran.stdout)[name] == count
         assert (out / "summary.json").is_file()
         assert shell(f"posefit track wlak {redirected}").returncode == 2
-        ran = shell(f"posefit sweep {tmp_path}/plan.toml --workers 1 --json --out {out}-rows {redirected}")
-        assert ran.returncode == 0
-        assert json.loads(ran.stdout)["done"] == 1
 
 
 @each("unbuffered", ["", "1"])
@@ -58,31 +58,20 @@ def test_results_that_cannot_be_written_are_one_line(unbuffered: str) -> None:
 
 def test_a_file_gets_messages_and_no_bars(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN)
-    shown = [shell(f"posefit {TRACK}"), shell(f"posefit sweep {tmp_path}/plan.toml --workers 1 --out {tmp_path}/out")]
-    for ran in shown:
+    for command in (TRACK, f"sweep {tmp_path}/plan.toml --workers 1 --out {tmp_path}/out"):
+        ran = shell(f"posefit {command}")
         assert ran.returncode == 0
-        assert "\r" not in ran.stderr
-        assert "it/s" not in ran.stderr
-        assert "%|" not in ran.stderr
+        assert [part for part in ("\r", "it/s", "%|") if part in ran.stderr] == []
 
 
 def test_what_a_machine_refuses_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits, denied = "expected work that fits .* GB of memory, got", PermissionError(13, "Permission denied", "a.npz")
     for error, line in (
-        (MemoryError(), r"expected work that fits .* GB of memory, got more"),
-        (
-            MemoryError("Unable to allocate 9 TiB"),
-            r"expected work that fits .* GB of memory, got Unable to allocate 9 TiB",
-        ),
-        (
-            PermissionError(13, "Permission denied", "a.npz"),
-            "a.npz: expected a file or folder that can be used, got Permission",
-        ),
+        (MemoryError(), f"{fits} more"),
+        (MemoryError("Unable to allocate 9 TiB"), f"{fits} Unable to allocate 9 TiB"),
+        (denied, "a.npz: expected a file or folder that can be used, got Permission"),
     ):
-
-        def refused(*_: object, error: BaseException = error, **__: object) -> None:
-            raise error
-
-        monkeypatch.setattr("posefit.tracking.front.track", refused)
+        monkeypatch.setattr("posefit.tracking.front.track", Mock(side_effect=error))
         ran = run("track", "walk")
         assert (ran.exit_code, ran.stdout, len(ran.stderr.splitlines())) == (2, "", 1)
         assert re.match(f"posefit: {line}", ran.stderr)

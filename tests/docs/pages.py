@@ -12,9 +12,7 @@ RUN = ("python", "sh", "toml")  # languages whose blocks are tested
 SHOWN = ("text",)  # what the block before it prints, or what is no code
 _BLOCK = re.compile(r"^(?P<fence>`{3,})(?P<language>[^\n]*)\n(?P<text>.*?)^(?P=fence)[ ]*$", re.MULTILINE | re.DOTALL)
 _MADE = re.compile(r"<!-- from the code: .*?<!-- end -->", re.DOTALL)
-_MARK = re.compile(
-    r"<!-- (?P<mark>nightly|not run|not a plan|not compared): (?P<reason>(?:(?!-->).)*) -->\n\Z", re.DOTALL
-)
+_MARK = re.compile(r"<!-- (nightly|not run|not a plan|not compared): ((?:(?!-->).)*) -->\n\Z", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -50,8 +48,7 @@ def blocks(page: Path) -> Iterator[Block]:
         if language.startswith("{"):
             continue
         before = text[: block.start()]
-        marked = _MARK.search(before)
-        why = ("", "") if marked is None else (marked["mark"], marked["reason"])
+        why = marked.groups() if (marked := _MARK.search(before)) else ()
         yield Block(str(page.relative_to(ROOT)), before.count("\n") + 1, language, block["text"], *why)
 
 
@@ -61,7 +58,5 @@ def _cells(page: Path) -> Iterator[Block]:
     for k, cell in enumerate(json.loads(page.read_text("utf-8"))["cells"]):
         if cell["cell_type"] == "code":
             yield Block(name, k, "python", "".join(cell["source"]))
-            printed = "".join(
-                "".join(output["text"]) for output in cell["outputs"] if output["output_type"] == "stream"
-            )
-            yield Block(name, k, "text", printed)
+            texts = [output["text"] for output in cell["outputs"] if output["output_type"] == "stream"]
+            yield Block(name, k, "text", "".join("".join(text) for text in texts))

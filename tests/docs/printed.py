@@ -31,10 +31,11 @@ def same(shown: str, line: str) -> bool:
     """Return whether two lines have the same words and close numbers; times may be any."""
     if shown.endswith("..."):
         shown = shown.removesuffix("...").rstrip()
-        line = _cut(line, shown)
+        line = " ".join(line.split()[: len(shown.split())])  # as many words
     if _NUMBER.sub("#", shown) != _NUMBER.sub("#", line):
         return False
-    pairs = list(_numbers(shown, line))
+    numbers = zip(_NUMBER.finditer(shown), _NUMBER.finditer(line), strict=True)
+    pairs = [(a, b) for a, b in numbers if not _TIME.match(shown[a.end() :])]
     whole = not any("." in number[0] for pair in pairs for number in pair)
 
     def is_count(a: re.Match[str]) -> bool:
@@ -43,19 +44,8 @@ def same(shown: str, line: str) -> bool:
     return all(a[0] == b[0] if is_count(a) else _close(a[0], b[0]) for a, b in pairs)
 
 
-def _numbers(shown: str, line: str) -> Iterator[tuple[re.Match[str], re.Match[str]]]:
-    """Yield the numbers of two lines in pairs; not those of times."""
-    pairs = zip(_NUMBER.finditer(shown), _NUMBER.finditer(line), strict=True)
-    return ((a, b) for a, b in pairs if not _TIME.match(shown[a.end() :]))
-
-
 def _value(number: str) -> float:
     return float(number.replace(",", ""))
-
-
-def _cut(line: str, shown: str) -> str:
-    """Return `line` up to as many words as `shown` has."""
-    return " ".join(line.split()[: len(shown.split())])
 
 
 def _plain(line: str) -> str:

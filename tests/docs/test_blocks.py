@@ -87,15 +87,9 @@ def _shell(block: Block, folder: Path) -> str:
     """Return what a block prints; what installs a package is left out."""
     tools = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     text = re.sub(r"^python -m pip install .*?(&& |$)", "", block.text, flags=re.MULTILINE)
-    result = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", text],
-        cwd=folder,
-        env={**os.environ, "PATH": tools},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=600,
-    )
+    words, environment = ["bash", "-euo", "pipefail", "-c", text], {**os.environ, "PATH": tools}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    result = subprocess.run(words, cwd=folder, env=environment, text=True, timeout=600, **pipes)
     assert result.returncode == 0, f"{block}: {result.stdout[-2000:]}"
     return result.stdout
 
@@ -137,9 +131,8 @@ def test_what_a_page_shows_as_printed_is_compared_or_has_its_reason() -> None:
 
 
 def test_messages_that_are_explained_exist() -> None:
-    code = " ".join(
-        path.read_text("utf-8") for folder in ("posefit", "plugins") for path in (ROOT / folder).rglob("*.py")
-    )
+    paths = [path for folder in ("posefit", "plugins") for path in (ROOT / folder).rglob("*.py")]
+    code = " ".join(path.read_text("utf-8") for path in paths)
     code = re.sub(r'"\s*f?"', "", code)  # of a text over several lines
     page = (ROOT / "docs/howto/troubleshooting.md").read_text("utf-8")
     messages = re.findall(r"^\| `([^`]+)`", page, re.MULTILINE)

@@ -11,15 +11,14 @@ from click.testing import CliRunner
 
 import footage_figures
 from footage_figures import LABELS, SINGLE, TALL, TRACKED, filmed_scene, main, recording_of
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit import Body, Camera, Motion
 from posefit.motion import built_in
 from posefit.motion.asf import write_asf
-from posefit.motion.motion import Motion
 from posefit.output.drawing import draw_body
 from tests.cases import each
 
 SIZE = (160, 120)
+Write = Callable[[Path, Motion], Path]
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # HumanEva's world from ours
 
 
@@ -76,9 +75,7 @@ def write_cmu(root: Path, motion: Motion) -> Path:
         (write_cmu, "16_15", None, (None, None)),
     ],
 )
-def test_the_films_of_each_layout(
-    write: Callable[[Path, Motion], Path], name: str, activity: str | None, frames: Any, tmp_path: Path
-) -> None:
+def test_the_films_of_each_layout(write: Write, name: str, activity: str | None, frames: Any, tmp_path: Path) -> None:
     recording = recording_of(write(tmp_path, walk(4)))
     assert (recording.name, recording.activity, recording.frames) == (name, activity, frames)
     assert (recording.calibration is not None) == (write is write_humaneva)
@@ -97,9 +94,7 @@ def test_the_films_of_each_layout(
         (write_cmu, "16/notes", "", "--activity must be given for films that do not say it, such as"),
     ],
 )
-def test_what_is_missing_is_one_line(
-    write: Callable[[Path, Motion], Path], spoilt: str, content: str | None, words: str, tmp_path: Path
-) -> None:
+def test_what_is_missing_is_one_line(write: Write, spoilt: str, content: Any, words: str, tmp_path: Path) -> None:
     film = write(tmp_path, walk(3))
     (tmp_path / spoilt).unlink() if content is None else (tmp_path / spoilt).write_text(content)
     result = CliRunner(env={"POSEFIT_CMU": ""}).invoke(main, [str(film), "--out", str(tmp_path / "out")])

@@ -32,9 +32,8 @@ def rows(page: str) -> set[str]:
 
 def test_the_settings_of_every_method_are_described() -> None:
     page = settings.page()
-    for offers in registry().offers.values():
-        for offer in offers.values():
-            assert f"`{offer.name}`" in page
+    names = [offer.name for offers in registry().offers.values() for offer in offers.values()]
+    assert [name for name in names if f"`{name}`" not in page] == []
 
 
 @pytest.fixture(scope="module")
@@ -51,37 +50,35 @@ def test_every_key_of_summary_json_is_described(tracked: Path) -> None:
     assert described - set(summary) <= {"history"}  # of a single frame
 
 
+def head_of(path: Path) -> list[str]:
+    """Return the names of a table's columns."""
+    return path.read_text("utf-8").splitlines()[0].split(",")
+
+
 def test_every_column_of_frames_csv_is_described(tracked: Path) -> None:
-    head = (tracked / "frames.csv").read_text("utf-8").splitlines()[0].split(",")
-    assert [name for name in head if name not in {f"{place}_{axis}" for place in PLACES for axis in "xyz"}] == list(
-        figures.FRAME
-    )
+    of_places = {f"{place}_{axis}" for place in PLACES for axis in "xyz"}
+    assert [name for name in head_of(tracked / "frames.csv") if name not in of_places] == list(figures.FRAME)
 
 
 def test_every_column_of_a_sweeps_csv_is_described() -> None:
     row = run_cell(cell_of({"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80})).row
     described = rows(figures.page()) | rows((DOCS / "howto" / "plan.md").read_text("utf-8"))
-    for column in flat(row):
-        assert column in described or column.partition(".")[0] in described or column.startswith("joint_errors_mm."), (
-            column
-        )
+    names = [column for column in flat(row) if not column.startswith("joint_errors_mm.")]
+    assert [name for name in names if not described & {name, name.partition(".")[0]}] == []
 
 
 def test_every_angle_is_described(tracked: Path) -> None:
-    head = (tracked / "angles.csv").read_text("utf-8").splitlines()[0].split(",")
-    assert head == ["frame", "seconds", *COLUMNS]
+    assert head_of(tracked / "angles.csv") == ["frame", "seconds", *COLUMNS]
     described = re.findall(r"^\| `(\w+)` \|", angles.page(), re.MULTILINE)
     assert {name.partition("_")[2] for name in COLUMNS} == set(described)
-    page = (DOCS / "howto" / "measuring.md").read_text("utf-8")
-    steps = (tracked / "gait.csv").read_text("utf-8").splitlines()[0].split(",")
-    assert re.findall(r"^\| `(\w+)` \|", page.partition("of `gait.csv`")[2], re.MULTILINE) == steps
+    page = (DOCS / "howto" / "measuring.md").read_text("utf-8").partition("of `gait.csv`")[2]
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == head_of(tracked / "gait.csv")
 
 
 def test_what_is_made_from_the_code_is_up_to_date() -> None:
-    stale = [  # words alone: another click breaks lines elsewhere
-        name for name, text in generator.pages().items() if (DOCS / name).read_text("utf-8").split() != text.split()
-    ]
-    assert stale == [], "python docs/generator writes them"
+    # words alone: another click breaks lines elsewhere
+    pages = [(name, (DOCS / name).read_text("utf-8").split(), text.split()) for name, text in generator.pages().items()]
+    assert [name for name, page, text in pages if page != text] == [], "python docs/generator writes them"
 
 
 def test_a_plan_is_described_with_every_field_list_and_corruption() -> None:
@@ -90,10 +87,12 @@ def test_a_plan_is_described_with_every_field_list_and_corruption() -> None:
     defaults: dict[str, Any] = {one.name: one.default for one in fields(TrackCell)}
     for name in ("instance", "frames", "fps", "evaluations", "seed"):
         assert f"| `{name}` | {defaults[name]:g} |" in page
-    assert f"| `size` | {list(defaults['size'])} |" in page
-    assert f"| `view_degrees` | {defaults['view_degrees'][0]:g} |" in page
-    for name in ("translation", "first_pose"):
-        assert f'| `{name}` | "{defaults[name]}" |' in page
+    for name, text in (
+        ("size", list(defaults["size"])),
+        ("view_degrees", f"{defaults['view_degrees'][0]:g}"),
+        *((name, f'"{defaults[name]}"') for name in ("translation", "first_pose")),
+    ):
+        assert f"| `{name}` | {text} |" in page
 
 
 def test_a_docstring_is_read_as_plain_text() -> None:

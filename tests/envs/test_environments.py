@@ -36,9 +36,7 @@ SHORT: dict[str, dict[str, Any]] = {
 
 
 @each(("name", "arguments"), VARIANTS)
-def test_the_checker_passes_without_a_warning(
-    name: str, arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_checker_passes_without_a_warning(name: str, arguments: dict[str, Any], monkeypatch: Any) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)  # nor is a window needed
     check_env(gym.make(f"posefit_envs:{name}", **arguments).unwrapped)
 
@@ -64,7 +62,6 @@ def trace(env: gym.Env[Any, Any], steps: int = 12) -> list[Any]:
 @each(("name", "arguments"), [(SEARCHES[0], {}), *zip(2 * SEARCHES, WORLDS[1:], strict=False)])
 def test_its_description_as_json_makes_an_equal_one(name: str, arguments: dict[str, Any]) -> None:
     env = gym.make(name, **{**arguments, **SHORT[name]})
-    assert env.spec is not None
     assert data_equivalence(trace(env), trace(gym.make(EnvSpec.from_json(env.spec.to_json()))))
 
 
@@ -87,9 +84,8 @@ def test_pictures_are_rgb(name: str) -> None:
     before = np.asarray(env.render())
     env.step(env.action_space.sample())
     after = np.asarray(env.render())
-    assert before.shape == after.shape
-    assert before.dtype == after.dtype == np.uint8
-    assert before.shape[2] == 3
+    assert (before.shape, before.dtype, before.shape[2]) == (after.shape, after.dtype, 3)
+    assert before.dtype == np.uint8
     assert (before != after).any()
 
 
@@ -139,11 +135,12 @@ def test_numbers_of_numpy_are_taken_as_arguments() -> None:
     arguments: dict[str, Any] = {
         "instance": np.int64(3), "size": np.array([64, 48]), "view_degrees": np.array([0.0, 90.0]),
         "mismatch_percent": np.float32(2.0), "noise": {"holes": np.float32(0.5)}, "errors": np.True_,
+        "generations": np.array([3, 6]), "searches": np.int8(2),
     }  # fmt: skip
-    plain = {"instance": 3, "size": (64, 48), "view_degrees": [0.0, 90.0], "mismatch_percent": 2.0}
-    plain |= {"noise": {"holes": 0.5}, "errors": True}
-    arguments |= {"generations": np.array([3, 6]), "searches": np.int8(2)}
-    plain |= {"generations": (3, 6), "searches": 2}
+    plain: dict[str, Any] = {
+        "instance": 3, "size": (64, 48), "view_degrees": [0.0, 90.0], "mismatch_percent": 2.0,
+        "noise": {"holes": 0.5}, "errors": True, "generations": (3, 6), "searches": 2,
+    }  # fmt: skip
     first, second = (gym.make("posefit/Race-v0", **more).reset(seed=1) for more in (arguments, plain))
     assert data_equivalence(first, second)
 

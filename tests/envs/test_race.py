@@ -13,12 +13,12 @@ import posefit_envs  # noqa: F401, registers it
 from posefit_envs.policies import race_action, race_features
 from tests.cases import each
 
-NAME = "posefit/Race-v0"
 LOG_101 = math.log(101.0)
 
 
 def made(**arguments: Any) -> Any:
-    return gym.make(NAME, **{"instance": 3, "searches": 4, "generations": (20, 20), **arguments}).unwrapped
+    usual = {"instance": 3, "searches": 4, "generations": (20, 20)}
+    return gym.make("posefit/Race-v0", **{**usual, **arguments}).unwrapped
 
 
 def test_a_step_is_one_generation_of_the_chosen_search() -> None:

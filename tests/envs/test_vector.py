@@ -37,11 +37,7 @@ RACE: list[dict[str, Any]] = [
     {"population_size": 3, "generations": (1, 6), "prior": "full", "translation": "searched", "errors": False},
     {"searches": 2, "generations": (30, 30), "view_degrees": [0.0, 90.0], "optimiser": "cma"},
 ]
-CASES = {
-    "posefit/FitImage-v0": FIT,
-    "posefit/Track-v0": TRACK,
-    "posefit/Race-v0": RACE,
-}
+CASES = {"posefit/FitImage-v0": FIT, "posefit/Track-v0": TRACK, "posefit/Race-v0": RACE}
 SHORT: dict[str, dict[str, Any]] = {
     "posefit/FitImage-v0": {"max_evaluations": 5},
     "posefit/Track-v0": {"frames": 2, "evaluations_per_frame": 2},
@@ -158,10 +154,7 @@ def test_mistakes_are_named(name: str) -> None:
 
 @each(
     ("name", "arguments"),
-    [
-        ("posefit/FitImage-v0", {"max_evaluations": 3}),
-        ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
-    ],
+    [("posefit/FitImage-v0", {"max_evaluations": 3}), ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3})],
 )
 def test_stable_baselines3_gets_the_last_observation_of_an_episode(name: str, arguments: dict[str, Any]) -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")

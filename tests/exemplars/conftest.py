@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from posefit import Body, Frame, Motion, Observation, Silhouette, Task
 from posefit.arrays import Array
-from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import synthetic
-from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit.motion.motion import Motion
-from posefit.silhouette.mask import Silhouette
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.tracker import ExemplarTracker
 

@@ -31,9 +31,8 @@ MOST = 4000
 
 
 def beam(states: list[int], yaws: list[float], totals: list[float] | None = None, places: Array | None = None) -> Beam:
-    many = len(states)
-    where = np.zeros((many, 3)) if places is None else places
-    return Beam(np.array(states), np.array(yaws), np.array(totals or [0.0] * many), where)
+    where = np.zeros((len(states), 3)) if places is None else places
+    return Beam(np.array(states), np.array(yaws), np.array(totals or [0.0] * len(states)), where)
 
 
 def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Array:

@@ -8,14 +8,7 @@ import pytest
 from posefit.geometry.skeleton import MIRROR
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit_exemplars.exemplars import (
-    MIN_FRAME_DISTANCE,
-    Exemplars,
-    Tiles,
-    about_vertical,
-    exemplars_of,
-    mirror_image,
-)
+from posefit_exemplars.exemplars import MIN_FRAME_DISTANCE, Exemplars, Tiles, about_vertical, exemplars_of, mirror_image
 from posefit_exemplars.kernels import DIMENSIONS, frames_apart, nearest_codes
 from tests.cases import each
 
@@ -91,7 +84,6 @@ def test_states_are_made_once_for_the_same_motions() -> None:
     made = exemplars_of([walk], SKELETON)
     assert exemplars_of([replace(walk, poses=walk.poses.copy())], SKELETON) is made
     moved, faster = replace(walk, translations=walk.translations + 1e-9), replace(walk, fps=60.0)
-    parts = ([walk.frames(0, k), walk.frames(k, 12)] for k in (4, 6))
-    for motions in ([moved], [faster], *parts):
+    for motions in ([moved], [faster], *([walk.frames(0, k), walk.frames(k, 12)] for k in (4, 6))):
         assert exemplars_of(motions, SKELETON) is not made
         made = exemplars_of(motions, SKELETON)

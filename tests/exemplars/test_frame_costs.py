@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit import Observation, Silhouette, facing, mirrored_poses, reflected_poses
 from posefit.fitting.contours import fitted, precisions
-from posefit.fitting.tracker import Observation
-from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.calibration import recalibrated, stored_calibration
@@ -21,18 +19,11 @@ from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
-SKELETON = average_skeleton()
-STILL = np.zeros(66)
-
-
-def samples(spread: float) -> Posterior:
-    poses = spread * np.random.default_rng(0).standard_normal((24, 66))
-    return Posterior(poses, np.zeros((24, 3)), np.ones(24))
-
 
 def recalibration(cost: float, usable: bool = True) -> Recalibration:
-    frame_costs: Any = SimpleNamespace(skeleton=SKELETON, camera_count=1, usable=usable)
-    return recalibrated(samples(0.1), STILL, cost, frame_costs).recalibration
+    frame_costs: Any = SimpleNamespace(skeleton=average_skeleton(), camera_count=1, usable=usable)
+    samples = Posterior(0.1 * np.random.default_rng(0).standard_normal((24, 66)), np.zeros((24, 3)), np.ones(24))
+    return recalibrated(samples, np.zeros(66), cost, frame_costs).recalibration
 
 
 def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> None:

@@ -7,17 +7,14 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit import Body, Camera, Observation, Silhouette, Task, project
 from posefit.arrays import Array
 from posefit.fitting.start import modes_apart
-from posefit.fitting.tracker import Observation, Task
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
-from posefit.silhouette.mask import Silhouette
 from posefit_exemplars.lookup import YAW_STEP, Lookup, looking_at
 from tests.cases import each
+from tests.geometry.turns import about
 
 WALK = built_in.motion("walk-a")
 BODY = Body.of(WALK.skeleton)
@@ -27,8 +24,7 @@ PLACE = np.array([0.0, 0.1, 0.0])
 
 def camera_at(azimuth: float, elevation: float = 0.0, roll: float = 0.0) -> Camera:
     straight = looking_at(azimuth, elevation)
-    cosine, sine = np.cos(roll), np.sin(roll)
-    rolled = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]) @ straight.rotation
+    rolled = about(2, roll) @ straight.rotation
     return Camera(160, 160, np.full(2, 200.0), np.full(2, 80.0), rolled, straight.translation)
 
 
@@ -51,8 +47,7 @@ def turned(seed: int) -> Array:
 
 def yaws_off(task: Task, observation: Observation, pose: Array) -> Array:
     """Return how far the yaws (modes,) of the modes of an observation are off, radians."""
-    posterior = Lookup(task).posterior(observation)
-    modes = modes_apart(BODY.skeleton, posterior)
+    modes = modes_apart(BODY.skeleton, Lookup(task).posterior(observation))
     return np.abs([float(wrapped(mode.poses[0, :1] - pose[0])[0]) for _, mode in modes])
 
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit.fitting.tracker import Frame
-from posefit.geometry.symmetry import mirrored_poses
+from posefit import Frame, mirrored_poses
 from posefit.uncertainty.modes import Posterior, unknown_sides
 from posefit_exemplars.lost_model import (
     EVIDENCE,
@@ -27,14 +26,13 @@ from tests.exemplars.conftest import Walk
 EVEN = LogisticModel([], np.empty(0), 0.0)  # a half for every frame
 
 
-def frame_of(walker: Walk, usable: bool = True) -> Frame:
+def frame_of(walker: Walk) -> Frame:
     """Return a frame that costs 4, whose mirror image costs 7 and whose reflections cost 9 and 6."""
     pose = walker.motion.poses[0]
     mirrored = mirrored_poses(walker.motion.skeleton, pose[None])[0]
     posterior = Posterior(np.array([pose, mirrored]), np.zeros((2, 3)), np.array([0.75, 0.25]))
-    details = {"usable": usable, "mirror_costs": np.array([7.0, 9.0, 6.0]) if usable else np.empty(0)}
-    areas = np.array([[30, 10, 70]])
-    return Frame(pose, np.zeros(3), 4.0, areas, 1, posterior=posterior, details=details)
+    details = {"usable": True, "mirror_costs": np.array([7.0, 9.0, 6.0])}
+    return Frame(pose, np.zeros(3), 4.0, np.array([[30, 10, 70]]), 1, posterior=posterior, details=details)
 
 
 def test_features_are_evidence_and_its_means_and_missing_evidence_is_the_last() -> None:
@@ -99,9 +97,7 @@ def test_sides_are_unknown_from_a_probability_on(walker: Walk, least: float, unk
         (2, [-0.1, 4.0], True),
     ],
 )
-def test_landmarks_of_legs_that_contradict_make_sides_unknown(
-    walker: Walk, cameras: int, odds: list[float], unknown: bool
-) -> None:
+def test_landmarks_of_legs_that_contradict_make_sides_unknown(walker: Walk, cameras, odds, unknown) -> None:
     classifier = FailureClassifier(EVEN, EVEN, 0.6)  # silhouettes call them known
     frame, task = frame_of(walker), replace(walker.task, cameras=list(walker.task.cameras)[:1] * cameras)
     details = {**frame.details, "sides": np.array(odds)}

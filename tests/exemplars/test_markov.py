@@ -7,22 +7,16 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit_exemplars.markov import FrameStates, SampledPaths, frame_states, mean_near, state_weights
+from posefit_exemplars.markov import SampledPaths, frame_states, mean_near, state_weights
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
 from posefit_exemplars.tracker import state_distances
 from tests.cases import each
 
 
-def window(costs: list[list[float]], steps: list[Array]) -> list[FrameStates]:
-    """Return frames whose states cost so much, joined by these costs of steps."""
-    frames: list[FrameStates] = []
-    for k, of_frame in enumerate(costs):
-        frames.append(frame_states(np.array(of_frame), frames[-1] if k else None, steps[k - 1] if k else None))
-    return frames
-
-
 def test_weights_are_finite_where_a_jump_costs_a_thousand() -> None:
-    frames = window([[0.0, 2000.0], [2000.0, 0.0], [0.0, 2000.0]], [np.full((2, 2), 1000.0)] * 2)
+    frames, jumps = [frame_states(np.array([0.0, 2000.0]))], np.full((2, 2), 1000.0)
+    for costs in ([2000.0, 0.0], [0.0, 2000.0]):
+        frames.append(frame_states(np.array(costs), frames[-1], jumps))
     for count in (1, 2, 3):
         weights = state_weights(frames[:count])
         assert np.isfinite(weights).all()
@@ -59,8 +53,8 @@ def test_a_steady_movement_stays_in_its_order(ahead: int) -> None:
     frames = list(smoothed((steady(k) for k in range(15)), 2.0, ahead))
     assert len(frames) == 15
     for k, frame in enumerate(frames):
-        np.testing.assert_allclose(frame.pose, 0.05 * k, atol=1e-12)
-        np.testing.assert_allclose(frame.place, [0.1 * k, 1.0, -k], atol=1e-12)
+        np.testing.assert_allclose(frame.pose, steady(k).pose, atol=1e-12)
+        np.testing.assert_allclose(frame.place, steady(k).place, atol=1e-12)
 
 
 def test_means_of_yaws_go_the_short_way_round() -> None:

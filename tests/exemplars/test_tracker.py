@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
-from posefit.testing import check_tracker
+from posefit.plugin import Array, check_tracker
 from posefit_exemplars import tracker
 from posefit_exemplars.tracker import MIN_EVALUATIONS, WRONG_YAW_COST, ExemplarTracker, yaw_costs
 from tests.cases import each

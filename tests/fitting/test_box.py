@@ -58,9 +58,8 @@ def test_a_scatter_is_feasible_and_redraws_only_what_is_not() -> None:
 
 
 def test_a_scatter_where_nothing_is_feasible_stays_at_its_means() -> None:
-    means = np.zeros((4, 2))
-    drawn = sample_normal(Toy(2, nowhere), np.random.default_rng(0), means, np.full(2, 0.1))
-    np.testing.assert_array_equal(drawn, means)
+    drawn = sample_normal(Toy(2, nowhere), np.random.default_rng(0), np.zeros((4, 2)), np.full(2, 0.1))
+    np.testing.assert_array_equal(drawn, np.zeros((4, 2)))
 
 
 def test_a_repair_moves_to_the_farthest_feasible_point_of_the_line() -> None:
@@ -73,12 +72,8 @@ def test_a_repair_moves_to_the_farthest_feasible_point_of_the_line() -> None:
 
 
 def test_a_repair_is_always_feasible() -> None:
-    homes = (
-        (anywhere, [0.0, 0.0]),
-        (ball, [0.1, 0.1]),
-        (shell, [0.3 + np.sqrt(0.1), 0.3 - np.sqrt(0.1)]),
-        (corner, [0.95, 0.95]),
-    )
+    on_shell = [0.3 + np.sqrt(0.1), 0.3 - np.sqrt(0.1)]
+    homes = (anywhere, [0.0, 0.0]), (ball, [0.1, 0.1]), (shell, on_shell), (corner, [0.95, 0.95])
     proposals = np.random.default_rng(0).normal(0.0, 3.0, (300, 2))
     before = proposals.copy()
     for rule, home in homes:
@@ -113,9 +108,11 @@ def test_a_draw_where_nothing_is_feasible_is_an_error() -> None:
 def test_moving_to_another_box_keeps_the_pose() -> None:
     motion = built_in.motion("walk-a")
     prior = PCA().fit(motion.poses[:, 3:])
-    old = SearchSpace(prior, np.zeros(3), np.radians([180.0, 15.0, 15.0]), np.array([0.0, 1.0, 0.0]), "searched")
-    new = SearchSpace(
-        prior, np.array([0.3, 0.0, 0.0]), np.radians([45.0, 15.0, 15.0]), np.array([0.1, 1.0, 0.0]), "searched"
+    old, new = (
+        SearchSpace(
+            prior, np.array([yaw, 0.0, 0.0]), np.radians([most, 15.0, 15.0]), np.array([x, 1.0, 0.0]), "searched"
+        )
+        for yaw, most, x in ((0.0, 180.0, 0.0), (0.3, 45.0, 0.1))
     )
     proposals = draw_population(old, np.random.default_rng(0), 200) * np.array([0.1] + [0.5] * 11)
     poses, places = old.decode(proposals)
@@ -138,5 +135,4 @@ def test_what_cannot_be_drawn_around_an_infeasible_mean_is_the_copy_of_a_feasibl
     drawn = draw_population(space, np.random.default_rng(0), 200)
     assert space.feasible(drawn).all()
     assert 10 < len(np.unique(drawn, axis=0)) < 60
-    asked = CMAES(space, np.random.default_rng(0)).ask()
-    assert space.feasible(asked).all()
+    assert space.feasible(CMAES(space, np.random.default_rng(0)).ask()).all()

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from cmaes import CMA
 
-from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.box import Start, displacement
 from posefit.fitting.cma import CMAES, Strategy
+from posefit.plugin import Array, Start, displacement
 from posefit.testing.toy import Toy, shell
 from tests.cases import each
 
@@ -27,14 +26,10 @@ def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) 
         costs = np.round(2.0 * costs) / 2.0 if ties else costs
         ours.learn(proposals, costs)
         theirs.tell(list(zip(proposals, costs.tolist(), strict=True)))
-        for mine, other in (
-            (ours.mean, theirs._mean),
-            (ours.covariance, theirs._C),
-            (ours.step_path, theirs._p_sigma),
-            (ours.path, theirs._pc),
-            (ours.sigma, theirs._sigma),
-        ):
-            np.testing.assert_allclose(mine, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+        mine = ours.mean, ours.covariance, ours.step_path, ours.path, ours.sigma
+        other = theirs._mean, theirs._C, theirs._p_sigma, theirs._pc, theirs._sigma
+        for one, same in zip(mine, other, strict=True):
+            np.testing.assert_allclose(one, same, rtol=1e-9, atol=1e-9 * np.abs(same).max())
         assert ours.ended() == theirs.should_stop()
         if ours.ended():
             return

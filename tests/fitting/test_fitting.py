@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
-from posefit.arrays import Array
-from posefit.fitting.box import displacement, draw_population
+from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise, project
 from posefit.fitting.optimiser import BudgetError
 from posefit.fitting.prior import Tilt
-from posefit.fitting.problem import align
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
+from posefit.plugin import Array, align, displacement, draw_population
 from posefit_priors.pca import PCA
 from tests.cases import each
 
@@ -35,9 +32,7 @@ def drawn(problem: PoseProblem, count: int) -> Array:
 
 
 @each(("translation", "tilted"), [("known", False), ("searched", True), ("aligned", False)])
-def test_a_cost_has_the_same_bits_whatever_stands_beside_it(
-    problem: PoseProblem, translation: str, tilted: bool
-) -> None:
+def test_a_cost_has_the_same_bits_whatever_is_beside_it(problem: PoseProblem, translation: str, tilted: bool) -> None:
     tilt = Tilt.of(problem.space.prior, [built_in.motion("walk-a")], 0.99, 0.1) if tilted else None
     problem = replace(problem, space=replace(problem.space, translation=translation, tilt=tilt))
     proposals = drawn(problem, 1000)
@@ -54,9 +49,7 @@ def test_a_cost_has_the_same_bits_whatever_stands_beside_it(
 
 
 @each("threads", [1, 2])
-def test_a_search_gets_the_costs_of_the_areas_without_views_that_know_nothing(
-    problem: PoseProblem, threads: int
-) -> None:
+def test_a_search_gets_the_costs_of_areas_without_views_that_know_nothing(problem: PoseProblem, threads: int) -> None:
     whole = problem.silhouettes[0]
     half = Silhouette.of(whole.mask, np.ones_like(whole.mask) & (np.arange(whole.size[0]) < 80))
     blind = Silhouette.of(np.zeros_like(whole.mask), np.zeros_like(whole.mask))
@@ -131,8 +124,8 @@ def test_aligning_near_a_camera_is_that_of_a_slow_twin(azimuths: tuple[float, ..
     cameras = [Camera.around(WALK.translations[0], angle, 1.5, (160, 120), field_of_view=1.9) for angle in azimuths]
     poses, places = WALK.poses[::3], WALK.translations[::3]
     silhouettes = [Silhouette.of(project(BODY, camera, poses[0], places[0])) for camera in cameras]
-    aligned = align(BODY, cameras, silhouettes, poses, places + [0.15, -0.1, 0.2])
-    for place, pose, start in zip(aligned, poses, places + [0.15, -0.1, 0.2], strict=True):
+    starts = places + [0.15, -0.1, 0.2]
+    for place, pose, start in zip(align(BODY, cameras, silhouettes, poses, starts), poses, starts, strict=True):
         expected = slowly_aligned(cameras, silhouettes, WALK.skeleton.joints(pose), start)
         np.testing.assert_allclose(place, expected, atol=1e-5)
 
@@ -148,10 +141,11 @@ def test_mistakes_are_named(problem: PoseProblem) -> None:
         ):
             with pytest.raises(ValueError, match=message):
                 shared.evaluate(proposals)
-    space, empty = problem.space, Silhouette.of(np.zeros((120, 160)))
+    space, nowhere = problem.space, np.zeros(3)
+    empty, lying = Silhouette.of(np.zeros((120, 160))), Silhouette.of(np.ones((160, 120)))
     for call, message in (
         (
-            lambda: replace(problem, silhouettes=[Silhouette.of(np.ones((160, 120)))] * 2),
+            lambda: replace(problem, silhouettes=[lying] * 2),
             r"mask must have shape \(120, 160\), the camera's, got \(160, 120\)",
         ),
         (lambda: replace(problem, silhouettes=[]), r"silhouettes must be one a camera \(2\), got 0"),
@@ -159,11 +153,8 @@ def test_mistakes_are_named(problem: PoseProblem) -> None:
         (lambda: replace(space, translation="free"), "translation must be one of known, searched, aligned, got 'free'"),
         (lambda: replace(space, root_range=-np.ones(3)), r"root_range must be 3 numbers of 0 or more, got \[-1.0, "),
         (lambda: replace(space, translation_range=-np.ones(3)), "translation_range must be 3 numbers of 0 or more"),
-        (lambda: Camera.around(np.zeros(3), 0.0, -1.0, (64, 48)), "distance must be 0 or more metres, got -1.0"),
-        (
-            lambda: Camera.around(np.zeros(3), 0.0, 3.0, (64, 48), 4.0),
-            "field_of_view must lie between 0 and pi radians",
-        ),
+        (lambda: Camera.around(nowhere, 0.0, -1.0, (64, 48)), "distance must be 0 or more metres, got -1.0"),
+        (lambda: Camera.around(nowhere, 0.0, 3.0, (64, 48), 4.0), "field_of_view must lie between 0 and pi radians"),
         (lambda: minimise(lambda x: x[1:, 0], Walker(7), 40), r"an array of costs of shape \(7,\), got shape \(6,\)"),
         (lambda: minimise(lambda x: x[:, 0].tolist(), Walker(7), 40), r"an array of costs of shape \(7,\), got list"),
     ):

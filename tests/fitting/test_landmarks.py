@@ -34,7 +34,7 @@ CAMERA = Camera.around(WALK.translations[3], 1.2, 4.0, (160, 120))
 
 def landmarks_of(confidence: float, joints: tuple[str, ...] = JOINTS) -> Array:
     """Return landmarks (1, 27, 3) where some joints of a frame are."""
-    pixels, _ = CAMERA.project(WALK.skeleton.joints(WALK.poses[3:4], WALK.translations[3:4])[0])
+    pixels, _ = CAMERA.project(WALK.joints[3])
     return np.column_stack([pixels, [confidence * (joint in joints) for joint in JOINTS]])[None]
 
 
@@ -57,10 +57,8 @@ def test_landmarks_at_the_joints_cost_least_and_as_little_as_their_sides_are_cer
 
 
 def test_one_joint_off_by_hand() -> None:
-    landmarks = landmarks_of(0.5, ("lradius",))
-    wrist = JOINTS.index("lradius")
-    joints = WALK.skeleton.joints(WALK.poses[3:4], WALK.translations[3:4])[0]
-    pixels, depths = CAMERA.project(joints)
+    landmarks, wrist = landmarks_of(0.5, ("lradius",)), JOINTS.index("lradius")
+    pixels, depths = CAMERA.project(WALK.joints[3])
     metre = np.sqrt(CAMERA.focal.prod()) / depths
     landmarks[0, wrist, 0] += 3.0 * DEVIATION * metre[wrist]  # three deviations to the side
     other = np.linalg.norm(landmarks[0, wrist, :2] - pixels[MIRROR[wrist]]) / metre[MIRROR[wrist]] / DEVIATION

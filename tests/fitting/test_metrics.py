@@ -41,8 +41,7 @@ def test_chosen_angles_alone_count() -> None:
 def test_the_pose_error_is_a_distance_of_directions(seed: int, turns: int) -> None:
     a, b, c = np.random.default_rng(seed).uniform(-4.0, 4.0, (3, 2, 66))
     error = metrics.pose_error_degrees(a, b)
-    assert (error >= 0.0).all()
-    assert (error <= 180.0).all()
+    assert ((error >= 0.0) & (error <= 180.0)).all()
     np.testing.assert_allclose(metrics.pose_error_degrees(b, a), error)
     np.testing.assert_allclose(metrics.pose_error_degrees(a + 2.0 * np.pi * turns, b), error)
     np.testing.assert_allclose(metrics.pose_error_degrees(a, a), 0.0)
@@ -61,9 +60,8 @@ def test_two_names_of_one_rotation_are_no_geodesic_error() -> None:
     rng = np.random.default_rng(1)
     truth = rng.uniform(-1.0, 1.0, (4, 66))
     estimate = truth.copy()
-    estimate[:, 3::3] += np.pi
+    estimate[:, 3:] += np.pi
     estimate[:, 4::3] = np.pi - truth[:, 4::3]
-    estimate[:, 5::3] += np.pi
     np.testing.assert_allclose(metrics.geodesic_degrees(truth, estimate), 0.0, atol=1e-5)
     assert metrics.pose_error_degrees(truth, estimate).min() > 90.0
 

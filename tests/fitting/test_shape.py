@@ -5,16 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from posefit import Camera, Frame, Observation, Silhouette, pose_costs, project
 from posefit.fitting import shape
 from posefit.fitting.problem import align
 from posefit.fitting.shape import COVARIANCE, GIRTHS, LENGTHS, NAMES, PULL, Shape, fit_shape, shaped
-from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body, varied
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
-from posefit.silhouette.cost import pose_costs, project
-from posefit.silhouette.mask import Silhouette
 
 AVERAGE = Body.of(built_in.average_skeleton())
 WALK = built_in.motion("walk", frames=40).frames(0, 40)
@@ -27,10 +24,8 @@ def frames_at(places: Sequence[np.ndarray]) -> list[Frame]:
 
 
 def observed(body: Body, cameras: list[Camera]) -> list[Observation]:
-    return [
-        Observation([Silhouette.of(project(body, camera, pose, where)) for camera in cameras])
-        for pose, where in zip(POSES, PLACES, strict=True)
-    ]
+    placed = zip(POSES, PLACES, strict=True)
+    return [Observation([Silhouette.of(project(body, camera, *at)) for camera in cameras]) for at in placed]
 
 
 def test_every_bone_belongs_to_one_group_of_lengths_and_one_of_girths() -> None:
@@ -41,15 +36,11 @@ def test_every_bone_belongs_to_one_group_of_lengths_and_one_of_girths() -> None:
 
 
 def test_factors_multiply_what_they_name() -> None:
-    factors = np.ones(len(NAMES))
-    factors[NAMES.index("scale")] = 1.1
-    factors[NAMES.index("thighs length")] = 0.9
-    factors[NAMES.index("arms girth")] = 1.2
-    made = shaped(AVERAGE, factors)
+    changed = {"scale": 1.1, "thighs length": 0.9, "arms girth": 1.2}
+    made = shaped(AVERAGE, np.array([changed.get(name, 1.0) for name in NAMES]))
     ratio = made.skeleton.lengths / AVERAGE.skeleton.lengths
-    assert ratio[BONES.index("lfemur")] == pytest.approx(0.99)
-    assert ratio[BONES.index("rfemur")] == pytest.approx(0.99)
-    assert ratio[BONES.index("ltibia")] == pytest.approx(1.1)
+    thighs_and_shank = [BONES.index(bone) for bone in ("lfemur", "rfemur", "ltibia")]
+    assert ratio[thighs_and_shank] == pytest.approx([0.99, 0.99, 1.1])
     wide = made.radii / AVERAGE.radii
     np.testing.assert_allclose(wide[BONES.index("lradius")], 1.32)
     np.testing.assert_allclose(wide[BONES.index("thorax")], 1.1)
@@ -77,17 +68,14 @@ def test_varied_people_are_symmetric_and_within_their_percentage() -> None:
 
 
 def test_a_build_is_estimated_where_the_poses_are_known() -> None:
-    rng = np.random.default_rng(5)
-    true = varied(AVERAGE, 10.0, rng).scaled(1.06, 1.06)
-    middle = WALK.translations.mean(axis=0)
+    true = varied(AVERAGE, 10.0, np.random.default_rng(5)).scaled(1.06, 1.06)
+    middle, rng = WALK.translations.mean(axis=0), np.random.default_rng(0)
     cameras = [Camera.around(middle, azimuth, 3.5, (320, 240)) for azimuth in (0.0, np.pi / 2)]
     frames, observations = frames_at(PLACES), observed(true, cameras)
-    rng = np.random.default_rng(0)
     shape = fit_shape(AVERAGE, cameras, observations, lambda _: frames, rng, aligned=False)
     assert shape.body.stature == pytest.approx(true.stature, rel=0.03)
-    for bone in ("lfemur", "ltibia", "lhumerus"):
-        k = BONES.index(bone)
-        assert shape.body.skeleton.lengths[k] == pytest.approx(true.skeleton.lengths[k], rel=0.06)
+    limbs = [BONES.index(bone) for bone in ("lfemur", "ltibia", "lhumerus")]
+    assert shape.body.skeleton.lengths[limbs] == pytest.approx(true.skeleton.lengths[limbs], rel=0.06)
 
 
 def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
@@ -119,7 +107,5 @@ def test_a_camera_that_knows_nothing_does_not_count_and_beta_does(monkeypatch: p
     np.testing.assert_array_equal(both.factors, alone.factors)
     missed = fit(1, observations, beta=1.0)
     rows = zip(observations, POSES[:, None], PLACES[:, None], strict=True)
-    costs = [
-        pose_costs(missed.body, cameras[:1], views.silhouettes, pose, place, 1.0)[0] for views, pose, place in rows
-    ]
+    costs = [pose_costs(missed.body, cameras[:1], seen.silhouettes, *placed, 1.0)[0] for seen, *placed in rows]
     assert missed.cost == pytest.approx(np.mean(costs))

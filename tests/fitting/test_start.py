@@ -6,14 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 
 import posefit
-from posefit.fitting.box import Start, draw_population
-from posefit.fitting.problem import PoseProblem
-from posefit.fitting.space import SearchSpace
+from posefit import PoseProblem, SearchSpace
 from posefit.fitting.start import MODE_SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
+from posefit.plugin import Posterior, Start, draw_population
 from posefit.testing.toy import Toy
-from posefit.uncertainty.modes import Posterior
 
 WALK = built_in.motion("walk-a", frames=40)
 PRIOR = posefit.prior("pca")().fit(WALK.poses[:, 3:], WALK.skeleton)
@@ -27,16 +25,13 @@ def weighted(rows: list[int], turns: list[float], weights: list[float]) -> Poste
 
 
 def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
-    count, means, spreads, weights = 4000, [-0.5, 0.5], [0.02, 0.05], [0.75, 0.25]
-    modes = [
-        Start(np.full(3, mean), np.full(3, spread), np.zeros(3), weight)
-        for mean, spread, weight in zip(means, spreads, weights, strict=True)
-    ]
-    drawn = draw_population(Toy(3, start=replace(modes[0], others=modes[1:])), np.random.default_rng(0), count)
+    count, parts = 4000, ((-0.5, 0.02, 0.75), (0.5, 0.05, 0.25))
+    start, other = (Start(np.full(3, mean), np.full(3, spread), np.zeros(3), weight) for mean, spread, weight in parts)
+    drawn = draw_population(Toy(3, start=replace(start, others=[other])), np.random.default_rng(0), count)
     first = drawn[:, 0] < 0.0
     # binomial, of standard deviation sqrt(p q / n); a mean's error is spread / sqrt(n), that of a spread over sqrt(2)
     assert abs(first.mean() - 0.75) < 4.0 * np.sqrt(0.75 * 0.25 / count)
-    for rows, mean, spread in ((first, -0.5, 0.02), (~first, 0.5, 0.05)):
+    for rows, (mean, spread, _) in ((first, parts[0]), (~first, parts[1])):
         error = 4.0 * spread / np.sqrt(rows.sum())
         np.testing.assert_allclose(drawn[rows].mean(axis=0), mean, atol=error)
         np.testing.assert_allclose(drawn[rows].std(axis=0), spread, atol=error)
@@ -44,13 +39,10 @@ def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
 
 def problem_of(row: int, turn: float) -> PoseProblem:
     """Return the problem whose silhouette is of one of the walker's poses, turned."""
-    body = posefit.Body.of(WALK.skeleton)
-    camera = posefit.Camera.around(WALK.translations[row], 0.3, 5.0, (160, 120))
-    pose = WALK.poses[row].copy()
-    pose[0] += turn
-    mask = posefit.project(body, camera, pose, WALK.translations[row])
-    space = replace(SPACE, anchor=WALK.translations[row])
-    return PoseProblem(body, [camera], [posefit.Silhouette.of(mask)], space)
+    body, place = posefit.Body.of(WALK.skeleton), WALK.translations[row]
+    camera = posefit.Camera.around(place, 0.3, 5.0, (160, 120))
+    mask = posefit.project(body, camera, WALK.poses[row] + turn * np.eye(66)[0], place)
+    return PoseProblem(body, [camera], [posefit.Silhouette.of(mask)], replace(SPACE, anchor=place))
 
 
 def test_modes_are_projected_onto_the_latents_of_the_prior_and_weighed_by_their_costs_there() -> None:

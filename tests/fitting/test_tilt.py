@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit import SearchSpace, Task
+from posefit import Body, Motion, SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.prior import Tilt
 from posefit.fitting.tracker import Observation, Prediction, Predictor, SynthesisTracker
-from posefit.geometry.body import Body
 from posefit.motion import built_in
-from posefit.motion.motion import Motion
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_priors.pca import PCA
@@ -53,9 +51,9 @@ def test_bent_hips_tilt_as_in_training() -> None:
 def test_latents_that_training_never_had_tilt_no_farther_than_training() -> None:
     hip = np.linspace(-0.1, 0.1, 50)
     tilt = Tilt.of(Line(), [bending(4.0 * hip, 0.0 * hip, hip)], 1.0, 0.0)
-    least, most = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]]))[0][:, 1]
-    assert [least, most] == pytest.approx(tilt.mean[:2, 0])
-    assert most < 0.4
+    pitches = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]]))[0][:, 1]
+    assert pitches == pytest.approx(tilt.mean[:2, 0])
+    assert pitches[1] < 0.4
 
 
 @each("turns", [0, 1, -2])
@@ -72,9 +70,8 @@ def test_a_turn_over_in_training_may_be_repeated() -> None:
     predictor = Predictor(task_of(cartwheel), Line(), Prediction())
     space = predictor.space(NOTHING)
     assert space.periodic.tolist() == [False, False, True, False]
-    rolls = []
+    rolls, proposal = [], np.array([0.0, 0.0, 0.9, 0.0])
     for _ in range(50):  # as far as it goes to one side, from frame to frame
-        proposal = np.array([0.0, 0.0, 0.9, 0.0])
         predictor.commit(proposal)
         rolls.append(space.decode(proposal[None])[0][0, 2])
         space = predictor.space(NOTHING)
@@ -84,11 +81,10 @@ def test_a_turn_over_in_training_may_be_repeated() -> None:
 
 
 def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
-    rng = np.random.default_rng(0)
-    rolling = bending(np.zeros(500), rng.uniform(-1.0, 1.0, 500))
-    predictor = Predictor(task_of(rolling), Line(), Prediction(), Tilt.of(Line(), [rolling], 1.0, 0.0))
+    rolling = bending(np.zeros(500), np.random.default_rng(0).uniform(-1.0, 1.0, 500))
+    tilt = Tilt.of(Line(), [rolling], 1.0, 0.0)
+    predictor = Predictor(task_of(rolling), Line(), Prediction(), tilt)
     space = predictor.space(NOTHING)
-    tilt = space.tilt
     np.testing.assert_allclose(space.centre[2] + np.array([-1.0, 1.0]) * space.half[2], [tilt.low[1], tilt.high[1]])
     centres = []
     for roll in (0.5, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0):

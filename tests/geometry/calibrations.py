@@ -50,6 +50,7 @@ def opencv(path: Path, placed: bool = True) -> Path:
 
 ROTATION = cv2.Rodrigues(np.array([1.4, 0.3, -0.2]))[0]  # a camera that looks along a z-up world's ground
 TRANSLATION = np.array([0.3, 1.1, 4.2])
+POSE = ROTATION, TRANSLATION
 K = [[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]]
 LENS = [0.12, -0.05, 0.001, 0.002, 0.01]
 
@@ -62,22 +63,18 @@ def matrix_text(name: str, values: object) -> str:
 
 PLACED = {"rotation": cv2.Rodrigues(ROTATION)[0].tolist(), "translation": TRANSLATION[:, None].tolist()}  # columns
 ENTRY = f"size = [640, 480]\nmatrix = {K}\ndistortions = {LENS}\nrotation = {PLACED['rotation']}\ntranslation = {PLACED['translation']}\nfisheye = false\n"
-YAML_24 = (
-    "%YAML:1.0\nimage_Width: 640\nimage_Height: 480\n"
-    + matrix_text("Camera_Matrix", K)
-    + matrix_text("Distortion_Coefficients", LENS)
-)
-INTRI = (
-    '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n'
-    + matrix_text("K_left", K)
-    + matrix_text("dist_left", LENS)
-    + matrix_text("K_right", K)
-    + matrix_text("dist_right", np.zeros(5))
-)
-EXTRI = '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n' + "".join(
-    matrix_text(f"{kind}_{name}", value)
-    for name in ("left", "right")
-    for kind, value in (("R", PLACED["rotation"]), ("Rot", ROTATION), ("T", PLACED["translation"]))
+LEFT_RIGHT = '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n'
+WRITTEN = {"R": PLACED["rotation"], "Rot": ROTATION, "T": PLACED["translation"]}
+
+
+def matrices(**values: object) -> str:
+    return "".join(matrix_text(name, value) for name, value in values.items())
+
+
+YAML_24 = "%YAML:1.0\nimage_Width: 640\nimage_Height: 480\n" + matrices(Camera_Matrix=K, Distortion_Coefficients=LENS)
+INTRI = LEFT_RIGHT + matrices(K_left=K, dist_left=LENS, K_right=K, dist_right=np.zeros(5))
+EXTRI = LEFT_RIGHT + "".join(
+    matrix_text(f"{kind}_{name}", value) for name in ("left", "right") for kind, value in WRITTEN.items()
 )
 ROS = (
     "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
@@ -92,7 +89,7 @@ ROS_MESSAGE = (
 KINDS = {
     "caliscope.toml": f"[charuco]\ncolumns = 4\n[cameras.0]\ncam_id = 0\n{ENTRY}[cameras.1]\nignore = true\n",
     "pose2sim.toml": f"[cam_01]\nname = 'cam_01'\n{ENTRY}[metadata]\nadjusted = false\n",
-    "opencv24.yml": YAML_24 + matrix_text("R", ROTATION) + matrix_text("T", PLACED["translation"]),
+    "opencv24.yml": YAML_24 + matrices(R=ROTATION, T=PLACED["translation"]),
     "tutorial.json": json.dumps({"mtx": K, "dist": [LENS], "R": ROTATION.tolist(), "tvec": PLACED["translation"]}),
     "several.json": json.dumps({"cameras": [{"name": "a", "K": K, "dist_coeff": LENS, "image_size": [640, 480], "R": ROTATION.tolist(), "t": TRANSLATION.tolist()}]}),
     "numbered.yaml": "w: 640\nh: 480\nfx: 500\nfy: 510\ncx: 319.5\ncy: 239.5\nk1: 0.12\nk2: -0.05\np1: 0.001\np2: 0.002\nk3: 0.01\n" + matrix_text("R", ROTATION) + matrix_text("T", TRANSLATION),

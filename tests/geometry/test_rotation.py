@@ -67,11 +67,9 @@ def test_a_side_view_is_not_degenerate(yaw: float, pitch: float, roll: float) ->
 @given(turns, tilts, turns)
 def test_angles_come_back(first: float, middle: float, last: float) -> None:
     angles = np.array([first, middle, last])
-    for there, back in (
-        (rotation_from_root_angles, root_angles_from_rotation),
-        (rotation_from_joint_angles, joint_angles_from_rotation),
-    ):
-        np.testing.assert_allclose(wrapped(back(there(angles)) - angles), 0.0, rtol=0.0, atol=1e-9)
+    of_root = root_angles_from_rotation(rotation_from_root_angles(angles))
+    of_joint = joint_angles_from_rotation(rotation_from_joint_angles(angles))
+    np.testing.assert_allclose(wrapped(np.array([of_root, of_joint]) - angles), 0.0, rtol=0.0, atol=1e-9)
 
 
 @each("roll", [0.0, 0.7, -2.0])
@@ -89,10 +87,8 @@ def test_the_geodesic_of_a_turn_about_one_axis_is_its_angle(angle: float, axis: 
 
 
 def test_wrapping_by_hand() -> None:
-    angles = np.radians([0.0, 180.0, -180.0, 190.0, -190.0, 540.0, 725.0])
-    np.testing.assert_allclose(
-        np.degrees(wrapped(angles)), [0.0, -180.0, -180.0, -170.0, 170.0, -180.0, 5.0], atol=1e-9
-    )
+    angles = np.degrees(wrapped(np.radians([0.0, 180.0, -180.0, 190.0, -190.0, 540.0, 725.0])))
+    np.testing.assert_allclose(angles, [0.0, -180.0, -180.0, -170.0, 170.0, -180.0, 5.0], atol=1e-9)
 
 
 def test_quaternions_are_scipys_and_do_not_jump() -> None:

@@ -96,5 +96,4 @@ def test_limbs_that_are_none_are_a_mistake() -> None:
 
 def test_facing_is_the_yaw_of_who_looks_at_the_camera() -> None:
     place = np.array([1.0, 0.0, 2.0])
-    camera = Camera.around(place, 0.7, 4.0, (160, 120))
-    assert facing(camera, place) == pytest.approx(0.7)
+    assert facing(Camera.around(place, 0.7, 4.0, (160, 120)), place) == pytest.approx(0.7)

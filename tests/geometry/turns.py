@@ -11,18 +11,16 @@ from posefit.geometry.skeleton import PARENTS
 def about(axis: int, angle: float) -> Array:
     """Return the rotation about x, y or z by radians."""
     c, s = np.cos(angle), np.sin(angle)
-    return np.array(
-        [
-            [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]],
-            [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]],
-            [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]],
-        ][axis]
-    )
+    x = [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]
+    y = [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
+    z = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+    return np.array((x, y, z)[axis])
 
 
-def chained(
-    root: Array, place: Array, turns: Sequence[Array], axes: Sequence[Array], offsets: Sequence[Array]
-) -> Array:
+Arrays = Sequence[Array]
+
+
+def chained(root: Array, place: Array, turns: Arrays, axes: Arrays, offsets: Arrays) -> Array:
     """Return joints (27, 3) straight from Acclaim's definition: a bone's local rotation is C M C^-1.
 
     C is its axis and M its motion; its end is its start plus its offset.

@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from posefit import JOINTS, Motion
 from posefit.arrays import Array
 from posefit.geometry.rotation import shortest_turn
-from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.segments import bone_rotations
-from posefit.motion.motion import Motion
 from tests.geometry.turns import about
 
 BONES = {  # of each joint of a rig: after which of posefit's joints its bone starts, and which bone it turns as
@@ -139,10 +138,8 @@ def write_rig(
     def add(role: str, side: str, parent: int) -> int:
         letter = side[:1].lower()
         starts, turning = (JOINTS.index(name.format(letter)) for name in (joint_after(role, style), BONES[role][1]))
-        axes = _axes(rest, role, skeleton.offsets[turning - 1])
-        joints.append(
-            _Joint(side + role, style.names[role].format(side), parent, turns[:, turning], at_rest[starts], axes)
-        )
+        axes, name = _axes(rest, role, skeleton.offsets[turning - 1]), style.names[role].format(side)
+        joints.append(_Joint(side + role, name, parent, turns[:, turning], at_rest[starts], axes))
         numbers[side + role] = len(joints) - 1
         return len(joints) - 1
 
@@ -167,12 +164,9 @@ def write_rig(
     if style.no_ends:
         for joint in joints:
             joint.tip = None
+    around = np.eye(3) if world is None else world
     turned = [joint.turn @ joint.axes for joint in joints]
-    if world is not None:
-        turned = [
-            turn if joint.parent < 0 and style.above else world @ turn
-            for joint, turn in zip(joints, turned, strict=True)
-        ]
+    turned = [turned[0] if style.above else around @ turned[0], *(around @ turn for turn in turned[1:])]
     lines, columns = ["HIERARCHY"], list[Array]()
 
     def visit(number: int, depth: int) -> None:
@@ -182,13 +176,10 @@ def write_rig(
         moves = joint.role == "hips" or style.positions
         channels = "Xposition Yposition Zposition " if moves else ""
         channels += " ".join(f"{axis}rotation" for axis in style.order)
-        lines.append(f"{tab}{'ROOT' if above is None else 'JOINT'} {joint.name}")
-        lines.extend(
-            [f"{tab}{{", f"{tab}\tOFFSET {_spaced(offset)}", f"{tab}\tCHANNELS {6 if moves else 3} {channels}"]
-        )
+        lines.extend([f"{tab}{'ROOT' if above is None else 'JOINT'} {joint.name}", f"{tab}{{"])
+        lines.extend([f"{tab}\tOFFSET {_spaced(offset)}", f"{tab}\tCHANNELS {6 if moves else 3} {channels}"])
         if joint.role == "hips":
-            roots = scale * motion.translations
-            columns.append(roots if world is None else roots @ world.T)
+            columns.append(scale * motion.translations @ around.T)
         elif moves:
             columns.append(np.tile(offset, (len(motion), 1)))
         local = turned[number] if above is None else np.swapaxes(turned[joint.parent], 1, 2) @ turned[number]

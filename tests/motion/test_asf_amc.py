@@ -1,5 +1,6 @@
 """Acclaim files: real ones against a slow reader of the same text, small ones against numbers worked by hand."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,15 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posefit import Body, Motion
 from posefit.arrays import Array
-from posefit.geometry.body import Body
 from posefit.geometry.rotation import geodesic, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Skeleton, angle_index
 from posefit.geometry.units import CMU_UNIT
 from posefit.motion import recorded
 from posefit.motion.amc import read_amc, read_clip, write_amc
 from posefit.motion.asf import parse_asf, write_asf
-from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about, chained
 
@@ -57,9 +57,8 @@ def amc_text(*frames: str) -> str:
 
 @pytest.fixture
 def skeleton(tmp_path: Path) -> Skeleton:
-    path = tmp_path / "small.asf"
-    path.write_text(asf_text())
-    return parse_asf(path).skeleton
+    (tmp_path / "small.asf").write_text(asf_text())
+    return parse_asf(tmp_path / "small.asf").skeleton
 
 
 def amc_file(folder: Path, text: str) -> Path:
@@ -145,7 +144,7 @@ def test_mistakes_in_a_skeleton_are_named(tmp_path: Path, before: str, after: st
     path.write_text(asf_text().replace(before, after, 1))
     with pytest.raises(ValueError, match="expected|needs") as caught:
         parse_asf(path)
-    assert str(tmp_path / "small.asf") in str(caught.value)
+    assert str(path) in str(caught.value)
     assert message in str(caught.value)
 
 
@@ -173,10 +172,8 @@ def test_line_ends_blank_lines_and_comments_make_no_difference(skeleton: Skeleto
 
 
 def test_angles_are_unwrapped_along_time(skeleton: Skeleton, tmp_path: Path) -> None:
-    frames = [
-        FRAME.replace("ltibia 40", f"ltibia {(50 * k + 180) % 360 - 180}").replace("0 90 0", f"0 {-60 * k} 0")
-        for k in range(20)
-    ]
+    turning = FRAME.replace("ltibia 40", "ltibia {}").replace("0 90 0", "0 {} 0")
+    frames = [turning.format(-60 * k, (50 * k + 180) % 360 - 180) for k in range(20)]
     motion = read_amc(amc_file(tmp_path, amc_text(*frames)), skeleton)
     np.testing.assert_allclose(angles_of(motion, "ltibia")[:, 0], 50 * np.arange(20), atol=1e-9)
     np.testing.assert_allclose(np.degrees(motion.poses[:, 0]), -60 * np.arange(20), atol=1e-9)
@@ -195,9 +192,7 @@ def test_angles_are_unwrapped_along_time(skeleton: Skeleton, tmp_path: Path) -> 
         ("\n1\n", "\n" + "1" * 10_001 + "\n", ":4: expected a line of at most 10000 bytes, got a longer one"),
     ],
 )
-def test_mistakes_in_a_motion_are_named(
-    skeleton: Skeleton, tmp_path: Path, before: str, after: str, message: str
-) -> None:
+def test_mistakes_in_a_motion_are_named(skeleton: Skeleton, tmp_path: Path, before, after, message) -> None:
     assert before in amc_text()
     path = amc_file(tmp_path, amc_text().replace(before, after, 1))
     with pytest.raises(ValueError, match="expected") as caught:
@@ -217,7 +212,6 @@ def test_what_a_file_cannot_hold_is_not_written(skeleton: Skeleton, tmp_path: Pa
 def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("acclaim")
     (folder / "small.asf").write_text(asf_text())
-    (folder / "clip.amc").write_text(amc_text())
     return folder
 
 
@@ -228,58 +222,57 @@ def test_any_motion_survives_writing(workshop: Path, seed: int, frames: int) -> 
     motion = Motion("any", skeleton, poses, rng.normal(size=(frames, 3)), 120.0)
     write_amc(workshop / "any.amc", motion)
     again = read_amc(workshop / "any.amc", skeleton)
-    assert geodesic(
-        rotation_from_root_angles(again.poses[:, :3]), rotation_from_root_angles(motion.poses[:, :3])
-    ).max() < 1e-7  # fmt: skip
+    roots = (rotation_from_root_angles(one.poses[:, :3]) for one in (again, motion))
+    assert geodesic(*roots).max() < 1e-7
     np.testing.assert_allclose(again.poses, motion.poses, atol=1e-9)
     np.testing.assert_allclose(again.translations, motion.translations, atol=1e-9)
 
 
+def written(folder: Path, motion: Motion) -> tuple[Path, Path]:
+    """Write a motion, and return its two files."""
+    asf, amc = folder / "a.asf", folder / "a.amc"
+    write_asf(asf, motion.skeleton)
+    write_amc(amc, motion)
+    return asf, amc
+
+
 def test_the_rate_is_the_files_own_or_given_or_assumed_and_said(tmp_path: Path) -> None:
     walk = replace(recorded.clip("16_15").motion().frames(0, 30), fps=60000 / 1001)
-    write_asf(tmp_path / "a.asf", walk.skeleton)
-    write_amc(tmp_path / "a.amc", walk)
-    again = read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+    asf, amc = written(tmp_path, walk)
+    again = read_clip(asf, amc)
     assert (again.fps, again.notes, len(again.resampled(30.0))) == (walk.fps, (), 15)
-    assert read_clip(tmp_path / "a.asf", tmp_path / "a.amc", fps=50.0).fps == 50.0
-    text = (tmp_path / "a.amc").read_text()
-    (tmp_path / "a.amc").write_text(text.partition("\n")[2])
-    assumed = read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+    assert read_clip(asf, amc, fps=50.0).fps == 50.0
+    text = amc.read_text()
+    amc.write_text(text.partition("\n")[2])
+    assumed = read_clip(asf, amc)
     assert assumed.fps == 120.0
-    assert assumed.notes == (
-        f"{tmp_path / 'a.amc'}: the file does not state its rate: 120 frames a second are assumed; --rate sets it",
-    )
-    (tmp_path / "a.amc").write_text("# 1e9 frames a second\n" + text)
+    why = "the file does not state its rate: 120 frames a second are assumed; --rate sets it"
+    assert assumed.notes == (f"{amc}: {why}",)
+    amc.write_text("# 1e9 frames a second\n" + text)
     with pytest.raises(ValueError, match=r"a.amc:1: expected .*got"):
-        read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+        read_clip(asf, amc)
 
 
 @each("stated", ["  length 1.0\n", "  length 0.001\n", None])
 def test_a_unit_that_makes_no_person_is_recognised_and_said(tmp_path: Path, stated: str | None) -> None:
     walk = recorded.clip("16_15").motion().frames(0, 4)
-    write_asf(tmp_path / "a.asf", walk.skeleton)
-    write_amc(tmp_path / "a.amc", walk)
-    assert read_clip(tmp_path / "a.asf", tmp_path / "a.amc").notes == ()
-    text = (tmp_path / "a.asf").read_text()
-    length = next(line for line in text.splitlines(keepends=True) if line.strip().startswith("length"))
+    asf, amc = written(tmp_path, walk)
+    assert read_clip(asf, amc).notes == ()
+    text = asf.read_text()
     if stated is None:
-        start, rest = text.split(":units\n")
-        text = start + rest[rest.index(":root") :]
+        text = re.sub(":units\n.*?(?=:root)", "", text, flags=re.DOTALL)
     else:
-        text = text.replace(length, stated, 1)
-    (tmp_path / "a.asf").write_text(text)
-    motion = read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+        text = re.sub(r"^ *length.*\n", stated, text, count=1, flags=re.MULTILINE)
+    asf.write_text(text)
+    motion = read_clip(asf, amc)
     np.testing.assert_allclose(motion.joints, walk.joints, atol=1e-9)
     (note,) = motion.notes
     assert "the CMU database's unit (5.64 cm): 1.7" in note
-    assert Body.of(parse_asf(tmp_path / "a.asf", "inch").skeleton).stature == pytest.approx(
-        0.45 * Body.of(walk.skeleton).stature
-    )
+    in_inches = Body.of(parse_asf(asf, "inch").skeleton).stature
+    assert in_inches == pytest.approx(0.45 * Body.of(walk.skeleton).stature)
 
 
 def test_an_amc_may_have_another_axis_up(tmp_path: Path) -> None:
     walk = recorded.clip("16_15").motion().frames(0, 4)
-    write_asf(tmp_path / "a.asf", walk.skeleton)
-    write_amc(tmp_path / "a.amc", walk.turned(about(0, np.pi / 2)))
-    motion = read_clip(tmp_path / "a.asf", tmp_path / "a.amc", up="z")
+    motion = read_clip(*written(tmp_path, walk.turned(about(0, np.pi / 2))), up="z")
     np.testing.assert_allclose(motion.joints, walk.joints, atol=1e-9)

@@ -23,9 +23,7 @@ each_gait = each("name", [name for name in built_in.names() if name.startswith(G
 
 
 def stored() -> dict[str, Any]:
-    text = (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
-    models: dict[str, Any] = json.loads(text)["motions"]
-    return models
+    return dict(json.loads((files("posefit.motion") / "built_in.json").read_text(encoding="utf-8"))["motions"])
 
 
 def means(name: str, key: str) -> float:
@@ -111,11 +109,10 @@ def test_mistakes_are_named() -> None:
     for ask in (built_in.motion, built_in.other_styles):
         with pytest.raises(ValueError, match=r"one of walk, run, march, .* got 'wlak'; did you mean 'walk'\?"):
             ask("wlak")
-    wrong: list[tuple[dict[str, Any], str]] = [
+    for settings, message in (
         ({"frames": 0}, "frames must be a whole number of at least 1, got 0"),
         ({"fps": 0.0}, "fps and speed must be positive, got 0.0 and 1.0"),
         ({"phase": np.nan}, "phase must be finite, got nan"),
-    ]
-    for settings, message in wrong:
+    ):
         with pytest.raises(ValueError, match=message):
             built_in.motion("walk", **settings)

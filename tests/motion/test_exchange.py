@@ -48,8 +48,7 @@ def markers_of(model: ElementTree.Element, values: dict[str, float]) -> dict[str
             turn = Rotation.from_euler("XYZ", numbers(frame.findtext("orientation"))).as_matrix()
             ends.append((frame.findtext("socket_parent") or "", affine(turn, numbers(frame.findtext("translation")))))
         (parent, first), (child, last) = ends
-        moved = np.eye(4)
-        shift = np.zeros(3)
+        moved, shift = np.eye(4), np.zeros(3)
         for one in joint.iter("TransformAxis"):
             name, axis = one.findtext("coordinates"), numbers(one.findtext("axis"))
             value = values[name] if name else 0.0
@@ -60,12 +59,9 @@ def markers_of(model: ElementTree.Element, values: dict[str, float]) -> dict[str
         moved[:3, 3] = shift
         if parent in world:
             world[child] = world[parent] @ first @ moved @ np.linalg.inv(last)
-    return {
-        marker.attrib["name"]: (
-            world[marker.findtext("socket_parent_frame") or ""] @ [*numbers(marker.findtext("location")), 1.0]
-        )[:3]
-        for marker in model.iter("Marker")
-    }
+    frames = {one.attrib["name"]: world[one.findtext("socket_parent_frame") or ""] for one in model.iter("Marker")}
+    places = {one.attrib["name"]: numbers(one.findtext("location")) for one in model.iter("Marker")}
+    return {name: (frame @ [*places[name], 1.0])[:3] for name, frame in frames.items()}
 
 
 def test_opensims_joints_are_posefits(tmp_path: Path) -> None:

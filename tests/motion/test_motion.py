@@ -73,8 +73,7 @@ def test_between_frames_joints_are_linear_and_the_root_lies_half_way_on_the_shor
 
 
 def test_a_root_that_turns_on_and_on_keeps_its_turns() -> None:
-    poses = np.zeros((40, 66))
-    poses[:, 0] = 7.0 + 0.5 * np.arange(40)
+    poses = (7.0 + 0.5 * np.arange(40)[:, None]) * np.eye(1, 66)
     fast = Motion("spin", SKELETON, poses, np.zeros((40, 3)), 30.0).resampled(45.0)
     np.testing.assert_allclose(fast.poses[:, 0], 7.0 + np.arange(len(fast)) / 3.0, atol=1e-9)
 
@@ -103,8 +102,7 @@ def test_what_falls_accelerates_as_it_does_at_any_rate(fps: float, left_out: int
     joints[..., 1] -= 0.5 * 9.81 * times[:, None] ** 2
     accelerations = acceleration(joints, fps)
     np.testing.assert_allclose(accelerations[left_out:-left_out], 9.81)
-    assert np.isnan(accelerations[:left_out]).all()
-    assert np.isnan(accelerations[-left_out:]).all()
+    assert np.isnan([accelerations[:left_out], accelerations[-left_out:]]).all()
 
 
 def test_a_foot_that_is_lifted_or_goes_fast_does_not_stand() -> None:
@@ -123,8 +121,7 @@ def test_a_step_is_as_long_as_a_foot_creeps_along_the_ground() -> None:
     joints[40:, LEFT] += np.arange(20)[:, None] * [0.003, 0.0, 0.004]  # 5 mm a frame, 15 cm a second
     stands = standing(joints, 30.0)
     lengths = slides(joints, stands)
-    assert len(lengths) == 3
-    assert lengths[0] == lengths[2] == 0.0
+    assert (len(lengths), lengths[0], lengths[2]) == (3, 0.0, 0.0)
     assert lengths[1] == pytest.approx(0.005 * (stands[40:, 0].sum() - 1))
 
 

@@ -1,7 +1,5 @@
 """The priors: components, looser limbs, all angles, and scikit-learn's transformers."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -34,21 +32,17 @@ def test_limits_widen_where_a_training_pose_passes_them_or_are_the_training_rang
     assert ((latents >= prior.low) & (latents <= prior.high)).all()
     np.testing.assert_allclose(prior.inverse_transform(latents), poses, atol=1e-12)
     prior = Full(limits="training").fit(poses)
-    low, high = poses.min(axis=0), poses.max(axis=0)
-    moving = high > low
-    np.testing.assert_array_equal(prior.low, low[moving])
-    np.testing.assert_array_equal(prior.high, high[moving])
+    moving = poses[:, np.ptp(poses, axis=0) > 0.0]
+    np.testing.assert_array_equal([prior.low, prior.high], [moving.min(axis=0), moving.max(axis=0)])
 
 
 def test_a_skeleton_without_limits_is_named() -> None:
     average = built_in.average_skeleton()
     bare = Skeleton("bare", average.offsets, average.axes, average.channels)
-    with pytest.raises(
-        ValueError, match="limits must be training where the skeleton states no joint limits, got asf and bare"
-    ):
-        Full().fit(angles("walk-a"), bare)
-    with pytest.raises(ValueError, match="got asf and no skeleton"):
-        Full().fit(angles("walk-a"))
+    rule = "limits must be training where the skeleton states no joint limits, got asf and"
+    for skeleton, name in ((bare, "bare"), (None, "no skeleton")):
+        with pytest.raises(ValueError, match=f"{rule} {name}"):
+            Full().fit(angles("walk-a"), skeleton)
     with pytest.raises(ValueError, match="angles must differ somewhere"):
         Full(limits="training").fit(np.zeros((5, 63)))
 
@@ -72,9 +66,8 @@ def test_the_same_poses_have_the_same_clusters_and_fewer_than_asked_are_centres_
 
 
 def test_a_loose_prior_reaches_what_its_components_do_not() -> None:
-    prior, pca = Loose().fit(angles("walk-a", "walk-b", "walk-c"), built_in.average_skeleton()), PCA(components=12)
-    pca.fit(angles("walk-a", "walk-b", "walk-c"))
-    run = angles("run-a")
+    walks, run = angles("walk-a", "walk-b", "walk-c"), angles("run-a")
+    prior, pca = Loose().fit(walks, built_in.average_skeleton()), PCA(components=12).fit(walks)
     # both shoulders and hips turn about three axes in CMU's skeletons, elbows and knees about one
     assert len(prior.loose) == 2 * (3 + 1 + 3 + 1)
     assert len(prior.low) == 12 + 16
@@ -100,23 +93,20 @@ def test_a_loose_angle_reaches_as_far_as_every_training_pose_may_still_go() -> N
 def test_no_freedom_at_all_is_the_space_of_pca() -> None:
     poses = angles("walk-a", "walk-b", "walk-c")
     prior = Loose(arms_degrees=0.0, legs_degrees=0.0, slack=1.0).fit(poses, built_in.average_skeleton())
-    latents = prior.transform(poses)
+    latents, pca = prior.transform(poses), PCA(components=12).fit(poses)
     latents[:, 12:] = 0.0
-    pca = PCA(components=12).fit(poses)
-    np.testing.assert_allclose(
-        prior.inverse_transform(latents), pca.inverse_transform(pca.transform(poses)), atol=1e-12
-    )
+    expected = pca.inverse_transform(pca.transform(poses))
+    np.testing.assert_allclose(prior.inverse_transform(latents), expected, atol=1e-12)
 
 
 def test_mistakes_in_settings_are_named() -> None:
-    rows: list[tuple[Any, dict[str, Any], str]] = [
+    for kind, settings, message in (
         (PCA, {"components": 2.5}, "components must be a whole number or a share"),
         (PCA, {"clusters": 0}, "clusters must be at least 1, got 0"),
         (Transformed, {"variant": "TSNE"}, "variant must be one of .*, got 'TSNE'"),
         (Transformed, {"options": "gamma=1"}, "options must be a JSON object, got 'gamma=1'"),
         (Transformed, {"options": '{"gama": 1}'}, "options of KernelPCA must be of alpha, .*, got gama"),
-    ]
-    for kind, settings, message in rows:
+    ):
         with pytest.raises(ValueError, match=message):
             kind(**settings)
     with pytest.raises(ValueError, match="angles must hold at least 7 frames, got 3"):

@@ -40,25 +40,19 @@ def registering(*offers: Any, hook: str = "optimisers", **more: Any) -> Any:
     return SimpleNamespace(**{f"posefit_register_{hook}": hookimpl(register_all)})
 
 
-def offering(name: str) -> Any:
-    return registering((name, PCA))
-
-
 def commands(*offers: Any) -> Any:
     return registering(*((offer,) for offer in offers), hook="commands")
 
 
 def test_the_built_ins_are_registered_like_a_third_partys() -> None:
     offers = registry().offers
-    assert {"sapso", "random"} <= set(offers["optimiser"])
-    assert "pca" in offers["prior"]
-    assert "lookup" in offers["start"]
-    assert offers["optimiser"]["sapso"].distribution == "posefit"
+    for kind, name in (("optimiser", "sapso"), ("optimiser", "random"), ("prior", "pca"), ("start", "lookup")):
+        assert offers[kind][name].distribution == "posefit"
     next_frames = {name: offer.next_frame for name, offer in offers["optimiser"].items()}
     assert {next_frames[name] for name in ("sapso", "pso", "cma", "scipy")} == {"start"}
     assert {next_frames[name] for name in ("particle", "annealed")} == {"carry"}
     assert next_frames["random"] == "forget"
-    assert Registry(load([point("mine", offering("mine"))])).optimiser("mine") is PCA
+    assert Registry(load([point("mine", registering(("mine", PCA)))])).optimiser("mine") is PCA
     starts = Registry(load([point("mine", registering(("guess", PCA), hook="starts"))]))
     assert starts.offer("start", "guess").factory is PCA
 
@@ -84,7 +78,7 @@ BROKEN = {
         (registering(hook="command"), "posefit_register_command"),
     ],
 }
-GOOD = {KINDS: offering("good"), (COMMAND,): commands(click.Command("greet"))}
+GOOD = {KINDS: registering(("good", PCA)), (COMMAND,): commands(click.Command("greet"))}
 
 
 @each("kinds", BROKEN)
@@ -116,25 +110,22 @@ def test_an_unknown_name_gets_the_nearest_its_kind_or_the_doctor() -> None:
 
 def test_an_entry_point_of_a_group_that_is_nearly_right_is_broken() -> None:
     with pytest.warns(UserWarning, match="must be in the group 'posefit', got 'posefit.plugins'"):
-        (plugin,) = load([point("mine", offering("mine"), "posefit.plugins")])
+        (plugin,) = load([point("mine", registering(("mine", PCA)), "posefit.plugins")])
     assert plugin.state == "broken"
 
 
 def test_one_module_registers_methods_and_commands_and_only_the_hooks_of_the_kinds_asked_for_are_called() -> None:
     greet, part = click.Command("greet"), click.Group("part")
-    module = SimpleNamespace(**vars(offering("mine")), **vars(commands(greet, part)))
-    for kinds, names, found in (
-        (KINDS, ["mine"], ()),
-        ((COMMAND,), [], (greet, part)),
-        ((*KINDS, COMMAND), ["mine"], (greet, part)),
-    ):
+    module = SimpleNamespace(**vars(registering(("mine", PCA))), **vars(commands(greet, part)))
+    made = (greet, part)
+    for kinds, names, found in ((KINDS, ["mine"], ()), ((COMMAND,), [], made), ((*KINDS, COMMAND), ["mine"], made)):
         (plugin,) = load([point("hello", module)], kinds)
         assert [offer.name for offer in plugin.offers] == names
         assert plugin.commands == found
 
 
 def test_a_taken_name_is_refused_and_its_plugin_left_out_whole() -> None:
-    points = [point("a", offering("one")), point("b", registering(("new", PCA), ("one", PCA)))]
+    points = [point("a", registering(("one", PCA))), point("b", registering(("new", PCA), ("one", PCA)))]
     with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
         offers = Registry(load(points)).offers["optimiser"]
     assert {name: offer.distribution for name, offer in offers.items()} == {"one": "posefit-a"}
@@ -146,23 +137,22 @@ def test_a_variable_chooses_what_is_left_out() -> None:
         ({"POSEFIT_BLOCK_PLUGINS": "b"}, {"posefit-a"}),
         ({"POSEFIT_BLOCK_PLUGINS": "Posefit-A,b"}, set()),
     ):
-        methods = Registry(load([point("a", offering("one")), point("b", offering("two"))], variables=variables))
+        points = [point(name, registering((f"of-{name}", PCA))) for name in "ab"]
+        methods = Registry(load(points, variables=variables))
         assert {plugin.distribution for plugin in methods.plugins if plugin.state == "loaded"} == loaded, variables
         assert {offer.distribution for offer in methods.offers["optimiser"].values()} == loaded, variables
         left_out = [plugin.cause for plugin in methods.plugins if plugin.state != "loaded"]
         assert all("names it" in cause for cause in left_out), variables
 
 
-def test_the_origin_of_results_changes_with_the_source_of_a_plugin(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_origin_of_results_changes_with_the_source_of_a_plugin(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))
     package = tmp_path / "growing"
     package.mkdir()
     (package / "__init__.py").write_text("from growing.part import Search\n")
     origins = []
-    for text in ("class Search:\n    step = 1\n", "class Search:\n    step = 2\n", "class Search:\n    step = 1\n"):
-        (package / "part.py").write_text(text)
+    for step in (1, 2, 1):
+        (package / "part.py").write_text(f"class Search:\n    step = {step}\n")
         for name in ("growing.part", "growing"):
             sys.modules.pop(name, None)
         importlib.invalidate_caches()

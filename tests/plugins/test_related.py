@@ -1,16 +1,16 @@
 """The related work as plugins: rules of their kinds, a few frames of a made walk, masks without a known place."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 import posefit
-from posefit.geometry.body import Body
+from posefit import Silhouette
 from posefit.plugin import Observation, check_optimiser, check_prior, check_tracker, contour_fit
 from posefit.registry import registry
-from posefit.silhouette.mask import Silhouette
 from posefit.testing.tracker_rules import scene
 from posefit_related.frames import costs_of, frame_of, place_of
 from tests.cases import each
@@ -24,38 +24,32 @@ TRACKERS = ["smoothing", "gradient", "regression"]
     "kind, name",
     [
         *(("optimiser", name) for name in ("hpso", "haga", "psopf", "local")),
-        ("prior", "isomap"),
-        ("prior", "gplvm"),
+        *(("prior", name) for name in ("isomap", "gplvm")),
         *(("tracker", name) for name in TRACKERS),
     ],
 )
 def test_each_follows_the_rules_of_its_kind(kind: str, name: str) -> None:
     offer = registry().offer(kind, name)
-    more: dict[str, Any] = {
-        "optimiser": {"next_frame": offer.next_frame},
-        "tracker": {"looks_ahead": offer.looks_ahead},
-    }.get(kind, {})
-    check = {"optimiser": check_optimiser, "prior": check_prior, "tracker": check_tracker}[kind]
-    report = check(offer.factory, **more)
+    report = {
+        "optimiser": partial(check_optimiser, next_frame=offer.next_frame),
+        "prior": check_prior,
+        "tracker": partial(check_tracker, looks_ahead=offer.looks_ahead),
+    }[kind](offer.factory)
     assert report, str(report)
 
 
-@each("method", [*METHODS, "smoothing", "gradient", "regression"])
+@each("method", [*METHODS, *TRACKERS])
 def test_a_walk_is_followed_better_than_by_its_mean_pose(method: str) -> None:
-    tracks = [
-        posefit.track("walk", method=method, frames=(0, 4), evaluations=800, seed=seed)
-        for seed in range(1 if method == "regression" else 5)
-    ]
+    seeds, how = range(1 if method == "regression" else 5), {"frames": (0, 4), "evaluations": 800}
+    tracks = [posefit.track("walk", method=method, seed=seed, **how) for seed in seeds]
     errors = [track.summary["error_degrees"]["mean"] for track in tracks]
     assert np.median(errors) < tracks[0].summary["baselines_degrees"]["mean_pose"]
 
 
 @each("method", TRACKERS)
 def test_a_place_that_is_not_known_is_found_in_the_masks(method: str) -> None:
-    settings = {"regression.samples": 300} if method == "regression" else {}
-    track = posefit.track(
-        "walk", method=method, frames=(0, 4), evaluations=800, translation="aligned", settings=settings
-    )
+    how = {"settings": {"regression.samples": 300} if method == "regression" else {}, "translation": "aligned"}
+    track = posefit.track("walk", method=method, frames=(0, 4), evaluations=800, **how)
     assert track.summary["iou"] > 0.3
     assert np.isfinite(track.motion.translations).all()
 
@@ -76,12 +70,10 @@ def test_a_pose_is_moved_to_the_contours_of_its_masks() -> None:
     pose = motion.poses[0].copy()
     pose[free] += np.radians(4.0) * np.random.default_rng(0).standard_normal(len(free))
     after, place, used = contour_fit(task, observations[0], (pose, motion.translations[0]), (0.1, 0.003), 400)
-    body: Body = task.body
-    true = body.skeleton.joints(motion.poses[:1], motion.translations[:1])
 
     def error(angles: Any) -> float:
-        joints = body.skeleton.joints(angles[None], motion.translations[:1])
-        return float(np.linalg.norm(joints - true, axis=-1).mean())
+        joints = task.body.skeleton.joints(angles[None], motion.translations[:1])
+        return float(np.linalg.norm(joints - motion.joints[:1], axis=-1).mean())
 
     assert error(after) < error(pose)
     assert used == 12 * 27  # never more than twelve steps
@@ -101,8 +93,8 @@ def test_a_camera_that_knows_nothing_does_not_count() -> None:
 
 
 def test_a_mask_says_where_the_root_is() -> None:
-    task, motion, observations = scene()
-    pose, place, observation = motion.poses[0], motion.translations[0], observations[0]
+    task, motion, (observation, *_) = scene()
+    pose, place = motion.poses[0], motion.translations[0]
     assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)  # known
     unknown = Observation(observation.silhouettes)
     moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])

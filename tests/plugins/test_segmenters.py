@@ -11,15 +11,12 @@ from posefit.registry import registry
 from posefit.silhouette.foreground import Film, Mixture
 from posefit.testing import check_segmenter
 
-BUILT_IN = ("masks", "mean", "median", "mixture")
-
 
 def test_the_kit_passes_the_built_in_ones() -> None:
     offers = registry().offers["segmenter"]
-    for name in BUILT_IN:
+    for name in ("masks", "mean", "median", "mixture"):
         assert offers[name].distribution == "posefit"
-        settings = {"background": "0:6"} if name == "mean" else {}
-        report = check_segmenter(registry().offer("segmenter", name).factory, settings=settings)
+        report = check_segmenter(offers[name].factory, settings={"background": "0:6"} if name == "mean" else {})
         assert report, str(report)
         assert len(report.of("passed")) >= 7
 

@@ -1,7 +1,7 @@
 """Settings are read from a plugin's signature, and a mistake is an error before anything runs."""
 
 import inspect
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -46,15 +46,7 @@ def test_settings_have_a_name_a_type_and_a_default() -> None:
 def test_texts_become_what_their_types_ask_for() -> None:
     given = {"count": "7", "rate": "1", "kind": "b", "name": "7", "sharp": "True", "limit": "none", "reach": "3,4.5"}
     parsed = parse("it", factory, given)
-    assert parsed == {
-        "count": 7,
-        "rate": 1,
-        "kind": "b",
-        "name": "7",
-        "sharp": True,
-        "limit": None,
-        "reach": (3, 4.5),
-    }
+    assert parsed == {"count": 7, "rate": 1, "kind": "b", "name": "7", "sharp": True, "limit": None, "reach": (3, 4.5)}
     assert parse("it", factory, {"limit": "1e-3", "anything": "4"}) == {"limit": 1e-3, "anything": 4}
 
 
@@ -101,27 +93,21 @@ def test_an_unknown_annotation_accepts_everything() -> None:
 
 
 def test_a_budget_becomes_iterations_or_evaluations_whichever_an_optimiser_plans_with() -> None:
-    rows: list[Any] = [
+    for optimiser, given, evaluations, filled in (
         (SAPSO, {}, 2440, {"iterations": 60}),
         (SAPSO, {"population_size": 61}, 2440, {"population_size": 61, "iterations": 39}),
         (SAPSO, {"iterations": 5}, 2440, {"iterations": 5}),
         (SAPSO, {}, 50, {"iterations": 1}),
         (Particle, {"noise": 0.2}, 500, {"noise": 0.2, "evaluations": 500}),
         (lambda space, rng: None, {}, 500, {}),
-    ]
-    for optimiser, given, evaluations, filled in rows:
+    ):
         assert planned(optimiser, given, evaluations) == filled, given
 
 
 def test_a_list_of_settings_is_read_from_a_docstring() -> None:
-    text = (
-        "A swarm.\n\nSettings:\n    cooling (gamma): factor on the temperature\n        after each iteration: 5.2.\n"
-        "    seed: any.\n\nMore."
-    )
-    assert settings_in(text) == {
-        "cooling": ("gamma", "factor on the temperature after each iteration: 5.2."),
-        "seed": ("", "any."),
-    }
+    listed = "    cooling (gamma): factor on\n        the temperature: 5.2.\n    seed: any."
+    text = f"A swarm.\n\nSettings:\n{listed}\n\nMore."
+    assert settings_in(text) == {"cooling": ("gamma", "factor on the temperature: 5.2."), "seed": ("", "any.")}
     assert without_settings(text) == "A swarm.\n\nMore."
     assert settings_in("Settings stand in prose.") == {}
 

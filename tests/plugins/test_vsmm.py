@@ -6,15 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit import Body, Camera, Frame, Observation, Silhouette, Task, project
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
-from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import joint_distances
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
-from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
 from posefit_vsmm import tracker
 from posefit_vsmm.groups import TOPOLOGY, most_probable
@@ -30,10 +26,8 @@ def seen(name: str = "jacks-b", frames: int = 40, azimuth: float = 0.1) -> tuple
     motion = built_in.motion(name, frames=frames)
     body = Body.of(motion.skeleton)
     camera = Camera.around(np.array([0.0, 1.05, 0.0]), azimuth, 4.4, SIZE)
-    observations = [
-        Observation([Silhouette.of(project(body, camera, pose, place))])
-        for pose, place in zip(motion.poses, motion.translations, strict=True)
-    ]
+    placed = zip(motion.poses, motion.translations, strict=True)
+    observations = [Observation([Silhouette.of(project(body, camera, *at))]) for at in placed]
     return Task(body, [camera], 600, 0.0, motion.translations[0], "aligned"), observations
 
 
@@ -45,12 +39,9 @@ def follow(task: Task, observations: list[Observation], **settings: Any) -> list
     frames = list(VSMM(task, **settings).track(observations, np.random.default_rng(0)))
     assert len(frames) == len(observations)
     for frame in frames:
-        assert np.isfinite(frame.pose).all()
-        assert np.isfinite(frame.translation).all()
-        assert np.isfinite(frame.cost)
-        probabilities = frame.details.get("probabilities")
-        if probabilities is not None:
-            assert np.isclose(probabilities.sum(), 1.0)
+        assert np.isfinite([*frame.pose, *frame.translation, frame.cost]).all()
+        if "probabilities" in frame.details:
+            assert np.isclose(frame.details["probabilities"].sum(), 1.0)
     return frames
 
 
@@ -107,8 +98,7 @@ def test_after_a_long_gap_the_track_is_lost_and_estimated_again() -> None:
 def test_nothing_is_ever_seen() -> None:
     task, observations = seen(frames=5)
     frames = follow(task, [blank(one) for one in observations])
-    assert all(frame.details["lost"] for frame in frames)
-    assert all(frame.evaluations == 0 for frame in frames)
+    assert all(frame.details["lost"] and frame.evaluations == 0 for frame in frames)
 
 
 def test_what_is_no_person_is_no_reason_to_fail() -> None:
@@ -159,12 +149,8 @@ def test_a_setting_counts_whatever_the_variant_is() -> None:
     for k in range(5, 30):
         observations[k] = blank(observations[k])
     # without recovery a track is never lost
-    for variant, recovery, lost in (
-        ("default", None, True),
-        ("default", False, False),
-        ("patent", None, False),
-        ("patent", True, True),
-    ):
+    cases = ("default", None, True), ("default", False, False), ("patent", None, False), ("patent", True, True)
+    for variant, recovery, lost in cases:
         frames = follow(task, observations, variant=variant, recovery=recovery)
         assert frames[-1].details["lost"] == lost
 

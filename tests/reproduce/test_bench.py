@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from posefit import PoseProblem, Silhouette, project
 from posefit.cli import main
-from posefit.fitting.problem import PoseProblem
-from posefit.silhouette.cost import project
-from posefit.silhouette.mask import Silhouette
 from posefit_reproduce.bench import kernel, loop
 from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
 from tests.cases import each

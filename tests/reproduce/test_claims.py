@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from posefit_reproduce.experiment import Claim, claims_table, interval
-from tests.cases import each
 
 # differences of two views and four seeds: the mean is 1; the variance of its mean is that of the seeds of each view,
 # 2 x (1/3) / 4 / 2^2, with 6 degrees of freedom, of which t is 2.447: 1 +- 2.447 x 0.2041
@@ -20,18 +19,11 @@ def test_the_interval_is_students_within_views() -> None:
     assert interval(shifted).high - interval(shifted).value == pytest.approx(HALF, rel=1e-5)
 
 
-@each(
-    ("bound", "above", "verdict"),
-    [
-        (2.0, False, "holds"),
-        (0.0, False, "fails"),
-        (1.2, False, "not decided"),
-        (0.0, True, "holds"),
-        (2.0, True, "fails"),
-    ],
-)
-def test_a_claim_is_judged_by_its_interval(bound: float, above: bool, verdict: str) -> None:
-    assert Claim("", "", "", VALUES, bound=bound, above=above).verdict(0.95)[0] == verdict
+def test_a_claim_is_judged_by_its_interval() -> None:
+    verdicts = {2.0: ("holds", "fails"), 1.2: ("not decided", "not decided"), 0.0: ("fails", "holds")}
+    for bound, expected in verdicts.items():
+        claims = [Claim("", "", "", VALUES, bound=bound, above=above) for above in (False, True)]
+        assert tuple(claim.verdict(0.95)[0] for claim in claims) == expected, bound
 
 
 def test_a_single_seed_decides_nothing_and_a_fact_needs_none() -> None:
@@ -40,20 +32,15 @@ def test_a_single_seed_decides_nothing_and_a_fact_needs_none() -> None:
 
 
 def test_the_more_claims_a_table_has_the_wider_are_their_intervals() -> None:
-    alone, many = (
-        claims_table(
-            "claims", [Claim("near its bound", "here", f"{k}", VALUES, "mm", 1.0 + 1.1 * HALF) for k in range(n)]
-        )
-        for n in (1, 10)
-    )
+    near = [Claim("near its bound", "here", f"{k}", VALUES, "mm", 1.0 + 1.1 * HALF) for k in range(10)]
+    alone, many = (claims_table("claims", near[:n]) for n in (1, 10))
     assert alone.rows == [["near its bound", "here", "below 1.55 mm", "8", "**holds** 1.00 (0.50 to 1.50)"]]
     assert all(cell.startswith("**not decided**") for cell in many.rows[0][4:])
 
 
 def test_the_claims_of_a_text_are_one_row_and_a_subject_is_a_column() -> None:
-    first = [Claim("one", "2.1", name, VALUES, bound=5.0) for name in ("run",)]
-    second = [Claim("two", "5.3", name, VALUES, bound=bound) for name, bound in (("walk", 4.0), ("run", 0.0))]
-    table = claims_table("claims", first + second)
+    rows = (("one", "2.1", "run", 5.0), ("two", "5.3", "walk", 4.0), ("two", "5.3", "run", 0.0))
+    table = claims_table("claims", [Claim(*texts, VALUES, bound=bound) for *texts, bound in rows])
     assert table.heads[3:] == ["n", "walk", "run"]
     assert [row[2] for row in table.rows] == ["below 5 degrees", "below 4 / 0 degrees"]
     assert table.rows[0][4] == ""

@@ -1,5 +1,6 @@
 """A folder of a reproduction holds runs of one scale, of the same clips and of one build."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -75,15 +76,16 @@ def test_a_quick_experiment_is_another_one_and_more_seeds_are_not() -> None:
 
 
 def test_clips_are_what_their_files_hold(tmp_path: Path) -> None:
-    walk, shared = motion("walk", frames=300, fps=120.0), []
-    for folder in (tmp_path / "a", tmp_path / "b"):
-        for test, training in CLIPS.values():
-            for clip in (test, *training):
-                (folder / clip).parent.mkdir(parents=True, exist_ok=True)
-                write_asf((folder / clip).with_name(f"{clip.partition('/')[0]}.asf"), walk.skeleton)
-                write_amc(folder / f"{clip}.amc", walk)
-        shared.append(paper_experiment(str(folder), Scale(**QUICK)).shared["clips"])
-    with (folder / "16" / "16_15.amc").open("a") as file:
+    def shared(folder: Path) -> Any:
+        return paper_experiment(str(folder), Scale(**QUICK)).shared["clips"]
+
+    walk, (one, other) = motion("walk", frames=300, fps=120.0), (tmp_path / "a", tmp_path / "b")
+    for clip in {clip for test, training in CLIPS.values() for clip in (test, *training)}:
+        (one / clip).parent.mkdir(parents=True, exist_ok=True)
+        write_asf((one / clip).with_name(f"{clip.partition('/')[0]}.asf"), walk.skeleton)
+        write_amc(one / f"{clip}.amc", walk)
+    shutil.copytree(one, other, copy_function=shutil.copyfile)  # at another time
+    assert shared(one) == shared(other)
+    with (other / "16" / "16_15.amc").open("a") as file:
         file.write("\n")
-    shared.append(paper_experiment(str(folder), Scale(**QUICK)).shared["clips"])
-    assert shared[0] == shared[1] != shared[2]
+    assert shared(one) != shared(other)

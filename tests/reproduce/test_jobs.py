@@ -11,7 +11,7 @@ from posefit_reproduce.jobs import each
 def test_jobs_come_back_under_their_keys_from_other_processes() -> None:
     steps: list[int] = []
 
-    def watched(found, count):  # type: ignore[no-untyped-def]
+    def watched(found, count):
         for one in found:
             steps.append(count)
             yield one

@@ -29,24 +29,9 @@ from posefit_reproduce.sapso.motions import CLIPS, PaperMotion, paper_motions, p
 from posefit_reproduce.sapso.tables import Analysis, few_joints
 
 TINY = Scale(seeds=2, frames=3, views=(0.0, 45.0), around=(0.0, 45.0), iterations=17)  # exemplars needs 715 poses
-FIGURES = {
-    "figure-3-latents.png",
-    "figure-4-clusters.png",
-    "figure-5-swarm.png",
-    "figure-6-convergence.png",
-    "figure-7-dimensions.png",
-    "figure-9-frames.png",
-}
-TABLES = {
-    "motions",
-    "table-1",
-    "table-2",
-    "flaws",
-    "claims",
-    "views",
-    "parts",
-    "turn",
-}
+NUMBERED = "3-latents", "4-clusters", "5-swarm", "6-convergence", "7-dimensions", "9-frames"
+FIGURES = {f"figure-{name}.png" for name in NUMBERED}
+TABLES = {"motions", "table-1", "table-2", "flaws", "claims", "views", "parts", "turn"}
 
 
 def run(*words: object) -> Result:
@@ -55,11 +40,9 @@ def run(*words: object) -> Result:
 
 def fails(*words: object) -> str:
     result = run(*words)
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    lines = result.stderr.splitlines()
-    assert len(lines) == 1, result.stderr
-    return lines[0]
+    assert (result.exit_code, result.stdout) == (2, ""), result.output
+    (line,) = result.stderr.splitlines()
+    return line
 
 
 @pytest.fixture(scope="module")
@@ -119,8 +102,7 @@ def test_tables_have_the_papers_numbers_beside_ours(written: tuple[Path, Result]
     assert cells["PF"][0] == "4.67 / 2.52 / 5.24"
     assert cells["mean training pose"][0] == ""
     claims = (out / "claims.md").read_text()
-    words = set(claims.split("**")[1::2])
-    assert words <= {"holds", "fails", "not decided"}
+    assert set(claims.split("**")[1::2]) <= {"holds", "fails", "not decided"}
     # LFemur of the walk: |-11.397 + 13.015|, ...: the mean of twelve differences is 2.26
     assert "below 2.26 / 2.62 / 1.35 degrees" in claims
     assert len((out / "parts.md").read_text().splitlines()) == 3 + 1 + len(PARTS) + 3
@@ -144,10 +126,9 @@ def test_errors_are_those_of_poses() -> None:
     np.testing.assert_allclose(analysis.errors("walk"), 3.0 * 3.0 / 66.0)
     assert few_joints(analysis, "walk")[0, 0] == pytest.approx(1.0)
     test = motions["walk"].test
-    joints = replace(test, poses=test.poses + np.eye(1, 66)[0] * np.pi).joints
-    expected = nearer_mirrored(test.joints, joints).mean()
+    joints = replace(test, poses=test.poses + np.pi * np.eye(1, 66)).joints
     analysis = Analysis(shifted(motions, 180.0, slice(0, 1)), motions)
-    assert analysis.swapped("walk")[0, 0] == expected
+    assert analysis.swapped("walk")[0, 0] == nearer_mirrored(test.joints, joints).mean()
 
 
 def test_a_part_that_is_left_out_is_left_out(walk: PaperMotion) -> None:
@@ -213,14 +194,8 @@ def poses_of(frames: Any) -> Any:
 def test_a_run_is_a_track_of_the_same_seed(walk: PaperMotion) -> None:
     scene = paper_scene(walk, 45.0)
     frames = follow(scene, walk, Scale(iterations=4), Run("track", "walk", "pso@pca", 45.0, 3))
-    again = track(
-        scene,
-        train=walk.training,
-        method="pso@pca",
-        evaluations=40 * 5,
-        settings={"tracker.tilt": "box"},  # Interpretation S16
-        seed=3,
-    )
+    box = {"tracker.tilt": "box"}  # Interpretation S16
+    again = track(scene, train=walk.training, method="pso@pca", evaluations=40 * 5, settings=box, seed=3)
     np.testing.assert_array_equal(poses_of(frames), again.motion.poses)
     assert [frame.evaluations for frame in frames] == [40 * 5] * 3
 
@@ -247,13 +222,9 @@ def test_the_first_yaw_is_searched_within_45_degrees_of_the_true_one(walk: Paper
 def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
     swarm = watched_swarm(walk, 30, 6)
     assert [poses.shape for poses in swarm.poses] == [(30, 66)] * 7
-    again = track(
-        paper_scene(walk, 45.0, (0, 1)),
-        train=walk.training,
-        evaluations=30 * 7,
-        method="sapso",
-        settings={"tracker.tilt": "box", "sapso.population_size": 30},  # Interpretation S16
-    )
+    settings = {"tracker.tilt": "box", "sapso.population_size": 30}  # Interpretation S16
+    scene = paper_scene(walk, 45.0, (0, 1))
+    again = track(scene, train=walk.training, evaluations=30 * 7, method="sapso", settings=settings)
     np.testing.assert_array_equal(swarm.history, again.frames[0].trace[:, 1])
     # the best pose of all iterations is the search's result
     best = [poses[k] for poses, k in zip(swarm.poses, swarm.best, strict=True)]

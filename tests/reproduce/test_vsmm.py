@@ -63,14 +63,8 @@ def test_tables_and_figures_are_made_of_runs(tmp_path: Path, tracked: dict[str, 
     pytest.importorskip("matplotlib")
     made = patent_experiment(Scale(films=2))
     found = reproduce(dataclasses.replace(made, perform=lambda run: tracked), tmp_path / "out", 1, None)
-    assert {table.name for table in found} == {
-        "compared",
-        "films",
-        "claims",
-        "labels-default",
-        "labels-patent",
-        "recovery",
-    }
+    names = {"compared", "films", "claims", "labels-default", "labels-patent", "recovery"}
+    assert {table.name for table in found} == names
     for figure in ("9-joints-default.jpg", "10-probabilities-patent.png", "11-errors-default.png"):
         assert (tmp_path / "out" / f"figure-{figure}").stat().st_size > 10_000
     assert found[-1].rows[0][1:3] == ["0.0", "0 of 5"]  # a setting that changes nothing
@@ -88,17 +82,14 @@ def right(film: activities.Film) -> dict[str, Any]:
     probabilities = np.full((len(labels), len(MODELS)), 0.02)
     names = ("walk", "arms-out", "jacks", "squat")
     probabilities[np.arange(len(labels)), [MODELS.index(names[label]) for label in labels]] = 0.9
-    none = np.full(len(labels), -1)
-    seconds = {"filter_seconds": np.full(len(labels), 0.001), "detection_seconds": np.full(len(labels), 0.002)}
-    lost = np.zeros(len(labels), dtype=bool)
-    group = np.array([0, 0, 2, 2])[labels]
     return {
         "probabilities": probabilities,
-        "group": group,
-        "candidate_group": none,
+        "group": np.array([0, 0, 2, 2])[labels],
+        "candidate_group": np.full(len(labels), -1),
         "label": labels,
-        "lost": lost,
-        **seconds,
+        "lost": np.zeros(len(labels), dtype=bool),
+        "filter_seconds": np.full(len(labels), 0.001),
+        "detection_seconds": np.full(len(labels), 0.002),
     }
 
 
@@ -130,12 +121,7 @@ def test_labels_are_counted_by_activity(film: activities.Film) -> None:
     runs = {Run("reported", "film", "default", seed=TUNED): right(film)}
     table = tables.labels_table("labels", Results(runs), "default")
     assert table.heads[0] == "% (by chance 31)"  # 140 of 450 frames
-    assert [row[1:] for row in table.rows] == [
-        ["100", "0", "0", "0", "0", "0"],
-        ["0", "100", "0", "0", "0", "0"],
-        ["0", "0", "100", "0", "0", "0"],
-        ["0", "0", "0", "100", "0", "0"],
-    ]
+    assert np.array([row[1:] for row in table.rows], dtype=int).tolist() == (100 * np.eye(4, 6, dtype=int)).tolist()
     runs[next(iter(runs))]["label"] = np.full(450, LABELS.index("jump"))
     assert tables.labels_table("labels", Results(runs), "default").rows[3][1:] == ["0", "0", "0", "0", "100", "0"]
 

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit import Body, Camera
 from posefit.motion.built_in import average_skeleton
 
 

@@ -13,13 +13,8 @@ from posefit.tracking.pipeline import track_scene
 NEEDED = "device cuda needs an NVIDIA GPU and posefit[gpu], got no library numba-cuda"
 
 
-@pytest.fixture
-def no_library(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_line_says_what_a_gpu_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("posefit.silhouette.cuda.device.find_spec", lambda name: None)
-
-
-@pytest.mark.usefixtures("no_library")
-def test_one_line_says_what_a_gpu_needs() -> None:
     silhouette = Silhouette.of(np.ones((4, 4)))
     scene = synthetic(built_in.motion("walk", frames=1), (45.0,), (64, 48), [], (None, None))
     for ask in (

@@ -8,15 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from posefit import Body, Camera, Silhouette
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.silhouette.cost import areas, drawing_of, mismatch, project
 from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.kernels import count_areas
-from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import FAR, NEAR
 from posefit.silhouette.sharing import parts_of, work_through
 from tests.cases import each
@@ -96,18 +94,14 @@ FLAT = Camera(120, 90, np.array([100.0, 100.0]), np.zeros(2), np.eye(3), np.arra
 
 def flat_cone(u: float, v: float, du: float, dv: float, r0: float, r1: float) -> tuple[Body, Camera, Array, Array]:
     """Return what `project` wants for a cone given in pixels."""
-    return (
-        one_cone(np.array([du, dv, 0.0]) / 100, r0 / 100, r1 / 100),
-        FLAT,
-        np.zeros(ANGLES),
-        np.array([u, v, 0]) / 100,
-    )
+    cone = one_cone(np.array([du, dv, 0.0]) / 100, r0 / 100, r1 / 100)
+    return cone, FLAT, np.zeros(ANGLES), np.array([u, v, 0]) / 100
 
 
 def test_cones_by_hand() -> None:
     # a cylinder of radius 5: 20.1 to 60.1 along row 30.2, rows 25 to 34 have their centres within 25.2 to 35.2
-    for lying, cone in ((True, (20.1, 30.2, 40.0, 0.0, 5.0, 5.0)), (False, (30.2, 20.1, 0.0, 40.0, 5.0, 5.0))):
-        mask = project(*flat_cone(*cone)) if lying else project(*flat_cone(*cone)).T
+    lying, upright = flat_cone(20.1, 30.2, 40.0, 0.0, 5.0, 5.0), flat_cone(30.2, 20.1, 0.0, 40.0, 5.0, 5.0)
+    for mask in (project(*lying), project(*upright).T):
         assert np.flatnonzero(mask[:, 40]).tolist() == list(range(25, 35))
         assert np.flatnonzero(mask[30]).tolist() == list(range(15, 65))  # centres within 15.1 and 65.1
     # a disc of radius 1.6 on a pixel's centre: the 3 x 3 block (its corners are 1.41 away), and nothing at 2
@@ -115,9 +109,8 @@ def test_cones_by_hand() -> None:
     assert mask.sum() == 9
     assert mask[39:42, 49:52].all()
     # a large disc hides a small one within it
-    np.testing.assert_array_equal(
-        project(*flat_cone(50.3, 40.7, 3.0, 1.0, 20.0, 2.0)), project(*flat_cone(50.3, 40.7, 0.0, 0.0, 20.0, 20.0))
-    )
+    alone = project(*flat_cone(50.3, 40.7, 0.0, 0.0, 20.0, 20.0))
+    np.testing.assert_array_equal(project(*flat_cone(50.3, 40.7, 3.0, 1.0, 20.0, 2.0)), alone)
 
 
 def test_counted_areas_equal_the_masks_for_any_size_and_place(body: Body) -> None:
@@ -143,9 +136,7 @@ def test_a_joint_is_drawn_from_5_cm_to_the_far_end() -> None:
         assert mask.any() == (NEAR <= depth <= FAR)
 
 
-def test_what_is_no_number_spoils_no_other_pose_and_without_a_place_nothing_is_drawn(
-    body: Body, camera: Camera
-) -> None:
+def test_what_is_no_number_spoils_no_other_pose_and_without_a_place_nothing_is_drawn(body, camera) -> None:
     rng = np.random.default_rng(15)
     poses, translations = random_poses(rng, 5), rng.uniform(-0.3, 0.3, (5, 3))
     silhouette = Silhouette.of(project(body, camera, poses[0], translations[0]))

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit import Body, Camera, areas, project
 from posefit.geometry.skeleton import ANGLES
-from posefit.silhouette.cost import areas, project
 from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette, pack, unpack
 from tests.silhouette.twin import TIE, body_distance
@@ -20,9 +18,7 @@ def test_pixel_65_is_bit_1_of_the_third_strip() -> None:
     mask = np.zeros((3, 70), dtype=bool)
     mask[2, 65] = True
     bits = pack(mask)
-    assert bits.shape == (4, 4)
-    assert bits.view(np.uint32)[2, 2] == 2
-    assert bits.sum() == 2
+    assert (bits.shape, bits.view(np.uint32)[2, 2], bits.sum()) == ((4, 4), 2, 2)
 
 
 def test_the_extent_is_the_border_of_the_persons_pixels_and_unknown_at_the_images_edge() -> None:
@@ -52,8 +48,7 @@ def test_any_value_but_0_is_the_person() -> None:
         assert Silhouette.of(values).mask.tolist() == [[False, True], [True, False]]
     silhouette = Silhouette.of(np.ones((2, 3)), np.array([[255, 0, 1], [0, 0, 2]]))
     assert silhouette.valid.tolist() == silhouette.mask.tolist() == [[True, False, True], [False, False, True]]
-    assert silhouette.size == (3, 2)
-    assert silhouette.pixels == 3
+    assert (silhouette.size, silhouette.pixels) == ((3, 2), 3)
 
 
 @given(st.integers(1, 150), st.integers(1, 10), st.integers(0, 2**32 - 1))
@@ -86,8 +81,8 @@ def test_half_and_quarter_size_by_hand() -> None:
     np.testing.assert_allclose(half.centre, [79.75, 59.75])
     # pixels 2, 6, 10, ...: 160 is (160 - 2.5) / 4 + 0.5
     np.testing.assert_allclose(quarter.centre, [39.875, 29.875])
-    assert coarser_camera(replace(camera, width=5, height=3), 2).width == 2
-    assert coarser_camera(replace(camera, width=5, height=3), 2).height == 1
+    small = coarser_camera(replace(camera, width=5, height=3), 2)
+    assert (small.width, small.height) == (2, 1)
 
 
 def test_a_body_seen_small_is_the_body_drawn_at_full_size_and_looked_at_there(body: Body) -> None:

@@ -8,14 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit.arrays import Array
-from posefit.fitting.box import draw_population
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
-from posefit.silhouette.cost import areas, project
-from posefit.silhouette.cuda.device import moved_to
+from posefit import Body, Camera, Silhouette, areas, moved_to, project
+from posefit.plugin import Array, draw_population
 from posefit.silhouette.drawn import PoseCount
-from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import pose_problem
 from tests.cases import each
 from tests.silhouette.twin import random_poses
@@ -27,14 +22,9 @@ pytestmark = [
 ]
 
 
-def seen_by(body: Body, camera: Camera, pose: Array, rng: np.random.Generator) -> Silhouette:
-    """Return the silhouette of a pose, of which a tenth is not known."""
-    mask = project(body, camera, pose, np.zeros(3))
-    return Silhouette.of(mask, rng.random(mask.shape) < 0.9)
-
-
 def assert_equals_the_cpu(body: Body, camera: Camera, poses: Array, places: Array) -> None:
-    silhouette = seen_by(body, camera, poses[0], np.random.default_rng(1))
+    mask = project(body, camera, poses[0], np.zeros(3))
+    silhouette = Silhouette.of(mask, np.random.default_rng(1).random(mask.shape) < 0.9)  # a tenth is not known
     expected = areas(body, camera, silhouette, poses, places)
     np.testing.assert_array_equal(areas(body, camera, moved_to(silhouette, "cuda"), poses, places), expected)
 

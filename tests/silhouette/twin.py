@@ -2,9 +2,8 @@
 
 import numpy as np
 
+from posefit import Body, Camera
 from posefit.arrays import Array
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, PARENTS
 from posefit.silhouette.rasteriser import FAR, NEAR
 

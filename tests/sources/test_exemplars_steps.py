@@ -1,7 +1,7 @@
 """Toyama and Blake 2001, Rabiner 1989, and Godsill et al. 2004: by hand, or against all ways through a small model."""
 
 from collections import Counter
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -10,17 +10,10 @@ import pytest
 from posefit.arrays import Array
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
+from posefit_exemplars import markov
 from posefit_exemplars.beam import Beam, Step, transition_costs
 from posefit_exemplars.exemplars import Exemplars, farthest_first
-from posefit_exemplars.markov import (
-    FrameStates,
-    Sampling,
-    backward_messages,
-    frame_states,
-    sample_states,
-    state_weights,
-    viterbi_state,
-)
+from posefit_exemplars.markov import FrameStates, frame_states
 
 SIZES = (3, 4, 2, 3, 4)  # states of each frame: 288 ways
 
@@ -70,11 +63,9 @@ def test_a_state_is_as_likely_as_all_ways_to_it_together() -> None:  # RABINER19
 def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do() -> None:  # RABINER1989 (backward)
     for seed in [0, 1, 2]:
         one = model(seed)
-        for first in range(len(SIZES)):
-            for count in range(first + 1, len(SIZES) + 1):
-                np.testing.assert_allclose(
-                    state_weights(one.frames[first:count]), shares(ways(one, count), first), rtol=1e-5
-                )
+        for first, count in combinations(range(len(SIZES) + 1), 2):
+            expected = shares(ways(one, count), first)
+            np.testing.assert_allclose(markov.state_weights(one.frames[first:count]), expected, rtol=1e-5)
 
 
 def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (Viterbi)
@@ -83,7 +74,7 @@ def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (
         for count in range(1, len(SIZES) + 1):
             costs = ways(one, count)
             best = min(costs, key=lambda way: costs[way])
-            assert [viterbi_state(one.frames[k:count]) for k in range(count)] == list(best)
+            assert [markov.viterbi_state(one.frames[k:count]) for k in range(count)] == list(best)
             each = [min(cost for way, cost in costs.items() if way[-1] == row) for row in range(SIZES[count - 1])]
             np.testing.assert_allclose(one.frames[count - 1].totals, np.array(each) - min(each), atol=1e-12)
 
@@ -134,7 +125,7 @@ def tempered(one: Model, power: float) -> Model:
 def test_a_message_is_the_share_of_all_ways_on_from_a_state() -> None:  # GODSILL2004 (messages)
     for power in POWERS:
         one = model(0)
-        found = backward_messages(one.frames[1:], power)
+        found = markov.backward_messages(one.frames[1:], power)
         expected = np.zeros(SIZES[1])
         for way, cost in ways(tempered(one, power), len(SIZES)).items():
             first = power * one.fits[0][way[0]] + one.steps[0][way[0], way[1]] + power * one.fits[1][way[1]]
@@ -147,7 +138,7 @@ def test_ways_are_drawn_as_often_as_they_are_likely() -> None:  # GODSILL2004 (s
         one, count, rng = model(1), 40_000, np.random.default_rng(0)
         rows, drawn = None, []
         for k in range(len(SIZES)):
-            rows = sample_states(one.frames[k:], rows, Sampling(count, power), rng)
+            rows = markov.sample_states(one.frames[k:], rows, markov.Sampling(count, power), rng)
             drawn.append(rows)
         costs = ways(tempered(one, power), len(SIZES))
         total = sum(np.exp(-cost) for cost in costs.values())

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from posefit import Start
-from posefit.arrays import Array
-from posefit.fitting.weights import systematic_rows, weigh
+from posefit.plugin import Array, systematic_rows, weigh
 from posefit.testing.toy import Toy
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle
@@ -83,11 +82,10 @@ def test_beta_has_an_answer_where_no_share_can_be_had() -> None:  # DEUTSCHER200
     assert sharpness(np.full(4, np.nan), 0.5) > 1e12
 
 
-def annealed(particles: Array, **settings: float) -> Annealed:
+def annealed(particles: Array, layers: int = 2, **settings: float) -> Annealed:
     """Return a filter of one layer more than has been told, with these particles."""
-    layers = int(settings.pop("layers", 2))
-    budget = layers * len(particles)
-    made = Annealed(Toy(particles.shape[1]), np.random.default_rng(0), evaluations=budget, layers=layers, **settings)
+    how = {"evaluations": layers * len(particles), "layers": layers, **settings}
+    made = Annealed(Toy(particles.shape[1]), np.random.default_rng(0), **how)
     made._particles = particles
     return made
 

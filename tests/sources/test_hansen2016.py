@@ -1,5 +1,6 @@
 """One test for each equation of Hansen's tutorial, 2016: by hand, by law, or in matrices; and Auger and Hansen 2005."""
 
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,9 +43,7 @@ def learnt(generations: int = 6, *, far: float = 0.0) -> Generation:
     for number in range(generations):
         x = strategy.sample(rng, 8) + far * (number == generations - 1)
         costs = x**2 @ np.array([1.0, 10.0, 3.0])
-        before = {
-            name: np.array(getattr(strategy, name)) for name in ("mean", "sigma", "covariance", "step_path", "path")
-        }
+        before = deepcopy(vars(strategy))
         strategy.learn(x, costs)
     return Generation(before, strategy, (x[costs.argsort()] - before["mean"]) / before["sigma"])
 
@@ -90,10 +89,8 @@ def test_eq_40_proposals_lie_a_step_size_times_a_step_from_the_mean() -> None:  
 def test_eq_41_the_step_of_the_mean_is_the_better_halfs_weighted_sum() -> None:  # HANSEN2016 (41)
     # two dimensions, where sigma is 1 and the mean 0, so that the new mean is the step
     strategy = Strategy(np.zeros(2), np.ones(2), 6)
-    strategy.learn(
-        np.array([[0.0, 9.0], [3.0, 0.0], [1.0, 0.0], [9.0, 9.0], [2.0, 0.0], [9.0, 0.0]]),
-        np.array([4.0, 3, 1, 6, 2, 5]),
-    )
+    x = np.array([[0.0, 9.0], [3.0, 0.0], [1.0, 0.0], [9.0, 9.0], [2.0, 0.0], [9.0, 0.0]])
+    strategy.learn(x, np.array([4.0, 3.0, 1.0, 6.0, 2.0, 5.0]))
     # (1 x 1.252763 + 2 x 0.559616 + 3 x 0.154151) / 1.966530
     np.testing.assert_allclose(strategy.mean, [1.441346, 0.0], atol=1e-5)
 
@@ -154,16 +151,11 @@ def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step() -> None
         one = learnt(far=far)
         h, rates, w = heeded(one), EIGHT, EIGHT_WEIGHTS
         lengths = np.linalg.norm(one.y @ one.root, axis=1)
-        rank_mu = sum(
-            wi * (1.0 if wi >= 0.0 else 3.0 / long**2) * np.outer(yi, yi)
-            for wi, yi, long in zip(w, one.y, lengths, strict=True)
-        )
+        shares = np.where(w >= 0.0, w, 3.0 * w / lengths**2)
+        rank_mu = sum(wi * np.outer(yi, yi) for wi, yi in zip(shares, one.y, strict=True))
         kept = 1.0 + rates.c_1 * (1.0 - h) * rates.c_c * (2.0 - rates.c_c) - rates.c_1 - rates.c_mu * w.sum()
-        expected = (
-            kept * one.before["covariance"]
-            + rates.c_1 * np.outer(one.after.path, one.after.path)
-            + rates.c_mu * rank_mu
-        )
+        of_path = rates.c_1 * np.outer(one.after.path, one.after.path)
+        expected = kept * one.before["covariance"] + of_path + rates.c_mu * rank_mu
         np.testing.assert_allclose(one.after.covariance, expected, rtol=1e-7, atol=1e-12)
         assert (one.after.covariance == one.after.covariance.T).all()
 

@@ -50,7 +50,7 @@ def test_the_root_comes_first_and_then_runs_along_the_chain() -> None:  # JOHN20
 
 def stages(optimiser: HPSO) -> list[list[tuple[Array, Array]]]:
     """Return the populations and costs of each stage of a search, the first poses first."""
-    by_stage: list[list[tuple[Array, Array]]] = [[] for _ in range(len(optimiser._runs) + 1)]
+    by_stage = [list[tuple[Array, Array]]() for _ in range(len(optimiser._runs) + 1)]
     while len(proposals := optimiser.ask()):
         costs = sphere(proposals)
         by_stage[optimiser._stage + 1].append((proposals, costs))
@@ -149,9 +149,9 @@ def test_a_swarm_shifts_the_particles() -> None:  # KRZESZOWSKI2010 (shift)
     twin, gbest = copy.deepcopy(optimiser._rng), x[sphere(x).argmin()]
     optimiser.tell(moved, sphere(moved))
     pulls = twin.random((2, *x.shape))
+    best = moved[sphere(moved).argmin()] if sphere(moved).min() < sphere(gbest[None])[0] else gbest
     for row in range(len(x)):
-        pbest = moved[row] if sphere(moved[row : row + 1])[0] < sphere(x[row : row + 1])[0] else x[row]
-        best = moved[sphere(moved).argmin()] if sphere(moved).min() < sphere(gbest[None])[0] else gbest
+        pbest = moved[row] if sphere(moved)[row] < sphere(x)[row] else x[row]
         by_hand = v[row] + PHI * pulls[0, row] * (pbest - moved[row]) + PHI * pulls[1, row] * (best - moved[row])
         if np.abs(moved[row] + CHI * by_hand).max() <= 1.0 and np.abs(moved[row]).max() < 1.0:
             np.testing.assert_allclose(optimiser._x[row], moved[row] + CHI * by_hand, atol=1e-12)

@@ -9,19 +9,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import ks_2samp
 
-from posefit import SearchSpace, Silhouette, Start, minimise
-from posefit.arrays import Array
+from posefit import Body, Camera, SearchSpace, Silhouette, Start, areas, minimise, mismatch, project
 from posefit.fitting import metrics
-from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Components
 from posefit.fitting.tracker import Prediction, Predictor, SynthesisTracker
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import rotation_from_root_angles, yaw_first
 from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import built_in
+from posefit.plugin import Array, draw_population
 from posefit.settings import settings_of
-from posefit.silhouette.cost import areas, mismatch, project
 from posefit.testing.problem import pose_problem
 from posefit.testing.toy import Toy
 from posefit.testing.tracker_rules import scene
@@ -114,20 +110,15 @@ def test_2_2_constraint_1_is_the_range_of_the_training_latents(walk: Array) -> N
     np.testing.assert_allclose(prior.low, latents.min(axis=0), atol=1e-6)  # a sum of 63 numbers of seven decimals
     np.testing.assert_allclose(prior.high, latents.max(axis=0), atol=1e-6)
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
-    edge = np.concatenate([np.zeros(3), prior.high])
-    np.testing.assert_allclose(space.proposals(edge)[3:], 1.0)
+    np.testing.assert_allclose(space.proposals(np.concatenate([np.zeros(3), prior.high]))[3:], 1.0)
 
 
 def test_2_2_constraint_2_by_hand() -> None:  # SAPSO 2.2 constraint 2
     prior = PCA(components=2, clusters=2)
     prior.centres, prior.reach = np.array([[0.0, 0.0], [4.0, 0.0]]), np.array(1.0)
     # D: (0.5 + 1) / 2 = 0.75; (2 + 0) / 2 = 1, from either centre, is not below chi; (1 + 0.5) / 2 from the second
-    assert prior.feasible(np.array([[0.5, 1.0], [2.0, 0.0], [5.0, 0.5], [4.0, 3.0]])).tolist() == [
-        True,
-        False,
-        True,
-        False,
-    ]
+    latents = np.array([[0.5, 1.0], [2.0, 0.0], [5.0, 0.5], [4.0, 3.0]])
+    assert prior.feasible(latents).tolist() == [True, False, True, False]
 
 
 def test_2_2_chi_is_the_99th_percentile_of_the_training_distances(walk: Array) -> None:
@@ -145,9 +136,9 @@ def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None: 
     prior = Line()
     prior.low, prior.high = np.array([2.0]), np.array([6.0])  # half-range 2: alpha 2 / 2 and alpha 6 / 2
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
-    low, high = velocity_limits(space)
-    np.testing.assert_allclose([low[3], high[3]], [0.15, 0.45])
-    assert (np.isinf(low[:3]) & np.isinf(high[:3])).all()  # they are those of x_s, and not of the root
+    limits = np.array(velocity_limits(space))
+    np.testing.assert_allclose(limits[:, 3], [0.15, 0.45])
+    assert np.isinf(limits[:, :3]).all()  # they are those of x_s, and not of the root
 
 
 def moved(
@@ -202,11 +193,10 @@ def test_eq_3_by_counting_pixels() -> None:  # SAPSO (3)
     poses, translations = rng.normal(0.0, 0.3, (3, ANGLES)), rng.uniform(-0.2, 0.2, (3, 3))
     observed = project(body, camera, poses[0], translations[0])
     counted = areas(body, camera, Silhouette.of(observed), poses, translations)
-    for pose, translation, (r, b, y) in zip(poses, translations, counted, strict=True):
+    for pose, translation, counts in zip(poses, translations, counted, strict=True):
         model = project(body, camera, pose, translation)
-        assert r == sum(f and not m for f, m in zip(observed.flat, model.flat, strict=True))
-        assert b == sum(m and not f for f, m in zip(observed.flat, model.flat, strict=True))
-        assert y == sum(f and m for f, m in zip(observed.flat, model.flat, strict=True))
+        r, b, y = (observed & ~model).sum(), (model & ~observed).sum(), (observed & model).sum()
+        assert counts.tolist() == [r, b, y]
 
 
 @pytest.mark.pure
@@ -319,11 +309,9 @@ def test_a1_2d_a_rise_is_accepted_with_chance_exp_minus_de_over_t() -> None:  # 
     assert judged(3.0, 0.367)[:2] == (True, 0.7)
     assert judged(3.0, 0.368)[:2] == (False, 0.1)
     # T = 0.5: exp(-2) = 0.1353
-    assert judged(3.0, 0.135, 0.5)[0]
-    assert not judged(3.0, 0.136, 0.5)[0]
+    assert [judged(3.0, chance, 0.5)[0] for chance in (0.135, 0.136)] == [True, False]
     # dE <= 0 always
-    assert judged(2.0, 0.9999)[0]
-    assert judged(1.0, 0.9999)[0]
+    assert [judged(cost, 0.9999)[0] for cost in (2.0, 1.0)] == [True, True]
     assert not judged(np.nan, 0.0)[0]
 
 
@@ -334,9 +322,7 @@ def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:  # SAPSO A1.2c
             assert space.feasible(proposals).all()
 
 
-def test_a1_2c_to_the_letter_a_velocity_beyond_its_limits_is_redrawn_and_not_moved_to_them() -> (
-    None
-):  # Interpretation S7
+def test_a1_2c_to_the_letter_a_velocity_beyond_its_limits_is_redrawn_and_not_moved_to_them():  # Interpretation S7
     # from 0, a pull of 2 rand() 0.2 towards the swarm's best: uniform on 0 to 0.4, of which the limit 0.15 leaves 3/8
     velocities = []
     for factory in (SAPSO, LetterSAPSO):
@@ -471,21 +457,16 @@ class Scripted:
     """An optimiser that proposes one given point of the unit box a frame, and keeps the space it was given."""
 
     def __init__(self, space: SearchSpace, point: Array) -> None:
-        self.space, self.point = space, point
-        self.asked = False
+        self.space, self.left = space, [np.empty((0, len(point))), point[None]]
 
     def ask(self) -> Array:
-        self.asked, asked = True, self.asked
-        return np.empty((0, len(self.point))) if asked else self.point[None]
+        return self.left.pop()
 
-    def tell(self, proposals: Array, costs: Array) -> None:
-        pass
+    def tell(self, proposals: Array, costs: Array) -> None: ...
 
 
 @pytest.mark.parametrize(("variant", "steps"), [("default", [0.0, 0.2, -0.1]), ("paper", [0.0, 0.0, 0.2])])
-def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
-    variant: Any, steps: list[float]
-) -> None:  # Interpretation S12
+def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(variant, steps):  # Interpretation S12
     latents = [0.1, 0.3, 0.2, 0.2]
     made: list[Scripted] = []
 
@@ -494,11 +475,10 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
         return made[-1]
 
     task, _, observations = scene()
-    how = Prediction(variant=variant, spread=2.0, floor=0.05)
-    tracker = SynthesisTracker(task, Line(), make, prediction=how)
+    tracker = SynthesisTracker(task, Line(), make, prediction=Prediction(variant=variant, spread=2.0, floor=0.05))
     list(tracker.track(observations[:4], np.random.default_rng(0)))
-    assert made[0].space.start is None  # frame 1 is an estimation
-    starts = [optimiser.space.start for optimiser in made[1:]]
+    first, *starts = [optimiser.space.start for optimiser in made]
+    assert first is None  # frame 1 is an estimation
     for start, step, last in zip(starts, steps, latents, strict=False):
         assert start.velocity[3] == pytest.approx(step)
         assert start.mean[3] == pytest.approx(last)

@@ -83,10 +83,8 @@ def reference(belief: Belief, seen: Array, at_mixed: bool = False) -> Belief:
     for j in range(2):
         weights = TRANSITION[:, j] * mu / c[j]
         mean = sum(w * x for w, x in zip(weights, belief.states, strict=True))
-        spread = sum(
-            w * (P + np.outer(x - mean, x - mean))
-            for w, x, P in zip(weights, belief.states, belief.covariances, strict=True)
-        )
+        sizes = zip(weights, belief.states, belief.covariances, strict=True)
+        spread = sum(w * (P + np.outer(x - mean, x - mean)) for w, x, P in sizes)
         x, P = MODELS[j].matrix @ mean, MODELS[j].matrix @ spread @ MODELS[j].matrix.T + MODELS[j].noise
         S = H @ P @ H.T + SIGMA**2 * np.eye(2)
         K = P @ H.T @ np.linalg.inv(S)
@@ -161,27 +159,22 @@ def test_the_gain_is_that_of_least_variance() -> None:  # VSMM 6.3d
 
 
 def test_the_model_that_flies_as_the_target_does_is_the_probable_one() -> None:  # VSMM 6.4
-    errors: dict[str, list[float]] = {"imm": [], "straight": [], "turn": []}
-    right = []
+    both, *alone = imm_of(MODELS, TRANSITION), imm_of(MODELS[:1], np.eye(1)), imm_of(MODELS[1:], np.eye(1))
+    right, errors = [], []  # of the filter with both models, then with either
     for seed in range(20):
         truth, seen = path(np.random.default_rng(seed))
-        imm, belief = imm_of(MODELS, TRANSITION), begin(truth)
-        singles = {"straight": imm_of(MODELS[:1], np.eye(1)), "turn": imm_of(MODELS[1:], np.eye(1))}
-        alone = {name: start(truth[0], belief.covariances[0], 1) for name in singles}
+        belief = begin(truth)
+        singles = [start(truth[0], belief.covariances[0], 1) for _ in alone]
         for k, place in enumerate(seen):
-            belief = imm.cycle(belief, measuring(place))
-            turning = 25 <= k < 45
-            right.append(belief.probabilities[int(turning)] > 0.5)
-            fused = imm.fused(belief)[0]
-            errors["imm"].append(float(np.hypot(*(H @ (fused - truth[k])))))
-            for name, single in singles.items():
-                alone[name] = single.cycle(alone[name], measuring(place))
-                errors[name].append(float(np.hypot(*(H @ (alone[name].states[0] - truth[k])))))
+            belief = both.cycle(belief, measuring(place))
+            singles = [imm.cycle(single, measuring(place)) for imm, single in zip(alone, singles, strict=True)]
+            right.append(belief.probabilities[int(25 <= k < 45)] > 0.5)
+            states = [both.fused(belief)[0], *(single.states[0] for single in singles)]
+            errors.append([np.hypot(*(H @ (state - truth[k]))) for state in states])
     assert np.mean(right) > 0.8  # a change is noticed some steps late
-    root = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in errors.items()}
-    assert root["imm"] < 0.5 * root["straight"]
-    assert root["imm"] < 0.5 * root["turn"]
-    assert root["imm"] < SIGMA * np.sqrt(2.0)  # better than the measurements themselves
+    of_both, straight, turn = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert of_both < 0.5 * min(straight, turn)
+    assert of_both < SIGMA * np.sqrt(2.0)  # better than the measurements themselves
 
 
 def test_fusing_is_the_mean_over_the_models() -> None:  # VSMM 6.5
@@ -198,9 +191,7 @@ def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None: 
     states, covariances = np.outer([60.0, 55.0, 70.0], np.ones(34)), np.tile(0.01 * np.eye(34), (3, 1, 1))
     belief = Belief(states, covariances, np.log(np.full(3, 1 / 3)), np.zeros(3))
 
-    def measure(states: Array) -> Measurement:
-        return Measurement(-states, np.tile(np.eye(34), (3, 1, 1)), np.eye(34))
-
+    measure = lambda states: Measurement(-states, np.tile(np.eye(34), (3, 1, 1)), np.eye(34))  # noqa: E731
     # no mixing: each model stays as far off as it is
     after = imm_of([still] * 3, np.eye(3)).cycle(belief, measure)
     assert (after.log_likelihoods < -745.0).all()  # exp() of it is 0

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from posefit.statistics.profiles import (
-    attained,
-    expected_running_time,
-    hits,
-    performance_profile,
-)
+from posefit.statistics.profiles import attained, expected_running_time, hits, performance_profile
 from tests.cases import each
 
 

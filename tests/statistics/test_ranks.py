@@ -35,17 +35,16 @@ def test_a_medians_interval_is_that_of_the_sign_test():
 
 def test_wilcoxon_is_scipys_and_its_adjustment_holms():
     errors = np.random.default_rng(0).gamma(2.0, size=(4, 3, 5)) * np.array([1.0, 1.2, 2.0, 3.0])[:, None, None]
-    pairs = wilcoxon(errors)
-    assert [(pair.first, pair.second) for pair in pairs] == list(combinations(range(4), 2))
-    p_values = [stats.wilcoxon(errors[a].ravel(), errors[b].ravel()).pvalue for a, b in combinations(range(4), 2)]
+    pairs, numbers = wilcoxon(errors), list(combinations(range(4), 2))
+    assert [(pair.first, pair.second) for pair in pairs] == numbers
+    p_values = [stats.wilcoxon(errors[a].ravel(), errors[b].ravel()).pvalue for a, b in numbers]
     assert [pair.p_value for pair in pairs] == pytest.approx(p_values)
     assert [pair.adjusted for pair in pairs] == pytest.approx(holm(p_values).tolist())
 
 
 @each("seed", range(3))
 def test_with_ties_and_equal_blocks_wilcoxon_is_scipys_too(seed):
-    errors = np.random.default_rng(seed).integers(0, 4, (2, 8, 1)).astype(float)
-    (pair,) = wilcoxon(errors)
+    (pair,) = wilcoxon(errors := np.random.default_rng(seed).integers(0, 4, (2, 8, 1)).astype(float))
     assert pair.p_value == pytest.approx(stats.wilcoxon(*errors[:, :, 0], zero_method="pratt").pvalue)
 
 

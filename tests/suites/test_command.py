@@ -1,8 +1,8 @@
 """`posefit suite`, and plans of single searches; mistakes are one line and status 2."""
 
-import json
 import re
 import tomllib
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from posefit.sweep.table import search_run
 from tests.cases import each
-from tests.commands import run
+from tests.commands import error_of, printed, run
 
 PLAN = """
 suite = "posefit-2026.3"
@@ -48,14 +48,12 @@ def test_the_functions_are_listed() -> None:
     done = run("suite")
     assert done.exit_code == 0
     assert "7  high-dimensional     d = 20, 24, 40, 66" in done.stdout
-    assert [one["number"] for one in json.loads(run("suite", "--json").stdout)] == list(range(1, 10))
+    assert [one["number"] for one in printed("suite")] == list(range(1, 10))
 
 
 def test_a_run_prints_what_it_reaches() -> None:
     words = ("run", "random", "--function", 2, "--instances", "10000:10003", "--budget", 5)
-    done = run("suite", *words, "--json")
-    assert done.exit_code == 0, done.stderr
-    (score,) = json.loads(done.stdout)
+    (score,) = printed("suite", *words)
     problems = posefit.Suite(functions=[2], dimensions=[9], instances=range(10_000, 10_003))
     runs = [run_on(problem, "random", evaluations=45) for problem in problems]
     assert [one.evaluations[0] for one in runs] == [1.0, 1.0, 1.0]
@@ -111,9 +109,8 @@ def test_any_loop_makes_a_run_whose_improvements_cost_the_same_again(infeasible:
     assert np.array_equal(run.evaluations, [*(k + 1.0 for k in falls), 100.0][: len(run.evaluations)])
     assert np.array_equal(run.costs[: len(falls)], costs[falls])
     assert problem.points.shape == (len(falls), 9)
-    assert np.array_equal(
-        posefit.suite(function=1, instance=10_000, infeasible=infeasible)(problem.points), costs[falls]
-    )
+    again = posefit.suite(function=1, instance=10_000, infeasible=infeasible)
+    assert np.array_equal(again(problem.points), costs[falls])
     expected = proposals[falls] if infeasible == "penalise" else problem.repaired(proposals[falls])
     assert np.array_equal(problem.points, expected)
     assert np.array_equal(problem.best, problem.repaired(proposals[falls[-1:]])[0])
@@ -128,38 +125,29 @@ def test_a_run_without_a_budget_or_beyond_it_is_no_run() -> None:
 
 
 def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken_together() -> None:
-    ways: list[tuple[int, Any]] = [(45, "repair"), (90, "repair"), (90, "penalise")]
-    runs = {
-        (budget, way): [
-            run_on(posefit.suite(function=1, instance=n, infeasible=way), "random", evaluations=budget) for n in (3, 4)
-        ]
-        for budget, way in ways
-    }
-    scores = {
-        (score.budget, score.infeasible): score
-        for score in suite_scores(run for several in runs.values() for run in several)
-    }
-    assert set(scores) == set(ways)
+    def runs_of(budget: int, infeasible: Any) -> list[Any]:
+        problems = [posefit.suite(function=1, instance=n, infeasible=infeasible) for n in (3, 4)]
+        return [run_on(problem, "random", evaluations=budget) for problem in problems]
+
+    runs = {way: runs_of(*way) for way in ((45, "repair"), (90, "repair"), (90, "penalise"))}
+    scores = {(score.budget, score.infeasible): score for score in suite_scores(chain(*runs.values()))}
+    assert set(scores) == set(runs)
     for way, score in scores.items():
         assert (score.method, score.runs) == ("random", 2)
         assert score.above == np.median([one.cost - one.truth_cost for one in runs[way]])
 
 
 def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> None:
-    runs = {
-        (run.method, run.function, run.dimension, run.instance): run for run in map(search_run, Ledger(results).rows())
-    }
-    assert len(runs) == 12
+    runs = [search_run(row) for row in Ledger(results).rows()]
+    assert len({(run.method, run.function, run.dimension, run.instance) for run in runs}) == len(runs) == 12
     problem = posefit.suite("posefit-2026.3", 1, 3, 9)
     expected = run_on(problem, "pso", {"population_size": 20}, evaluations=90)
-    mine = runs["pso", 1, 9, 3]
-    assert np.array_equal(mine.evaluations, expected.evaluations)
-    assert np.array_equal(mine.costs, expected.costs)
-    assert np.array_equal(mine.targets, expected.targets)
-    scores = suite_scores(runs.values())
-    assert [(score.dimension, score.function) for score in scores] == [
-        *2 * [(9, 1)], *2 * [(24, 0)], *2 * [(24, 1)], *2 * [(24, 7)]
-    ]  # fmt: skip
+    (mine,) = [run for run in runs if (run.method, run.function, run.dimension, run.instance) == ("pso", 1, 9, 3)]
+    for name in ("evaluations", "costs", "targets"):
+        assert np.array_equal(getattr(mine, name), getattr(expected, name))
+    scores = suite_scores(runs)
+    parts = [(9, 1), (24, 0), (24, 1), (24, 7)]
+    assert [(score.dimension, score.function) for score in scores] == [part for part in parts for _ in range(2)]
     assert all(score.running_times == {} for score in scores if score.function == 0)  # the hardest would decide them
     of_random = {(score.function, score.dimension): score for score in scores if score.method == "random"}
     together, *others = [of_random[function, 24] for function in (0, 1, 7)]
@@ -169,9 +157,7 @@ def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> Non
 
 def test_the_ledger_is_a_table(results: Path) -> None:
     table = Ledger(results).frame()
-    assert len(table) == 12
-    assert set(table["function"]) == {1, 7}
-    assert set(table["settings"]) == {"", "population_size=20"}
+    assert (len(table), set(table["function"]), set(table["settings"])) == (12, {1, 7}, {"", "population_size=20"})
 
 
 @each(
@@ -185,16 +171,10 @@ def test_the_ledger_is_a_table(results: Path) -> None:
         (["run", "sapso", "--set", "foo=1"], "a setting of sapso must be one of .*, got 'foo'"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_one_line_and_status_2(
-    words: list[Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mistake_is_one_line_and_status_2(words: list[Any], message: str, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.chdir(tmp_path)
-    done = run("suite", *words)
-    assert done.exit_code == 2
-    assert done.stdout == ""
-    last = done.stderr.strip().splitlines()[-1]
-    assert last.startswith("posefit: ")
-    assert re.search(message, last), last
+    line = error_of("suite", *words)
+    assert re.search(message, line), line
     assert list(tmp_path.iterdir()) == []
 
 

@@ -101,16 +101,10 @@ class Chaos:
 
     def _begun(self) -> subprocess.Popen[bytes]:
         words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), str(self.count), str(LIMIT)]
-        environment = {
-            **os.environ,
-            STARTS: str(self._starts),
-            SLOW_SECONDS: str(self.seconds),
-            "PYTHONPATH": str(ROOT),
-        }
+        own = {STARTS: str(self._starts), SLOW_SECONDS: str(self.seconds), "PYTHONPATH": str(ROOT)}
+        how = {"cwd": ROOT, "env": os.environ | own, "start_new_session": True}
         with (self.folder / "output.txt").open("ab") as output:
-            return subprocess.Popen(
-                words, cwd=ROOT, env=environment, start_new_session=True, stdout=output, stderr=subprocess.STDOUT
-            )
+            return subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT, **how)
 
     def _event(self) -> None:
         assert self._driver is not None
@@ -128,14 +122,10 @@ class Chaos:
             else:
                 other = self._begun()
                 done = self._driver.poll() is None
-                refused = (
-                    other.wait(timeout=CONNECT_TIMEOUT_SECONDS) not in (0, 1, 130) or b"that process" in self._output()
-                )
-                self.refused += done and refused
+                ended = other.wait(timeout=CONNECT_TIMEOUT_SECONDS) in (0, 1, 130)
+                output = (self.folder / "output.txt").read_bytes()
+                self.refused += done and (not ended or b"that process" in output)
             self.happened[event] += done
-
-    def _output(self) -> bytes:
-        return (self.folder / "output.txt").read_bytes()
 
     def _copy(self) -> None:
         """Copy the ledger's files while their writer stands still, wherever in its writing it is, and open the copy."""

@@ -27,7 +27,6 @@ STARTS = "POSEFIT_STARTS"
 SLOW_SECONDS = "POSEFIT_SLOW_SECONDS"
 SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND, TOGETHER = 1001, 1002, 1003, 1004, 1005, 1006, 1007
 LEAVE, KILLED, EXIT, COMPILE = 1008, 1009, 1010, 1011
-LIMITS = Limits(seconds=300.0, gigabytes=1.0)
 
 
 def cells(count: int, frames: int = 60) -> list[TrackCell]:
@@ -38,9 +37,8 @@ def cells(count: int, frames: int = 60) -> list[TrackCell]:
 def behave(cell: TrackCell) -> CellResult:
     """Return a result that follows from the cell alone, or do harm."""
     if STARTS in os.environ:
-        file = os.open(os.environ[STARTS], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-        os.write(file, f"{cell.key} {os.getpid()}\n".encode())
-        os.close(file)
+        with open(os.environ[STARTS], "ab", buffering=0) as file:
+            file.write(f"{cell.key} {os.getpid()}\n".encode())
     match cell.frames:
         case n if n == SEGFAULT:
             ctypes.string_at(0)
@@ -48,8 +46,7 @@ def behave(cell: TrackCell) -> CellResult:
             while True:
                 pass
         case n if n == HOG:
-            hoard = [np.ones(2**24) for _ in range(10_000)]
-            del hoard
+            _ = [np.ones(2**24) for _ in range(10_000)]
         case n if n == RAISE:
             raise ZeroDivisionError("one\nby none")
         case n if n == LEAVE:

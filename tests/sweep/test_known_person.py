@@ -16,15 +16,10 @@ def cell(**fields: Any) -> TrackCell:
     return cell_of({**SPEC, **fields})
 
 
-def yaw(**fields: Any) -> float:
-    first = cell_scene(cell(**fields)).yaw
-    assert first is not None
-    return first
-
-
 def yaw_off(**fields: Any) -> float:
     """Return by how many radians the yaw that a method knows is off."""
-    return yaw(yaw_off_degrees=25.0, **fields) - yaw(**fields)
+    off, true = (cell_scene(cell(yaw_off_degrees=degrees, **fields)).yaw for degrees in (25.0, 0.0))
+    return off - true
 
 
 def test_the_first_yaw_is_off_by_no_more_than_the_limit_and_unknown_at_180() -> None:
@@ -38,12 +33,9 @@ def test_the_body_is_off_and_neither_the_truth_nor_the_observations() -> None:
     exact, off = cell_scene(cell()), cell_scene(cell(body_off_percent=10.0))
     shares = off.body.skeleton.lengths / exact.body.skeleton.lengths
     assert 1e-3 < np.abs(shares - 1.0).max() <= 0.1
-    assert exact.truth is not None
-    assert off.truth is not None
     assert np.array_equal(off.truth.skeleton.offsets, exact.truth.skeleton.offsets)
-    for k in range(2):
-        masks = [scene.observations[k].silhouettes[0].mask for scene in (exact, off)]
-        assert np.array_equal(*masks)
+    for one, other in zip(exact.observations, off.observations, strict=True):
+        assert np.array_equal(one.silhouettes[0].mask, other.silhouettes[0].mask)
 
 
 def test_the_yaw_is_off_by_the_same_for_every_method_and_seed_and_by_another_for_another_motion() -> None:

@@ -21,6 +21,7 @@ from posefit.sweep.command import swept
 from posefit.sweep.ledger import ATTEMPTS, FILE, LOSSES, Ledger, Writer
 from posefit.version import posefit_build
 from tests.cases import each
+from tests.sweep import fake
 from tests.sweep.fake import Instant, cells, filled, result
 
 ROOT = Path(__file__).parents[2]
@@ -86,19 +87,15 @@ SPEC = cells(1)[0].spec
         ("spec", {"more": 1}, "got one more: 'more'"),
     ],
 )
-def test_a_row_that_posefit_did_not_write_is_named_with_what_to_do(
-    column: str, change: dict[str, Any], reason: str, tmp_path: Path
-) -> None:
-    folder = filled(tmp_path / "results", 2)
-    key = cells(1)[0].key
+def test_a_row_that_posefit_did_not_write_is_named_with_what_to_do(column, change, reason, tmp_path: Path) -> None:
+    folder, key = filled(tmp_path / "results", 2), cells(1)[0].key
     text = json.dumps({**(ROW if column == "row" else SPEC), **change})
     changed(folder, f"UPDATE cells SET {column} = ? WHERE key = ?", text, key)
     with pytest.raises(ValueError, match=reason) as caught:
         runs_of(Ledger(folder))
-    message = str(caught.value)
-    assert f"{FILE}: the row of cell {key[:8]}" in message
-    fix = message.partition("to run it again: ")[2].partition('"')[2].rstrip('"')
-    changed(folder, fix)
+    assert f"{FILE}: the row of cell {key[:8]}" in str(caught.value)
+    fix = str(caught.value).partition("to run it again: ")[2]
+    changed(folder, fix.partition('"')[2].rstrip('"'))
     changed(folder, "UPDATE cells SET spec = ? WHERE key = ?", json.dumps(SPEC), key)
     filled(folder, 2)
     assert len(list(Ledger(folder).rows())) == 2
@@ -131,36 +128,34 @@ def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(tmp_p
 
 
 def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"expected a ledger, a folder or .sqlite file .*, got none"):
-        Ledger(tmp_path / "nowhere")
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(ValueError, match="got a folder without one"):
-        Ledger(tmp_path)
-    with pytest.raises(ValueError, match="expected a new folder or a ledger, got one with mine.txt"):
-        Writer(tmp_path / FILE)
-    with pytest.raises(ValueError, match="expected a folder for the ledger, got a file"):
-        Writer(tmp_path / "mine.txt" / FILE)
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-    other = tmp_path / "other" / FILE
-    other.parent.mkdir()
+    other, short, empty = (tmp_path / f"{name}.sqlite" for name in ("other", "short", "empty"))
+    (mine := tmp_path / "mine.txt").write_text("mine")
+    for opened, path, message in (
+        (Ledger, tmp_path / "nowhere", r"expected a ledger, a folder or .sqlite file .*, got none"),
+        (Ledger, tmp_path, "got a folder without one"),
+        (Writer, tmp_path / FILE, "expected a new folder or a ledger, got one with mine.txt"),
+        (Writer, mine / FILE, "expected a folder for the ledger, got a file"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            opened(path)
+        assert list(tmp_path.iterdir()) == [mine]
     with closing(sqlite3.connect(other)) as database, database:
         database.execute("CREATE TABLE notes (text TEXT)")
-    for opened in (Ledger, Writer):
-        with pytest.raises(ValueError, match="expected a ledger that posefit sweep wrote, got another SQLite file"):
-            opened(other)
-        (tmp_path / "other" / "short.sqlite").write_bytes(b"x")
-        with pytest.raises(ValueError, match="a whole SQLite file, got a file of 1 byte, too short to be one: take it"):
-            opened(tmp_path / "other" / "short.sqlite")
-    (empty := tmp_path / "empty" / FILE).parent.mkdir()
+    short.write_bytes(b"x")
     empty.touch()
+    folder = filled(tmp_path / "later", 1)
+    changed(folder, "PRAGMA user_version = 9")
+    for path, message in (
+        (other, "expected a ledger that posefit sweep wrote, got another SQLite file"),
+        (short, "a whole SQLite file, got a file of 1 byte, too short to be one: take it"),
+        (folder / FILE, "expected a ledger of format 1, got 9"),
+    ):
+        for opened in (Ledger, Writer):
+            with pytest.raises(ValueError, match=message):
+                opened(path)
     with pytest.raises(ValueError, match="expected a ledger that posefit sweep wrote, got an empty file"):
         Ledger(empty)
     Writer(empty).close()  # as where a driver was killed at once
-    folder = filled(tmp_path / "later", 1)
-    changed(folder, "PRAGMA user_version = 9")
-    for opened in (Ledger, Writer):
-        with pytest.raises(ValueError, match="expected a ledger of format 1, got 9"):
-            opened(folder / FILE)
 
 
 HOLD = """
@@ -175,7 +170,6 @@ with Writer(sys.argv[1]):
 def test_a_driver_that_was_killed_holds_nothing(tmp_path: Path) -> None:
     path = tmp_path / "results" / FILE
     with subprocess.Popen([sys.executable, "-c", HOLD, str(path)], cwd=ROOT, stdout=subprocess.PIPE) as held:
-        assert held.stdout is not None
         assert held.stdout.readline() == b"open\n"
         with pytest.raises(ValueError, match=f"got one that process {held.pid} of .* drives; --shard I/N"):
             Writer(path)
@@ -204,9 +198,8 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_loss
         ledger.plan([cell, lost])
         outcomes = [ledger.fail(cell.key, "its own", own) for own in (False, True, False, True, False, True)]
         assert outcomes == [False] * 5 + [True]
-        assert [ledger.fail(lost.key, "killed", is_own_fault=False) for _ in range(LOSSES)] == [False] * (
-            LOSSES - 1
-        ) + [True]
+        losses = [ledger.fail(lost.key, "killed", is_own_fault=False) for _ in range(LOSSES)]
+        assert losses == [False] * (LOSSES - 1) + [True]
         assert ledger.counts() == {"quarantined": 2}
         reasons = {row["key"]: row["reasons"] for row in Ledger(tmp_path / "results").quarantined()}
         assert reasons == {cell.key: ["its own"] * 3, lost.key: ["something outside ended it 50 times", "killed"]}
@@ -248,19 +241,12 @@ def test_a_name_changes_no_key_and_the_latest_plans_name_counts(tmp_path: Path) 
     assert [row["spec"]["name"] for row in Ledger(folder).rows()] == ["cold"]
 
 
-def old_ones(folder: Path) -> Path:
-    with Writer(folder / FILE) as ledger:
-        ledger.plan(old := [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)])
-        for cell in old:
-            ledger.finish(cell.key, result(cell))
-    return folder
-
-
 def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(tmp_path: Path) -> None:
-    folder = old_ones(tmp_path / "results")
+    folder = tmp_path / "results"
+    fake.swept(folder, [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)], Instant())
     assert Ledger(folder).version == "0.0.9 a1"
     messages: list[str] = []
-    assert swept(cells(3), folder, Instant(), messages.append).ran == 3  # type: ignore[arg-type]
+    assert swept(cells(3), folder, Instant(), messages.append).ran == 3
     assert messages == [f"2 rows in {folder} are of another version, posefit 0.0.9 a1, and do not count here"]
     ledger = Ledger(folder)
     assert len(ledger) == 5

@@ -4,13 +4,16 @@ import io
 import re
 import sys
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import posefit
+from posefit import Frame
 from posefit.evaluation.errors import anytime_trace
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
@@ -55,28 +58,17 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
 
 
 def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant_has_a_name() -> None:
-    methods = [COLD, "cma@pca", "random@full"]
-    plan = planned(
-        grid={"sapso.inertia": [0.7, 0.9], "pca.components": [4, 5]}, product={**PRODUCT, "methods": methods}
-    )
+    product = {**PRODUCT, "methods": [COLD, "cma@pca", "random@full"]}
+    plan = planned(grid={"sapso.inertia": [0.7, 0.9], "pca.components": [4, 5]}, product=product)
     sets = [(i, c) for i in (0.7, 0.9) for c in (4, 5)]
     assert [(cell.name, cell.method, dict(cell.settings)) for cell in plan] == [
         *(("cold", "sapso@pca", {"pca.components": c, "sapso.cooling": 0.8, "sapso.inertia": i}) for i, c in sets),
         *(("", "cma@pca", {"pca.components": c}) for c in (4, 5)),
         ("", "random@full", {}),
     ]
-    searches = Plan.of(
-        {
-            "suite": SUITE,
-            "methods": ["cma", "sapso"],
-            "functions": [1],
-            "instances": 1,
-            "grid": {"sapso.inertia": [0.7, 0.9]},
-        }
-    )
-    assert [(cell.method, cell.settings) for cell in searches] == [
-        ("cma", {}), ("sapso", {"inertia": 0.7}), ("sapso", {"inertia": 0.9})
-    ]  # fmt: skip
+    suite = {"suite": SUITE, "methods": ["cma", "sapso"], "functions": [1], "instances": 1}
+    searches = [(cell.method, cell.settings) for cell in Plan.of({**suite, "grid": {"sapso.inertia": [0.7, 0.9]}})]
+    assert searches == [("cma", {}), ("sapso", {"inertia": 0.7}), ("sapso", {"inertia": 0.9})]
 
 
 @each(
@@ -149,13 +141,11 @@ def test_a_cells_version_has_digests_of_posefit_and_of_its_methods_plugins_and_n
     assert all(re.fullmatch(r"\w+ [0-9a-f]{8}", part) for part in (*sapso[1:], *cma[1:]))
 
 
-def test_a_digest_changes_with_every_source_and_data_file_that_results_depend_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_digest_changes_with_every_file_that_results_depend_on(tmp_path: Path, monkeypatch: Any) -> None:
     package = tmp_path / "package"
     (package / "report").mkdir(parents=True)
     (package / "__init__.py").write_text("")
-    monkeypatch.setitem(sys.modules, "package", SimpleNamespace(__file__=str(package / "__init__.py")))  # type: ignore[arg-type]
+    monkeypatch.setitem(sys.modules, "package", SimpleNamespace(__file__=str(package / "__init__.py")))
     digests = [source_digest.__wrapped__("package", ("report",))]
     for name, counts in (("search.py", True), ("model.npz", True), ("notes.txt", False), ("report/page.py", False)):
         (package / name).write_text("1")
@@ -166,7 +156,6 @@ def test_a_digest_changes_with_every_source_and_data_file_that_results_depend_on
 def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -> None:
     def observed(**spec: Any) -> tuple[bytes, bytes]:
         scene = cell_scene(cell_of({**SMALL, "frames": 4, **spec}))
-        assert scene.truth is not None
         return scene.truth.poses.tobytes(), scene.observations[2].silhouettes[0].mask.tobytes()
 
     assert observed(instance=0)[0] == built_in.motion("walk", frames=4).poses.tobytes()
@@ -185,26 +174,21 @@ def test_a_share_of_the_frames_is_dropped() -> None:
 
 
 def test_a_file_that_changed_after_it_was_planned_is_not_followed(tmp_path: Path) -> None:
-    motion = built_in.motion("walk-b", frames=12)
-    write_asf(tmp_path / "one.asf", motion.skeleton)
-    write_amc(tmp_path / "one.amc", motion)
-    source = str(tmp_path / "one.amc")
-    spec = {**SMALL, "motion": source, "frames": 1, "fps": 120}
+    motion, asf, amc = built_in.motion("walk-b", frames=12), tmp_path / "one.asf", tmp_path / "one.amc"
+    write_asf(asf, motion.skeleton)
+    write_amc(amc, motion)
+    spec = {**SMALL, "motion": str(amc), "frames": 1, "fps": 120}
     cell = cell_of(spec)
-    assert cell.files == {str(path): digest_of(path) for path in (tmp_path / "one.amc", tmp_path / "one.asf")}
+    assert cell.files == {str(path): digest_of(path) for path in (amc, asf)}
     assert run_cell(cell).row["status"] == "done"
     with pytest.raises(ValueError, match=r"frames must be at most \d+, the length of"):
         cell_of({**spec, "frames": 500})
-    (tmp_path / "one.amc").write_text((tmp_path / "one.amc").read_text() + "\n")
+    amc.write_text(amc.read_text() + "\n")
     with pytest.raises(ValueError, match="one.amc must be the file that was planned, "):
         run_cell(cell)
 
 
 def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_evaluations() -> None:
-    import numpy as np
-
-    from posefit.fitting.tracker import Frame
-
     def frame(costs: list[float], step: int) -> Frame:
         trace = np.column_stack([step * np.arange(1, len(costs) + 1), costs])
         return Frame(np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), step * len(costs), trace)
@@ -215,8 +199,7 @@ def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_eval
     assert anytime_trace([frame([], 1)]) == {"evaluations": [], "cost": []}
     long = anytime_trace([frame(list(range(500, 0, -1)), 1)])
     assert len(long["cost"]) <= 64
-    assert long["evaluations"][-1] == 500
-    assert long["cost"][-1] == 1.0
+    assert (long["evaluations"][-1], long["cost"][-1]) == (500, 1.0)
 
 
 def test_a_worker_of_another_version_does_not_run_a_cell() -> None:
@@ -229,9 +212,7 @@ def test_a_worker_of_another_version_does_not_run_a_cell() -> None:
             run_cell(TrackCell("random@pca", "walk", ("walk-a",), version=version))
 
 
-def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(monkeypatch: Any) -> None:
     offer = Offer("tracker", "hold+still", Holds, "posefit-hold", "2.5")
     installed = Registry((Plugin("hold", "posefit-hold", "2.5", "loaded", offers=(offer,)),))
     for module in (check, method):
@@ -239,16 +220,15 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
     cell = cell_of({"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]})
     assert cell.version == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     row = run_cell(cell).row
-    assert row["prior_floor_degrees"] is None
-    assert row["trace"] == {"evaluations": [], "cost": []}  # it does not search
+    assert (row["prior_floor_degrees"], row["trace"]) == (None, {"evaluations": [], "cost": []})  # it does not search
 
 
 PLAIN = '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\n'
 
 
 def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(tmp_path: Path) -> None:
-    path, cells = tmp_path / "plan.toml", PLAIN
-    path.write_bytes(b"\xef\xbb\xbf" + cells.encode())
+    path = tmp_path / "plan.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + PLAIN.encode())
     assert len(Plan.read(path)) == 1
     for line, message in (
         (f"view_degrees = {10**400}", "view_degrees must be a finite number, got 1000"),
@@ -259,7 +239,7 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(t
         (f'"{"n" * 300}" = 1', "got 'n{76}[.]{3}$"),
         ("train = " + "[" * 9000, "not nested so deeply"),
     ):
-        path.write_text(cells + line)
+        path.write_text(PLAIN + line)
         with pytest.raises(ValueError, match=message):
             Plan.read(path)
 
@@ -272,14 +252,16 @@ def test_a_plan_on_standard_input_is_read_whole_or_refused(monkeypatch: Any) -> 
     assert len(Plan.read("-")) == 1
 
 
-@each(
-    "tables", [{"product": {"methods": ["random@pca"], "motions": ["walk"]}}, {"suite": SUITE, "methods": ["random"]}]
-)
-def test_a_large_plan_is_held_in_a_few_bytes_a_cell_and_no_signature_is_read_a_cell(tables: dict[str, Any]) -> None:
-    def of(seeds: int) -> Plan:
-        crossed = {"product": {**tables["product"], "seeds": seeds}} if "product" in tables else {"seeds": seeds}
-        return Plan.of({**tables, **crossed, **({"functions": [1], "instances": 1} if "suite" in tables else {})})
+def tracks(seeds: int) -> Plan:
+    return Plan.of({"product": {"methods": ["random@pca"], "motions": ["walk"], "seeds": seeds}})
 
+
+def searches(seeds: int) -> Plan:
+    return Plan.of({"suite": SUITE, "methods": ["random"], "functions": [1], "instances": 1, "seeds": seeds})
+
+
+@each("of", [tracks, searches])
+def test_a_large_plan_is_held_in_a_few_bytes_a_cell_and_no_signature_is_read_a_cell(of: Callable[[int], Plan]) -> None:
     of(10)
     calls = [effort(lambda seeds=seeds: of(seeds)).calls for seeds in (200, 400)]  # type: ignore[misc]
     assert (calls[1] - calls[0]) / 200 < 1000  # of Python and of C, a cell

@@ -35,10 +35,9 @@ def block(word: str) -> str:
 
 
 def test_sqlite3_says_which_method_has_the_lowest_error(folder: Path) -> None:
-    match = re.fullmatch(r'sqlite3 (\S+) "(.*)"\n', block("sqlite3 results"))
-    assert match is not None
-    with closing(sqlite3.connect(match[1])) as database:
-        assert database.execute(match[2]).fetchall() == [("sapso@pca", "", 2, 1.5), ("cma@pca", "", 2, 2.5)]
+    ((file, query),) = re.findall(r'^sqlite3 (\S+) "(.*)"\n$', block("sqlite3 results"))
+    with closing(sqlite3.connect(file)) as database:
+        assert database.execute(query).fetchall() == [("sapso@pca", "", 2, 1.5), ("cma@pca", "", 2, 2.5)]
 
 
 def test_pandas_says_which_settings_are_best(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

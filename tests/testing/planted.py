@@ -10,16 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from posefit import Frame, SearchSpace, Task
-from posefit.arrays import Array
-from posefit.fitting.box import draw_population, sample_normal
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit import Body, Camera, Frame, SearchSpace, Task, areas, mismatch, project
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
-from posefit.uncertainty.modes import Posterior
+from posefit.plugin import Array, Posterior, draw_population, sample_normal
 from posefit_filters.annealed import Annealed
 from posefit_priors.pca import PCA
+
+Rng = np.random.Generator
 
 
 class Planted:
@@ -35,9 +32,7 @@ class Planted:
 class Sound(Planted):
     """Shrinks a cloud around the best point; nothing is wrong with it, and the others each spoil one thing."""
 
-    def __init__(
-        self, space: SearchSpace, rng: np.random.Generator, *, population_size: int = 40, shrink: float = 0.9
-    ) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng, *, population_size: int = 40, shrink: float = 0.9) -> None:
         if population_size < 1:
             raise ValueError(f"population_size must be at least 1, got {population_size}")
         self.space, self.rng, self.shrink = space, rng, shrink
@@ -57,7 +52,7 @@ class Sound(Planted):
 
 
 class SwallowsSettings(Sound, breaks="construction unknown_setting"):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator, **settings: Any) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng, **settings: Any) -> None:
         super().__init__(space, rng)
 
 
@@ -118,7 +113,7 @@ class DrawsInSecret(Sound, breaks="evaluations"):
 
 
 class HasUntypedSettings(Sound, breaks="construction"):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator, *, shrink=0.9) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, space: SearchSpace, rng: Rng, *, shrink=0.9) -> None:  # type: ignore[no-untyped-def]
         super().__init__(space, rng, shrink=shrink)
 
 
@@ -153,7 +148,7 @@ class KnowsItsRows(Sound):
 
 
 class LeavesAThread(Sound):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, rng)
         threading.Thread(target=time.sleep, args=(120.0,), name="planted").start()
 
@@ -204,7 +199,7 @@ class FillsTheMemory(Sound, ends="it must not fail, got MemoryError: Unable to a
 
 
 class FewDimensionsOnly(Sound, breaks="dimensions"):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, rng)
         self.corners = np.zeros((9, 9))[: space.dimensions, : space.dimensions] + np.eye(space.dimensions)
 
@@ -216,23 +211,22 @@ class UsesGlobalNumpy(Sound, breaks="global_randomness"):
 
 
 class UsesTheClock(Sound, breaks="seeds"):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, np.random.default_rng(time.perf_counter_ns()))
 
 
 class IgnoresTheSeed(Sound, breaks="seeds"):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, np.random.default_rng(0))
 
 
 class HashesNames(Sound, breaks="new_process"):
     """Depends on the order of a set of words, which every process shuffles again."""
 
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
-        super().__init__(space, np.random.default_rng(abs(hash("posefit"))))
-        self.population = draw_population(
-            space, np.random.default_rng([abs(hash("posefit")), int(rng.integers(9**9))]), 40
-        )
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
+        shuffled = abs(hash("posefit"))
+        super().__init__(space, np.random.default_rng(shuffled))
+        self.population = draw_population(space, np.random.default_rng([shuffled, int(rng.integers(9**9))]), 40)
 
 
 class SortsInPlace(Sound, breaks="inputs"):
@@ -244,7 +238,7 @@ class SortsInPlace(Sound, breaks="inputs"):
 class HoldsALock(Sound, breaks="copies"):
     """Cannot be copied."""
 
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, rng)
         self.lock = threading.Lock()
 
@@ -254,7 +248,7 @@ class SharesItsGenerator(Sound, breaks="copies"):
 
     generators: dict[int, np.random.Generator] = {}  # noqa: RUF012
 
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, rng)
         self.key = id(rng)
         SharesItsGenerator.generators[self.key], self.rng = rng, rng
@@ -265,7 +259,7 @@ class SharesItsGenerator(Sound, breaks="copies"):
 
 
 class IgnoresTheStart(Sound, breaks="start"):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, rng)
         drawn = rng.uniform(-1.0, 1.0, (2000, space.dimensions))
         allowed = drawn[space.feasible(drawn)][:40]
@@ -279,9 +273,7 @@ class Slow(Sound, breaks="speed"):
 
 
 class HangsOnNonsense(Sound, breaks="nonsense_settings"):
-    def __init__(
-        self, space: SearchSpace, rng: np.random.Generator, *, population_size: int = 40, tries: int = 5
-    ) -> None:
+    def __init__(self, space: SearchSpace, rng: Rng, *, population_size: int = 40, tries: int = 5) -> None:
         super().__init__(space, rng, population_size=population_size)
         while tries != 0:
             tries -= 1
@@ -355,17 +347,12 @@ class Holds(Planted):
         self.pose = np.concatenate([np.zeros(3), task.training[0].poses[0, 3:]])
 
     def frame(self, observation: Any) -> Frame:
-        from posefit.silhouette.cost import areas, mismatch
-
         where = observation.translation
         counts = areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], self.pose[None], where[None])
-        cost = float(mismatch(counts)[0])
-        return Frame(self.pose, where, cost, counts, 1)
+        return Frame(self.pose, where, float(mismatch(counts)[0]), counts, 1)
 
     def draw(self, observation: Any, poses: int) -> None:
         """Draw so many poses, for nothing."""
-        from posefit.silhouette.cost import areas
-
         many, places = np.tile(self.pose, (poses, 1)), np.tile(observation.translation, (poses, 1))
         areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], many, places)
 

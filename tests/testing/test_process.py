@@ -17,6 +17,7 @@ from tests.testing import planted
 from tests.testing.sabotage import install, named
 
 ROOT = Path(__file__).parents[2]
+TRACK = ("track", "walk", "--frames", ":1", "--evaluations", "80", "--method")
 
 
 @pytest.fixture
@@ -49,26 +50,17 @@ def test_what_ends_a_process_fails_the_check_that_ran(bug: Any, monkeypatch: Any
 @pytest.mark.usefixtures("installed")
 def test_the_checks_go_on_after_one_that_ended_the_process_until_another_fails_alike() -> None:
     report = check_in_process("optimiser", "ends-the-process", only=["shape", "dtype", "dimensions", "speed"])
-    assert [(result.name, result.outcome) for result in report.results] == [
-        ("shape", "passed"),
-        ("dtype", "failed"),
-        ("dimensions", "failed"),
-        ("speed", "skipped"),
-    ]
+    outcomes = {"shape": "passed", "dtype": "failed", "dimensions": "failed", "speed": "skipped"}
+    assert [(result.name, result.outcome) for result in report.results] == list(outcomes.items())
     assert report.results[-1].detail == "not run: dtype and dimensions fail for one cause"
 
 
-def test_a_name_that_two_plugins_register_is_not_checked_before_one_has_another(
-    monkeypatch: Any, tmp_path: Path
-) -> None:
+def test_a_name_that_two_plugins_register_is_checked_once_one_has_another(monkeypatch: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "from posefit.plugin import hookimpl\n@hookimpl\n"
         "def posefit_register_optimisers(register):\n    register('sapso', dict)\n"
     )
-    info = tmp_path / "posefit_mine-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: posefit-mine\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[posefit]\nmine = mine\n")
+    install(tmp_path, "mine", "mine")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     ran = posefit("check", "optimiser", "sapso")
     assert ran.returncode == 2
@@ -84,7 +76,7 @@ def test_what_a_plugin_prints_is_in_no_result() -> None:
     checked = posefit("check", "optimiser", "talks", "--only", "shape", "--only", "new_process", "--json")
     assert checked.returncode == 0
     assert [result["outcome"] for result in json.loads(checked.stdout)["results"]] == ["passed", "passed"]
-    tracked = posefit("track", "walk", "--method", "talks", "--frames", ":1", "--evaluations", "80", "--json")
+    tracked = posefit(*TRACK, "talks", "--json")
     assert tracked.returncode == 0, tracked.stderr
     assert json.loads(tracked.stdout)["method"] == "talks@pca"
     for ran in (checked, tracked):
@@ -94,15 +86,12 @@ def test_what_a_plugin_prints_is_in_no_result() -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
-    for blame in (
-        "optimiser 'exits-in-tell' of posefit-sabotage 1.0: tell",
-        "tracker 'exits-in-track' of posefit-sabotage 1.0: it",
-    ):
-        method = blame.split("'")[1]
-        ran = posefit("track", "walk", "--method", method, "--frames", ":1", "--evaluations", "80")
+    for kind, name, what in (("optimiser", "exits-in-tell", "tell"), ("tracker", "exits-in-track", "it")):
+        ran = posefit(*TRACK, name)
         assert (ran.returncode, ran.stdout) == (2, "")
         (line,) = [line for line in ran.stderr.splitlines() if line.startswith("posefit: ")]
-        assert line.startswith(f"posefit: {blame} must not end the program, got SystemExit: 0")
+        blame = f"posefit: {kind} '{name}' of posefit-sabotage 1.0: {what}"
+        assert line.startswith(f"{blame} must not end the program, got SystemExit: 0")
         assert "Traceback" not in ran.stderr
 
 
@@ -117,7 +106,8 @@ def test_the_process_of_a_check_ends_with_the_one_that_started_it(tmp_path: Path
         finally:
             ran.kill()
             ran.wait()
-    wait_until(lambda: not Path(f"/proc/{child}/cmdline").exists() or not Path(f"/proc/{child}/cmdline").read_bytes())
+    words_of = Path(f"/proc/{child}/cmdline")
+    wait_until(lambda: not words_of.exists() or not words_of.read_bytes())
 
 
 def children(process: int) -> list[int]:
@@ -135,9 +125,7 @@ def wait_until(condition: Callable[[], Any]) -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_a_thread_that_a_plugin_leaves_running_does_not_keep_a_track_from_ending() -> None:
-    ran = posefit(
-        "track", "walk", "--method", "leaves-a-thread", "--frames", ":1", "--evaluations", "80", "--threads", "2"
-    )
+    ran = posefit(*TRACK, "leaves-a-thread", "--threads", "2")
     assert ran.returncode == 0
     assert ran.stderr.splitlines()[-1] == "posefit: not waiting for what a plugin left running: planted"
 
