@@ -278,18 +278,23 @@ def rows_of(
 
 
 def shown_persons(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
-    """Return which of some people the mask of each frame shows, by index: where nobody, whom the mask before shows.
+    """Return which of some people the mask of each frame shows, by index; where nobody, whom one before it shows.
 
-    None where a mask is empty, or shows more than half as much of another.
+    None where a mask is empty, shows more than half as much of another, or where none shows anybody.
     """
-    result, latest = list[int | None](), None
+    nobody, result = -1, list[int | None]()
     for k, mask in enumerate(masks):
         shown = [part_at(parts, k) for parts in persons]
         shares = [0 if part is None else _common(part.detections[k][0], mask) for part in shown]
         *_, second, most = sorted(shares)
         clear = mask.any() and most >= CLEARER * second
-        latest = shares.index(most) if clear and most else latest
-        result.append(latest if clear else None)
+        result.append((shares.index(most) if most else nobody) if clear else None)
+    latest = next((number for number in result if number not in (None, nobody)), None)
+    for k, number in enumerate(result):
+        if number == nobody:
+            result[k] = latest
+        elif number is not None:
+            latest = number
     return result
 
 

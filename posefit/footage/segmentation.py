@@ -345,9 +345,11 @@ class Segmentation:
         scan = self._scan(progress)
         persons, learned = scan.people.persons(), self._segmenter.learned
         doubted = [verdict(rows_of(person, scan.blanks)[1], self.how.name, learned=learned) for person in persons]
-        if len(persons) < 2 or scan.camera_moves or all(doubted) or not alone.masks.any():
+        if len(persons) < 2 or scan.camera_moves or all(doubted):
             return alone
         numbers = shown_persons(persons, (unpacked(plane, self.size) for plane in alone.masks))
+        if not any(number is not None for number in numbers):
+            return alone
         most = max(range(len(persons)), key=numbers.count)
         parts, _ = scan.people.chosen(self.how.person or 1 + most, str, 1.0 / self._segmenter.scale)
         landmarks, facings = np.zeros_like(alone.landmarks), [math.nan] * len(numbers)

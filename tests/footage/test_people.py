@@ -9,7 +9,7 @@ import numpy as np
 
 import posefit
 from posefit.footage.cleaning import people_in
-from posefit.footage.people import People, planes_of
+from posefit.footage.people import People, planes_of, shown_persons
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
@@ -94,6 +94,17 @@ def test_a_segmenter_that_goes_over_to_another_person_is_used_where_it_shows_the
     assert not given[~right].any()
     assert given[right & (np.arange(len(pairs)) >= EMPTY)].mean() > 0.7  # but for the meeting
     assert np.median(shares[given, followed]) > 0.9
+
+
+def test_whom_a_mask_shows_is_who_is_there_or_else_whom_the_one_before_shows() -> None:
+    people, sides = People(30.0), np.zeros((3, *SIZE[::-1]), dtype=bool)
+    sides[0, 20:100, 20:50] = sides[1, 30:100, 115:145] = sides[2, 20:100, 70:90] = True
+    for _ in range(12):
+        people.add([sides[0], sides[1]])
+    left, right, nobody = sides
+    masks = [nobody, left, nobody, right, left | right, nobody, np.zeros_like(left), right | nobody]
+    assert shown_persons(people.persons(), masks) == [0, 0, 0, 1, None, 1, None, 1]
+    assert shown_persons(people.persons(), [nobody] * 2) == [None] * 2
 
 
 def test_parts_that_take_turns_are_no_time_apart() -> None:
