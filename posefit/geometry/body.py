@@ -42,10 +42,10 @@ class Body:
             raise InputError(f"radii must not be negative, got {self.radii.min()}")
 
     @classmethod
-    def of(cls, skeleton: Skeleton, girth: float = 1.0) -> "Body":
-        """Return the body whose radii are `PROPORTIONS` of the bone lengths, times `girth`."""
+    def of(cls, skeleton: Skeleton) -> "Body":
+        """Return the body whose radii are `PROPORTIONS` of the bone lengths."""
         shares = np.array([PROPORTIONS[kind(bone)] for bone in BONES])
-        return cls(skeleton, girth * shares * skeleton.lengths[:, None])
+        return cls(skeleton, shares * skeleton.lengths[:, None])
 
     def joint_radii(self) -> Array:
         """Return the largest radius (27,) that a bone has at each joint."""

@@ -54,10 +54,10 @@ class Recalibration:
         return {name: np.round(value, DIGITS).tolist() for name, value in vars(self).items()}
 
 
-def reliability(probabilities: Array, right: NDArray[np.bool_], bins: int = BINS) -> list[tuple[int, float, float]]:
+def reliability(probabilities: Array, right: NDArray[np.bool_]) -> list[tuple[int, float, float]]:
     """Return the number of probabilities (n,) in each bin that has any, their mean, and the share that is right."""
     predicted, observed = np.asarray(probabilities, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    bin_of = np.minimum((predicted * bins).astype(np.int64), bins - 1)
+    bin_of = np.minimum((predicted * BINS).astype(np.int64), BINS - 1)
     return [
         (int((bin_of == k).sum()), float(predicted[bin_of == k].mean()), float(observed[bin_of == k].mean()))
         for k in np.unique(bin_of)
