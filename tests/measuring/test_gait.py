@@ -202,17 +202,9 @@ def test_a_few_frames_are_not_worth_a_warning() -> None:
     assert backwards_warning(np.arange(100) < 5).startswith("the person seems to walk backwards in 5 of 100 frames")
 
 
-@pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("track") / "out"
-
-
-@pytest.fixture(scope="module")
-def tracked(out: Path) -> posefit.Track:
-    return posefit.track("walk", size=(160, 120), out=out)
-
-
-def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> None:
+def test_a_track_of_a_walk_has_its_gait(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    tracked = posefit.track("walk", size=(160, 120), out=out)
     gait = json.loads((out / "summary.json").read_text())["gait"]
     assert gait == tracked.summary["gait"]
     assert gait["walk"] is True
