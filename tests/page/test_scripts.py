@@ -74,10 +74,7 @@ def test_colours_have_contrast_with_their_background_in_light_and_dark():
         shown = {**colours, **{name: base[name] for name in ("ink", "soft", "accent", "bad")}}
         for name, colour in shown.items():
             if colour.startswith("#"):
-                assert min(contrast(colour, base[behind]) for behind in ("back", "card")) >= MIN_CONTRAST, (
-                    name,
-                    colour,
-                )
-        assert (
-            len({colours[f"c{k}"] for k in range(report_page.COLOUR_COUNT)}) == report_page.COLOUR_COUNT == len(COLOURS)
-        )
+                least = min(contrast(colour, base[behind]) for behind in ("back", "card"))
+                assert least >= MIN_CONTRAST, (name, colour)
+        drawn = {colours[f"c{k}"] for k in range(report_page.COLOUR_COUNT)}
+        assert len(drawn) == report_page.COLOUR_COUNT == len(COLOURS)
