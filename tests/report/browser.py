@@ -14,6 +14,7 @@ import pytest
 
 from posefit.sweep.cell import CellResult, TrackCell, cell_from, packed_joints
 from posefit.sweep.ledger import FILE, Writer
+from tests.commands import run
 
 # what no page may take for markup
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028'\"&"
@@ -88,6 +89,14 @@ def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
         "trace": {"evaluations": [40, 80, 120], "cost": [4.0 * error, 2.0 * error, error]},
         "mode_reliability": [],
     } | more
+
+
+def written(made: Path, *words: object) -> tuple[list[str], str]:
+    """Return the lines that `posefit report` prints of a ledger, and the page that it writes beside it."""
+    out = made.with_name("report.html")
+    done = run("report", made, "--out", out, *words)
+    assert done.exit_code == 0, done.stderr
+    return done.stdout.splitlines(), out.read_text("utf-8")
 
 
 def data_in(page: str) -> dict[str, Any]:
