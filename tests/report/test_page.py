@@ -90,10 +90,7 @@ def test_it_opens_without_errors_and_is_accessible_in_every_width_and_scheme(
     chromium: Any, tracks: Path, searches: Path, width: int
 ) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install posefit[browser]")
-    figures = {
-        tracks: ("standing", "convergence", "profile", "joint-errors"),
-        searches: ("standing", "chart-0"),
-    }
+    figures = {tracks: ("standing", "convergence", "profile", "joint-errors"), searches: ("standing", "chart-0")}
     for path, names in figures.items():
         for scheme in ("light", "dark"):
             with shown(chromium, path, width, color_scheme=scheme, bypass_csp=True) as page:
