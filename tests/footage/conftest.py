@@ -1,6 +1,6 @@
 """A synthetic video of a walk, whose masks are known."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -49,17 +49,31 @@ def truth(azimuth: float = np.pi / 2) -> list[Any]:
     return [project(body, camera(azimuth), pose, place) for pose, place in placed]
 
 
+def encoded(path: Path, images: Iterable[Any], codec: str = "MJPG") -> Path:
+    """Write a video of images."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 25.0, SIZE)
+    for image in images:
+        writer.write(image)
+    writer.release()
+    return path
+
+
 def film(path: Path, masks: list[Any]) -> Path:
     """Write a video of a person before a still, noisy background."""
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
     rng = np.random.default_rng(0)
     background = cv2.GaussianBlur(rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0)
     background = (background - background.mean()) * 4.0 + 150.0
+    images = []
     for mask in masks:
         image = background + rng.normal(0.0, 2.0, background.shape)
         image[mask] = (40.0, 30.0, 120.0)
-        writer.write(np.clip(image, 0, 255).astype(np.uint8))
-    writer.release()
+        images.append(np.clip(image, 0, 255).astype(np.uint8))
+    return encoded(path, images)
+
+
+def stack(path: Path, masks: Sequence[Any], **more: Any) -> Path:
+    """Write masks to an .npz file."""
+    np.savez(path, masks=np.stack(masks), **more)
     return path
 
 

@@ -11,7 +11,7 @@ from posefit.footage.source import scene_of
 from posefit.geometry.units import METRES, UNIT_NAMES
 from tests.cases import each
 from tests.commands import error_of, printed
-from tests.footage.conftest import camera, truth, walk
+from tests.footage.conftest import camera, stack, truth, walk
 from tests.footage.test_footage import toml
 
 AZIMUTHS = (np.pi / 2, 0.6)
@@ -28,9 +28,8 @@ def calibration(path: Path, metres: float, azimuths: Any = AZIMUTHS) -> Path:
 
 
 def views(tmp_path: Path) -> list[Path]:
-    for name, azimuth in zip("ab", AZIMUTHS, strict=True):
-        np.savez(tmp_path / f"{name}.npz", masks=np.stack(truth(azimuth)[8:14]).astype(np.uint8), fps=25.0)
-    return [tmp_path / "a.npz", tmp_path / "b.npz"]
+    named = zip("ab", AZIMUTHS, strict=True)
+    return [stack(tmp_path / f"{name}.npz", truth(azimuth)[8:14], fps=25.0) for name, azimuth in named]
 
 
 @each("unit", ["m", "cm", "mm", "inch"])

@@ -1,6 +1,5 @@
 """Masks from video: synthetic ones with a known person, and video whose frames come at uneven times."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,9 @@ from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Still, mean_background, people
 from tests.cases import each
-from tests.commands import error_of, run
+from tests.commands import error_of, printed, run
 from tests.files import arrays, csv_rows
-from tests.footage.conftest import EMPTY, FRAMES, SIZE, Box, iou, truth
+from tests.footage.conftest import EMPTY, FRAMES, NOBODY, SIZE, Box, encoded, iou, stack, truth
 from tests.footage.matroska import write_matroska
 
 
@@ -45,11 +44,8 @@ def test_each_method_finds_the_person(
 
 def test_a_video_of_masks_is_taken_as_it_is(tmp_path: Path) -> None:
     masks = truth()[8:20]
-    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"FFV1"), 25.0, SIZE)
-    for mask in masks:
-        writer.write(255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2))
-    writer.release()
-    result = extract(tmp_path / "a.avi", tmp_path / "out", Extraction("masks"))
+    images = [255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks]
+    result = extract(encoded(tmp_path / "a.avi", images, "FFV1"), tmp_path / "out", Extraction("masks"))
     assert result["usable"] == 12
     stored = arrays(tmp_path / "out" / "masks.npz")
     assert np.mean([iou(a > 0, b) for a, b in zip(stored["masks"], masks, strict=True)]) > 0.95
@@ -114,16 +110,10 @@ def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_fil
 
 
 def test_the_command_prints_a_summary(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
-    result = run("extract", filmed[0], "--out", tmp_path / "out", "--frames", "20:40", "--json")
-    assert result.exit_code == 0, result.stderr
-    summary = json.loads(result.stdout)
-    assert summary["frames"] == 20
-    assert summary["size"] == [160, 120]
-    assert summary["guesses"] == []
-    smaller = run(
-        "extract", filmed[0], "--out", tmp_path / "two", "--frames", "20:40", "--width", "80", "--roi", "0,0,160,120"
-    )
-    assert "20 frames" in smaller.stdout
+    words = ["extract", filmed[0], "--frames", "20:40", "--out"]
+    summary = printed(*words, tmp_path / "out")
+    assert (summary["frames"], summary["size"], summary["guesses"]) == (20, [160, 120], [])
+    assert "20 frames" in run(*words, tmp_path / "two", "--width", "80", "--roi", "0,0,160,120").stdout
     assert arrays(tmp_path / "two" / "masks.npz")["masks"].shape == (20, 60, 80)
 
 
@@ -167,14 +157,11 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
 def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     usable = np.ones(12, dtype=bool)
     usable[[0, 5, 6]] = False
-    masks = np.stack(truth()[10:22]).astype(np.uint8)
-    masks[6] = 0  # no person at all
-    path = tmp_path / "a.npz"
-    np.savez(path, masks=masks, usable=usable)
+    masks = truth()[10:22]
+    masks[6] = NOBODY
+    path = stack(tmp_path / "a.npz", masks, usable=usable)
     result = posefit.track(path, method="sapso", view_degrees=90, evaluations=400, smooth=False, out=tmp_path / "out")
-    assert result.summary["frames"] == 12
-    assert result.summary["held_frames"] == 3
-    assert result.summary["evaluations"] == 9 * 400
+    assert [result.summary[name] for name in ("frames", "held_frames", "evaluations")] == [12, 3, 9 * 400]
     assert result.table["usable"].tolist() == usable.astype(float).tolist()
     poses = result.motion.poses
     np.testing.assert_array_equal(poses[5], poses[4])
@@ -199,9 +186,8 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     ],
 )
 def test_masks_that_contradict_themselves_are_named(tmp_path: Path, more: dict[str, Any], message: str) -> None:
-    np.savez(tmp_path / "a.npz", masks=np.stack(truth()[10:22]), **more)
     with pytest.raises(ValueError, match=message):
-        posefit.track(tmp_path / "a.npz")
+        posefit.track(stack(tmp_path / "a.npz", truth()[10:22], **more))
 
 
 def frame_numbers(video: Video, *chosen: Any) -> list[int]:

@@ -15,7 +15,7 @@ from posefit.footage.source import kind_of, scene_of
 from posefit.footage.video import Video
 from tests.cases import each
 from tests.commands import error_of
-from tests.footage.conftest import EMPTY, SIZE, film, truth
+from tests.footage.conftest import EMPTY, SIZE, film, iou, stack, truth
 from tests.footage.matroska import write_matroska
 
 
@@ -56,9 +56,8 @@ def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Pat
         os.rename(tmp_path / "walk.avi", f"{strange}.avi")
         words = ("track", f"{strange}.avi", "--out", tmp_path / "out")
     elif where == "masks":
-        np.savez(strange + ".npz", masks=truth()[:4])
         (tmp_path / "walk.avi").unlink()
-        words = ("track", strange + ".npz", "--out", tmp_path / "out")
+        words = ("track", stack(Path(f"{strange}.npz"), truth()[:4]), "--out", tmp_path / "out")
     elif where == "live":
         words = ("track", "--live", strange)
     elif where == "extract":
@@ -92,11 +91,8 @@ def test_pictures_are_a_film(filmed: tuple[Path, list[Any]], tmp_path: Path, suf
     assert kind_of((folder / f"frame0{suffix}",)) == "masks"  # a single one, which is refused there
     scene, other = (scene_of([source], fps=fps) for source, fps in ((folder, 25.0), (path, None)))
     assert (scene.count, scene.fps) == (len(masks), 25.0)
-    overlaps = []
-    for k in range(EMPTY + 12, EMPTY + 30):
-        first, second = (one.observations[k].silhouettes[0].mask for one in (scene, other))
-        overlaps.append((first & second).sum() / (first | second).sum())
-    assert np.median(overlaps) > 0.9
+    views = [[one.observations[k].silhouettes[0].mask for k in range(EMPTY + 12, EMPTY + 30)] for one in (scene, other)]
+    assert np.median([iou(*pair) for pair in zip(*views, strict=True)]) > 0.9
     assert "30 frames a second" in scene_of([folder]).guesses
 
 
