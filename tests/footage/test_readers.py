@@ -142,11 +142,6 @@ def test_two_fractions_are_a_mask_whichever_they_are(
     assert guesses == ([] if usual else [f"{tmp_path / 'a.npy'}: masks of values from {min(values):g} to {max(values):g}: the person is the higher of two"])  # fmt: skip
 
 
-def degrees_of(soft: Any, scale: float) -> Any:
-    """Return degrees a little below 0, as bicubic scaling makes them."""
-    return soft * scale - 0.02 * scale
-
-
 def test_labels_may_be_whole_numbers_held_as_fractions(walk: list[Any], tmp_path: Path) -> None:
     labels = np.stack(walk).astype(np.float32)
     labels[:, :30, :30] = 2.0
@@ -162,8 +157,9 @@ def test_logits_are_cut_at_zero_and_degrees_half_way(walk: list[Any], tmp_path: 
     np.save(tmp_path / "a.npy", logits)
     (guess,) = check(tmp_path / "a.npy", list(logits > 0.0))
     assert guess.endswith("masks of values from -20 to 10 are logits: the person is above 0")
-    for scale, threshold in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0), (10.0, 0.5 * float(degrees_of(soft, 10.0).max()))):
-        degrees = degrees_of(soft, scale)
+    for scale, half in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0), (10.0, None)):
+        degrees = soft * scale - 0.02 * scale  # a little below 0, as bicubic scaling makes them
+        threshold = half or 0.5 * float(degrees.max())
         np.save(tmp_path / "a.npy", degrees)
         (guess,) = check(tmp_path / "a.npy", list(degrees > threshold))
         assert guess.endswith(f"are degrees: the person is above {threshold:g}")
@@ -182,10 +178,9 @@ def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) 
 def test_a_person_who_touches_the_border_in_all_masks_is_followed(walk: list[Any], tmp_path: Path) -> None:
     for k, mask in enumerate(walk):  # cut to the person, as silhouettes of gait are
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        cut = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        Image.fromarray(255 * cv2.resize(cut.astype(np.uint8), (88, 128), interpolation=cv2.INTER_NEAREST)).save(
-            tmp_path / f"{k:03}.gif"
-        )
+        cut = 255 * mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.uint8)
+        large = cv2.resize(cut, (88, 128), interpolation=cv2.INTER_NEAREST)
+        Image.fromarray(large).save(tmp_path / f"{k:03}.gif")
     scene = scene_of([tmp_path])
     assert [scene.observations[k].usable for k in range(len(walk))] == [True] * len(walk)
 
