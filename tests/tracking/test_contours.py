@@ -110,8 +110,7 @@ def pull_of_view(view: MaskContours, k: int, here: Array, there: Array, reach: f
     The drawn body's numbers are `here` (106,), and `there` (n, 106) where each parameter is off by `STEP`.
     """
     root = view.metres[k]
-    points = view.points[view.starts[k] : view.starts[k + 1]]
-    points = np.ascontiguousarray(points)
+    points = np.ascontiguousarray(view.points[view.starts[k] : view.starts[k + 1]])
     mask = kernels.Contour(view.fields[k], view.corners[k], view.sizes[k], points, view.step)
     curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
     deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
@@ -354,18 +353,15 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     estimate = estimate_of(truth, 3.0)
     sure = Recalibration(joint_spreads=np.append(0.0, np.full(len(JOINTS) - 1, 0.006)))
     posterior = Posterior(estimate.poses[:2], estimate.translations[:2], np.ones(2), recalibration=sure)
-    nothing = np.zeros((1, 3), np.int64)
-    frames = [
-        Frame(pose, place, 0.0, nothing, 0, posterior=posterior)
-        for pose, place in zip(estimate.poses, estimate.translations, strict=True)
-    ]
+    known, nothing = zip(estimate.poses, estimate.translations, strict=True), np.zeros((1, 3), np.int64)
+    frames = [Frame(*pose, 0.0, nothing, 0, posterior=posterior) for pose in known]
     (_, alone, none), (_, both, shape) = (smooth(scene, frames, each, 0.5) for each in (None, average_shape(scene)))
     assert none is None
     costs = [np.mean([frame.cost for frame in each]) for each in (both, alone)]
     assert costs[0] < 0.7 * costs[1]
     assert shape.cost == pytest.approx(costs[0])
-    moved, pose, known = both[0].posterior, both[0].pose, alone[0].posterior
-    assert known.recalibration is moved.recalibration is sure
+    moved, pose = both[0].posterior, both[0].pose
+    assert alone[0].posterior.recalibration is moved.recalibration is sure
     np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
     apart = estimate.translations[1] - estimate.translations[0]
     np.testing.assert_allclose(moved.translations[1] - both[0].translation, apart)

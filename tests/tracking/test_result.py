@@ -15,6 +15,7 @@ from posefit.errors import InputError
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from tests.cases import each
+from tests.files import arrays
 
 QUICK: dict[str, Any] = {"method": "random@loose", "evaluations": 40, "restarts": 1, "body_frames": 0, "smooth": False}
 MOTION = built_in.motion("walk", frames=3)
@@ -119,8 +120,7 @@ def test_the_files_of_a_track_have_the_build_that_was_fitted(tmp_path: Path) -> 
     masks = [project(BODY, CAMERA, *pose) for pose in zip(motion.poses, motion.translations, strict=True)]
     track = posefit.track(masks, camera=CAMERA, fps=25, out=tmp_path / "out", **{**QUICK, "body_frames": 6})
     assert track.log.build is not None
-    with np.load(tmp_path / "out" / "poses.npz") as stored:
-        np.testing.assert_array_equal(stored["radii"], track.scene.body.radii)
+    np.testing.assert_array_equal(arrays(tmp_path / "out" / "poses.npz")["radii"], track.scene.body.radii)
 
 
 def test_methods_are_compared(tmp_path: Path) -> None:
