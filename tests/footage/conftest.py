@@ -17,6 +17,7 @@ from posefit.motion import built_in
 from posefit.registry import Offer
 from posefit.silhouette.cost import project
 
+Film = tuple[Path, list[Any]]  # a video and the true mask of each frame
 SIZE = (160, 120)
 NOBODY = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
 ALL = (None, None)  # frames
@@ -84,7 +85,7 @@ def six_masks() -> list[Any]:
 
 
 @pytest.fixture(scope="session")
-def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> Film:
     masks = [NOBODY] * EMPTY + truth()
     return film(tmp_path_factory.mktemp("video") / "walk.avi", masks), masks
 

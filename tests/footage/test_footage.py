@@ -25,7 +25,7 @@ from posefit.progress import Progress
 from posefit.uncertainty.modes import nearer_mirrored
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.footage.conftest import ALL, EMPTY, NOBODY, SIZE, camera, encoded, film, iou, stack, truth, walk
+from tests.footage.conftest import ALL, EMPTY, NOBODY, SIZE, Film, camera, encoded, film, iou, stack, truth, walk
 from tests.tracking.scenes import stopping
 
 QUICK: dict[str, Any] = {
@@ -38,7 +38,7 @@ QUICK: dict[str, Any] = {
 BRIEF = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0"]
 
 
-def test_a_video_is_tracked_from_nothing_but_its_frames(filmed: tuple[Path, list[Any]]) -> None:
+def test_a_video_is_tracked_from_nothing_but_its_frames(filmed: Film) -> None:
     settings = {**QUICK, "body_frames": 12, "restarts": 4, "evaluations": 1000}
     result = posefit.track(filmed[0], height=1.7, **settings)
     assert result.summary["frames"] == 24
@@ -65,7 +65,7 @@ def toml(path: Path, *cameras: posefit.Camera) -> Path:
     return path
 
 
-def test_two_calibrated_cameras_place_the_person(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+def test_two_calibrated_cameras_place_the_person(filmed: Film, tmp_path: Path) -> None:
     calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
     sources = [stack(tmp_path / f"{k}.npz", truth(azimuth)[6:30]) for k, azimuth in enumerate((np.pi / 2, 0.6))]
     result = posefit.track(sources, camera=calibration, up="y", **{**QUICK, "method": "sapso@pca", "frames": ALL})
@@ -187,16 +187,14 @@ def flickering(image: Any, k: int) -> Any:
 
 
 @each("change", [in_front, flickering])
-def test_a_camera_that_stands_still_does_not_seem_to_move(
-    filmed: tuple[Path, list[Any]], change: Callable[[Any, int], Any]
-) -> None:
+def test_a_camera_that_stands_still_does_not_seem_to_move(filmed: Film, change: Callable[[Any, int], Any]) -> None:
     camera_motion = CameraMotion(SIZE)
     for k, image in enumerate(Video.of(filmed[0]).frames(0, None, SIZE)):
         camera_motion.add(k, np.clip(change(image.astype(np.float32), k), 0, 255).astype(np.uint8))
     assert not camera_motion.moves
 
 
-def test_a_video_that_changes_its_size_is_named(filmed: tuple[Path, list[Any]]) -> None:
+def test_a_video_that_changes_its_size_is_named(filmed: Film) -> None:
     with pytest.raises(ValueError, match="walk.avi: expected frames of 160x60, got 160x120 in frame 0"):
         list(replace(Video.of(filmed[0]), size=(160, 60)).frames(0, None, (160, 60)))
 
@@ -217,9 +215,7 @@ def test_a_video_that_changes_its_size_is_named(filmed: tuple[Path, list[Any]]) 
         (["VIDEO", "--frames", "0:5"], "expected a person who moves before a still background, got none in any frame"),
     ],
 )
-def test_a_mistake_with_footage_is_one_line_and_leaves_nothing(
-    filmed: tuple[Path, list[Any]], tmp_path: Path, words: list[str], message: str
-) -> None:
+def test_a_mistake_with_footage_leaves_one_line(filmed: Film, tmp_path: Path, words: list[str], message: str) -> None:
     inputs = tmp_path / "in"
     inputs.mkdir()
     (inputs / "large.json").write_text(posefit.Camera.around(np.zeros(3), 0.0, 4.0, (320, 240)).to_json())

@@ -48,9 +48,7 @@ def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) 
 
 
 @each("suffix", [".gif", ".webp", ".tif"])
-def test_a_folder_of_images_of_any_kind_is_read_as_pillow_reads_it(
-    walk: list[Any], tmp_path: Path, suffix: str
-) -> None:
+def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(walk: list[Any], tmp_path: Path, suffix: str) -> None:
     for k, image in enumerate(drawn(walk)):
         image.save(tmp_path / f"{k:03}{suffix}")
     wanted = [read_by_pillow(tmp_path / f"{k:03}{suffix}") for k in range(len(walk))]
@@ -113,9 +111,7 @@ def test_what_numbers_in_names_mean_is_reported(names: list[str], count: int, gu
         (["img_3.png", "img_4.png", "mask_3.png"], "expected one image a frame, got img_3.png and mask_3.png"),
     ],
 )
-def test_other_pictures_beside_masks_are_refused(
-    walk: list[Any], tmp_path: Path, names: list[str], message: str
-) -> None:
+def test_other_pictures_with_masks_are_refused(walk: list[Any], tmp_path: Path, names: list[str], message: str) -> None:
     for name in names:
         drawn(walk)[0].save(tmp_path / name)
     with pytest.raises(ValueError, match=message):
@@ -133,9 +129,7 @@ def test_a_photo_among_jpegs_is_refused_by_name(walk: list[Any], tmp_path: Path)
 
 
 @each("values", [(0.0, 0.3), (0.0, 2.0), (-3.0, 3.0), (0.0, 1.0), (-1.0, 0.0)])
-def test_two_fractions_are_a_mask_whichever_they_are(
-    walk: list[Any], tmp_path: Path, values: tuple[float, float]
-) -> None:
+def test_any_two_fractions_are_a_mask(walk: list[Any], tmp_path: Path, values: tuple[float, float]) -> None:
     np.save(tmp_path / "a.npy", np.where(np.stack(walk), values[1], values[0]).astype(np.float32))
     guesses = check(tmp_path / "a.npy", walk)
     usual = values == (0.0, 1.0)

@@ -15,7 +15,7 @@ from posefit.footage.source import kind_of, scene_of
 from posefit.footage.video import Video
 from tests.cases import each
 from tests.commands import error_of
-from tests.footage.conftest import EMPTY, SIZE, film, iou, stack, truth
+from tests.footage.conftest import EMPTY, SIZE, Film, film, iou, stack, truth
 from tests.footage.matroska import write_matroska
 
 
@@ -84,7 +84,7 @@ def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:
 
 
 @each("suffix", [".png", ".jpg", ".webp"])
-def test_pictures_are_a_film(filmed: tuple[Path, list[Any]], tmp_path: Path, suffix: str) -> None:
+def test_pictures_are_a_film(filmed: Film, tmp_path: Path, suffix: str) -> None:
     path, masks = filmed
     folder = written(tmp_path / "a", path, suffix, list(range(len(masks))))
     assert kind_of(folder) == "pictures"
@@ -96,7 +96,7 @@ def test_pictures_are_a_film(filmed: tuple[Path, list[Any]], tmp_path: Path, suf
     assert "30 frames a second" in scene_of([folder]).guesses
 
 
-def test_a_picture_that_is_missing_is_held(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+def test_a_picture_that_is_missing_is_held(filmed: Film, tmp_path: Path) -> None:
     numbers = [number for number in range(60) if number not in (30, 31)]
     folder = written(tmp_path / "a", filmed[0], ".png", numbers)
     scene = scene_of([folder])
