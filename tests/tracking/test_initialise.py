@@ -61,9 +61,7 @@ def test_a_tracker_that_needs_its_whole_budget_is_not_warmed_up() -> None:
 
 
 @each(("size", "rows"), [((320, 240), 240), ((640, 479), 479), ((640, 480), 240), ((960, 721), 240)])
-def test_restarts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole_one(
-    size: tuple[int, int], rows: int
-) -> None:
+def test_restarts_see_small_pictures_and_the_best_goes_on_in_the_whole_one(size: tuple[int, int], rows: int) -> None:
     scene = walk(5, [90.0], size)
     motion, task = scene.truth, Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
     views: list[tuple[int, float]] = []

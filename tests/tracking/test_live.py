@@ -156,9 +156,7 @@ def test_a_method_gets_the_landmarks_of_a_segmenter_also_through_a_lens(monkeypa
 
 
 @each("damaged", [0, 5])
-def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off(
-    damaged, monkeypatch, every_frame, walk, tmp_path
-):
+def test_masks_in_a_pipe_become_poses_on_disk_also_if_it_breaks_off(damaged, monkeypatch, every_frame, walk, tmp_path):
     content, count = b"".join(map(pgm, walk)), 39 if damaged else 40
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content[: len(content) - damaged])))
     out = tmp_path / "out"
@@ -175,7 +173,7 @@ def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off
     assert (stored["poses"].shape, stored["translations"].shape) == ((count, 66), (count, 3))
 
 
-def test_what_a_stream_does_not_state_is_logged_and_the_unit_of_its_calibration_is_used(
+def test_what_a_stream_leaves_open_is_logged_and_its_calibrations_unit_is_used(
     monkeypatch, every_frame, walk, tmp_path
 ):
     write_bvh(tmp_path / "walk.bvh", built_in.motion("walk-b").turned(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))

@@ -52,9 +52,7 @@ def installed(monkeypatch: Any) -> Any:
 
 
 @each(("name", "later"), [("particle", []), ("sapso", ["start", "start"]), ("random", ["anywhere", "anywhere"])])
-def test_a_filter_carries_its_particles_and_the_others_are_built_again(
-    name: str, later: list[str], installed: Any
-) -> None:
+def test_a_filter_carries_its_particles_and_others_are_built_again(name: str, later: list[str], installed: Any) -> None:
     built: list[str] = []
     offer = registry().offer("optimiser", name)
 
@@ -81,18 +79,18 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(in
     [
         ({"low": np.zeros((2, 3))}, r"low and high must be finite and of shape \(m,\), got \(2, 3\), \(6,\)"),
         (
-            {"inverse_transform": lambda latents: np.zeros((len(latents), 60))},
+            {"inverse_transform": lambda z: np.zeros((len(z), 60))},
             r"inverse_transform must return shape \(3, 63\), got \(3, 60\)",
         ),
         (
-            {"inverse_transform": lambda latents: np.full((len(latents), 63), np.nan)},
+            {"inverse_transform": lambda z: np.full((len(z), 63), np.nan)},
             "inverse_transform must return finite numbers",
         ),
-        ({"feasible": lambda latents: True}, r"feasible must return shape \(3,\), got \(\)"),
+        ({"feasible": lambda z: True}, r"feasible must return shape \(3,\), got \(\)"),
         ({"transform": lambda angles: 1 / 0}, "it must not fail, got ZeroDivisionError"),
         ({"low": np.full(6, 9.0)}, "low must not be above high, got 9 and [0-9.]+ of latent 0"),
         (
-            {"feasible": lambda latents: np.zeros(len(latents), dtype=bool)},
+            {"feasible": lambda z: np.zeros(len(z), dtype=bool)},
             "feasible must allow some poses, got none of [0-9]+ training poses and 1000 of the range",
         ),
     ],

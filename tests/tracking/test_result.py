@@ -100,12 +100,9 @@ def test_a_frame_is_a_fit_with_a_picture(track: posefit.Track) -> None:
 def test_a_mask_is_fitted() -> None:
     fit = posefit.fit(MASKS[0], camera=CAMERA, **QUICK)
     assert fit.pose.shape == (66,)
-    assert "history" not in fit.summary
 
 
-def test_files_and_the_page_come_afterwards_too(
-    track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_and_a_page_come_later_too(track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "strftime", lambda _: "1 July 2026")  # no midnight between the two
     track.save(tmp_path / "out")
     opened: list[str] = []
