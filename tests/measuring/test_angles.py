@@ -200,10 +200,9 @@ def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion
     assert table.dtype.names == ("frame", "seconds", *COLUMNS)
     np.testing.assert_array_equal(table["frame"], np.arange(count))
     np.testing.assert_allclose(table["seconds"], np.arange(count) / 30.0, atol=1e-6)
+    blank = np.isin(np.arange(count), [*BLANK])
     for name, values in clinical_angles(walk.skeleton, walk.poses).items():
-        np.testing.assert_allclose(
-            table[name], np.where(np.isin(np.arange(count), [*BLANK]), np.nan, values), atol=1e-3
-        )
+        np.testing.assert_allclose(table[name], np.where(blank, np.nan, values), atol=1e-3)
 
 
 def test_angles_of_recorded_people_do_not_jump() -> None:

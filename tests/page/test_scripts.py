@@ -40,11 +40,10 @@ def test_the_linter_accepts_whole_scripts_and_rejects_planted_mistakes(tmp_path)
         status, output = linted(tmp_path / "page.js", one_script(page.__name__, page.SCRIPTS))
         assert status == 0, output
         assert "on 1 file" in output
+    whole = one_script(report_page.__name__, report_page.SCRIPTS)
     mistakes = {"missing(1);": "no-undef", "const unused = 1;": "no-unused-vars", "if (D == null) paint();": "eqeqeq"}
     for mistake, rule in mistakes.items():
-        planted = re.sub(
-            r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", one_script(report_page.__name__, report_page.SCRIPTS)
-        )
+        planted = re.sub(r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", whole)
         status, output = linted(tmp_path / "page.js", planted)
         assert status != 0
         assert rule in output

@@ -115,15 +115,13 @@ def sure(coverage: float, width: float, modes: list[list[float]], unknown: float
     }
 
 
-def ledger(
-    path: Path, results: Iterable[CellResult], failures: list[tuple[TrackCell, list[str]]] | None = None
-) -> Path:
+def ledger(path: Path, results: Iterable[CellResult], failures: Iterable[tuple[TrackCell, list[str]]] = ()) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
     with Writer(path / FILE) as writer, writer.transaction():
         for done in results:
             writer.add(cell_from(done.row["spec"]))
             writer.finish(done.row["key"], done)
-        for cell, reasons in failures or []:
+        for cell, reasons in failures:
             writer.add(cell)
             lost = "UPDATE cells SET status = 'quarantined', faults = ? WHERE key = ?"
             writer._db.execute(lost, [json.dumps(reasons), cell.key])

@@ -52,9 +52,7 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
 
 
-def test_the_same_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(
-    results: Path, tmp_path: Path
-) -> None:
+def test_a_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(results: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     done = run("report", results)
     assert done.exit_code == 0, done.stderr
