@@ -134,10 +134,10 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
-    for out, message in ((tmp_path / "out", "expected a track that was interrupted to resume, got none"),
-                         (None, "resume must be given with out")):  # fmt: skip
-        with pytest.raises(ValueError, match=message):
-            posefit.track("walk", resume=True, out=out)
+    with pytest.raises(ValueError, match="expected a track that was interrupted to resume, got none"):
+        posefit.track("walk", resume=True, out=tmp_path / "out")
+    with pytest.raises(ValueError, match="resume must be given with out"):
+        posefit.track("walk", resume=True)
 
 
 @pytest.mark.slow
