@@ -29,21 +29,14 @@ def track() -> posefit.Track:
     return posefit.track(MASKS, camera=CAMERA, fps=25, **QUICK)
 
 
-@each("kind", ["npy", "images", "list", "bytes", "folder"])
-def test_the_same_masks_give_the_same_track(kind: str, track: posefit.Track, tmp_path: Path) -> None:
+def test_the_same_masks_give_the_same_track(track: posefit.Track, tmp_path: Path) -> None:
     np.save(tmp_path / "masks.npy", MASKS)
-    paths = [tmp_path / f"{k}.png" for k in range(len(MASKS))]
-    for path, mask in zip(paths, MASKS, strict=True):
+    images = [tmp_path / f"{k}.png" for k in range(len(MASKS))]
+    for path, mask in zip(images, MASKS, strict=True):
         cv2.imwrite(str(path), 255 * mask.astype(np.uint8))
-    sources: dict[str, Any] = {
-        "npy": tmp_path / "masks.npy",
-        "images": paths,
-        "list": list(MASKS),
-        "bytes": 255 * MASKS.astype(np.uint8),
-        "folder": tmp_path,
-    }
-    again = posefit.track(sources[kind], camera=CAMERA, fps=25, **QUICK)
-    np.testing.assert_array_equal(again.joints, track.joints)
+    for source in (tmp_path / "masks.npy", images, list(MASKS), 255 * MASKS.astype(np.uint8), tmp_path):
+        again = posefit.track(source, camera=CAMERA, fps=25, **QUICK)
+        np.testing.assert_array_equal(again.joints, track.joints, err_msg=f"{type(source)}")
 
 
 @each(
