@@ -13,7 +13,7 @@ from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import CellResult
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
-from tests.report.contests import FIRST
+from tests.report.contests import FIRST, full, results_of
 
 SAPSO, COOLER = replace(FIRST, method="sapso@pca"), replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
 
@@ -76,7 +76,7 @@ def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -
 
 
 def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(tmp_path: Path) -> None:
-    made = [result(replace(FIRST, method=m, instance=i, seed=s), 1 + i) for m in "ab" for i in range(3) for s in (0, 1)]
+    made = results_of(full({"a": 1.0, "b": 1.0}, instances=3))
     runs, mixed = read(tmp_path / "a", *made), read(tmp_path / "b", *random.Random(0).sample(made, len(made)))
     assert runs.keys == mixed.keys
     assert (runs.figures["error"] == mixed.figures["error"]).all()

@@ -15,7 +15,7 @@ from posefit.sweep.table import write_csv
 from tests.commands import error_of, run
 from tests.files import csv_rows
 from tests.report.browser import data_in, ledger, result, sure, written
-from tests.report.contests import FIRST, full
+from tests.report.contests import FIRST, full, results_of
 
 LOST = [(replace(FIRST, seed=9), ["its process died", "ValueError: it had to", "its process died"])]
 
@@ -71,13 +71,8 @@ def test_a_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(r
 
 
 def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_path: Path) -> None:
-    made = [
-        result(replace(FIRST, method=m, instance=i, seed=s), 1.0 + i)
-        for m in ("random@pca", "sapso@pca")
-        for i in range(3)
-        for s in range(2)
-        if (m, i) != ("sapso@pca", 1)
-    ]
+    errors = full({"random@pca": 1.0, "sapso@pca": 1.0}, instances=3)
+    made = results_of({key: error for key, error in errors.items() if key[:2] != ("sapso@pca", 1)})
     lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
     lines, page = written(ledger(tmp_path / "results", made, lost))
     assert lines[4:9] == [
