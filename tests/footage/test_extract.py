@@ -220,9 +220,7 @@ def test_a_very_short_frame_does_not_make_thousands(tmp_path: Path) -> None:
     assert video.count() <= 4 * 7
 
 
-def test_a_rate_that_is_not_stated_is_guessed_aloud(
-    filmed: Film, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_unstated_rate_is_guessed_aloud(filmed: Film, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened = cv2.VideoCapture
 
     class Timeless:

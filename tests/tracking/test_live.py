@@ -173,9 +173,7 @@ def test_masks_in_a_pipe_become_poses_on_disk_also_if_it_breaks_off(damaged, mon
     assert (stored["poses"].shape, stored["translations"].shape) == ((count, 66), (count, 3))
 
 
-def test_what_a_stream_leaves_open_is_logged_and_its_calibrations_unit_is_used(
-    monkeypatch, every_frame, walk, tmp_path
-):
+def test_what_a_stream_leaves_open_is_logged_and_its_calibrations_unit_counts(monkeypatch, every_frame, walk, tmp_path):
     write_bvh(tmp_path / "walk.bvh", built_in.motion("walk-b").turned(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
     stated = Calibration("a", (160, 120), PINHOLE, np.zeros(4), np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 30.0]))
     assumed, person = "30 frames a second", "a person of 1.74 m"
