@@ -1,6 +1,6 @@
 """A synthetic video of a walk, whose masks are known."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
@@ -18,6 +18,7 @@ from posefit.motion import built_in
 from posefit.registry import Offer
 from posefit.silhouette.cost import project
 
+Film = tuple[Path, list[Any]]  # a video and the true mask of each frame
 SIZE = (160, 120)
 NOBODY = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
 ALL = (None, None)  # frames
@@ -50,17 +51,31 @@ def truth(azimuth: float = np.pi / 2) -> list[Any]:
     return [project(body, camera(azimuth), pose, place) for pose, place in placed]
 
 
+def encoded(path: Path, images: Iterable[Any], codec: str = "MJPG") -> Path:
+    """Write a video of images."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 25.0, SIZE)
+    for image in images:
+        writer.write(image)
+    writer.release()
+    return path
+
+
 def film(path: Path, masks: list[Any], others: Iterable[Any] = ()) -> Path:
     """Write a video of a person, and of another in other clothes, before a still, noisy background."""
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
     rng = np.random.default_rng(0)
     background = cv2.GaussianBlur(rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0)
     background = (background - background.mean()) * 4.0 + 150.0
+    images = []
     for mask, other in zip_longest(masks, others, fillvalue=NOBODY):
         image = background + rng.normal(0.0, 2.0, background.shape)
         image[mask], image[other] = (40.0, 30.0, 120.0), (20.0, 90.0, 20.0)
-        writer.write(np.clip(image, 0, 255).astype(np.uint8))
-    writer.release()
+        images.append(np.clip(image, 0, 255).astype(np.uint8))
+    return encoded(path, images)
+
+
+def stack(path: Path, masks: Sequence[Any], **more: Any) -> Path:
+    """Write masks to an .npz file."""
+    np.savez(path, masks=np.stack(masks), **more)
     return path
 
 
@@ -71,7 +86,7 @@ def six_masks() -> list[Any]:
 
 
 @pytest.fixture(scope="session")
-def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> Film:
     masks = [NOBODY] * EMPTY + truth()
     return film(tmp_path_factory.mktemp("video") / "walk.avi", masks), masks
 

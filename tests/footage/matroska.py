@@ -23,9 +23,8 @@ def write_matroska(path: Path, images: Sequence[Any], milliseconds: Sequence[int
     info = _number(0x2AD7B1, 1_000_000) + _element(0x4D80, b"tests") + _element(0x5741, b"tests")
     picture = _number(0xB0, width) + _number(0xBA, height)
     picture += _number(0x54B0, wide) + _number(0x54BA, height) if wide else b""
-    track = (
-        _number(0xD7, 1) + _number(0x73C5, 1) + _number(0x83, 1) + _element(0x86, b"V_MJPEG") + _element(0xE0, picture)
-    )
+    track = _number(0xD7, 1) + _number(0x73C5, 1) + _number(0x83, 1)
+    track += _element(0x86, b"V_MJPEG") + _element(0xE0, picture)
     clusters = b""
     for image, time in zip(images, milliseconds, strict=True):
         jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()

@@ -1,7 +1,5 @@
 """Masks from video: synthetic ones with a known person, and video whose frames come at uneven times."""
 
-import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +16,14 @@ from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Still, mean_background, people
 from tests.cases import each
-from tests.commands import error_of, run
+from tests.commands import error_of, printed, run
 from tests.files import arrays, csv_rows
-from tests.footage.conftest import EMPTY, FRAMES, SIZE, Box, iou, truth
+from tests.footage.conftest import ALL, EMPTY, FRAMES, NOBODY, SIZE, Box, Film, encoded, iou, stack, truth
 from tests.footage.matroska import write_matroska
 
 
 @each(("method", "background"), [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")])
-def test_each_method_finds_the_person(
-    filmed: tuple[Path, list[Any]], tmp_path: Path, method: Any, background: Any
-) -> None:
+def test_each_method_finds_the_person(filmed: Film, tmp_path: Path, method: Any, background: Any) -> None:
     path, masks = filmed
     result = extract(path, tmp_path / "out", Extraction(method, background), frames=(EMPTY, None))
     assert result["frames"] == FRAMES
@@ -45,32 +41,25 @@ def test_each_method_finds_the_person(
 
 def test_a_video_of_masks_is_taken_as_it_is(tmp_path: Path) -> None:
     masks = truth()[8:20]
-    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"FFV1"), 25.0, SIZE)
-    for mask in masks:
-        writer.write(255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2))
-    writer.release()
-    result = extract(tmp_path / "a.avi", tmp_path / "out", Extraction("masks"))
+    images = [255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks]
+    result = extract(encoded(tmp_path / "a.avi", images, "FFV1"), tmp_path / "out", Extraction("masks"))
     assert result["usable"] == 12
     stored = arrays(tmp_path / "out" / "masks.npz")
     assert np.mean([iou(a > 0, b) for a, b in zip(stored["masks"], masks, strict=True)]) > 0.95
     assert stored["valid"].all()
 
 
-def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
-    filmed: tuple[Path, list[Any]], tmp_path: Path
-) -> None:
+def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(filmed: Film, tmp_path: Path) -> None:
     path, _ = filmed
     hidden = np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)
     hidden[:, 70:80] = 255
     cv2.imwrite(str(tmp_path / "tree.png"), hidden)
     extract(path, tmp_path / "out", Extraction(ignore=tmp_path / "tree.png"), frames=(EMPTY + 5, EMPTY + 40))
-    masks = read_masks(tmp_path / "out" / "masks.npz", (None, None))
-    silhouette = masks.silhouette(15)
+    masks = tmp_path / "out" / "masks.npz"
+    silhouette = read_masks(masks, ALL).silhouette(15)
     assert not silhouette.valid[:, 70:80].any()
     assert not silhouette.mask[:, 70:80].any()
-    result = posefit.track(
-        tmp_path / "out" / "masks.npz", method="@loose", frames=(5, 9), view_degrees=90, evaluations=400
-    )
+    result = posefit.track(masks, method="@loose", frames=(5, 9), view_degrees=90, evaluations=400)
     assert result.summary["iou"] > 0.4
 
 
@@ -113,17 +102,11 @@ def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_fil
     assert people(foreground, empty, None, None)[0].touches_border
 
 
-def test_the_command_prints_a_summary(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
-    result = run("extract", filmed[0], "--out", tmp_path / "out", "--frames", "20:40", "--json")
-    assert result.exit_code == 0, result.stderr
-    summary = json.loads(result.stdout)
-    assert summary["frames"] == 20
-    assert summary["size"] == [160, 120]
-    assert summary["guesses"] == []
-    smaller = run(
-        "extract", filmed[0], "--out", tmp_path / "two", "--frames", "20:40", "--width", "80", "--roi", "0,0,160,120"
-    )
-    assert "20 frames" in smaller.stdout
+def test_the_command_prints_a_summary(filmed: Film, tmp_path: Path) -> None:
+    words = ["extract", filmed[0], "--frames", "20:40", "--out"]
+    summary = printed(*words, tmp_path / "out")
+    assert (summary["frames"], summary["size"], summary["guesses"]) == (20, [160, 120], [])
+    assert "20 frames" in run(*words, tmp_path / "two", "--width", "80", "--roi", "0,0,160,120").stdout
     assert arrays(tmp_path / "two" / "masks.npz")["masks"].shape == (20, 60, 80)
 
 
@@ -144,9 +127,7 @@ def test_the_command_prints_a_summary(filmed: tuple[Path, list[Any]], tmp_path: 
         (["--frames", "0:8", "--background", "0:12"], "expected a person who moves before a still background"),
     ],
 )
-def test_a_mistake_is_one_line_and_leaves_nothing(
-    filmed: tuple[Path, list[Any]], tmp_path: Path, words: list[str], message: str
-) -> None:
+def test_a_mistake_leaves_one_line(filmed: Film, tmp_path: Path, words: list[str], message: str) -> None:
     assert message in error_of("extract", filmed[0], "--out", tmp_path / "out", *words)
     assert not list(tmp_path.iterdir())
 
@@ -167,14 +148,11 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
 def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     usable = np.ones(12, dtype=bool)
     usable[[0, 5, 6]] = False
-    masks = np.stack(truth()[10:22]).astype(np.uint8)
-    masks[6] = 0  # no person at all
-    path = tmp_path / "a.npz"
-    np.savez(path, masks=masks, usable=usable)
+    masks = truth()[10:22]
+    masks[6] = NOBODY
+    path = stack(tmp_path / "a.npz", masks, usable=usable)
     result = posefit.track(path, method="sapso", view_degrees=90, evaluations=400, smooth=False, out=tmp_path / "out")
-    assert result.summary["frames"] == 12
-    assert result.summary["held_frames"] == 3
-    assert result.summary["evaluations"] == 9 * 400
+    assert [result.summary[name] for name in ("frames", "held_frames", "evaluations")] == [12, 3, 9 * 400]
     assert result.table["usable"].tolist() == usable.astype(float).tolist()
     poses = result.motion.poses
     np.testing.assert_array_equal(poses[5], poses[4])
@@ -189,7 +167,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     ("more", "message"),
     [
         (
-            {"valid": np.ones((12, 5, 5), dtype=np.uint8)},
+            {"valid": np.ones((12, 5, 5), dtype=bool)},
             r"valid must have the masks' shape \(12, 120, 160\), got \(12, 5",
         ),
         ({"usable": np.ones(5, dtype=bool)}, r"usable must be 12 booleans, got \(5,\) bool"),
@@ -199,9 +177,8 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     ],
 )
 def test_masks_that_contradict_themselves_are_named(tmp_path: Path, more: dict[str, Any], message: str) -> None:
-    np.savez(tmp_path / "a.npz", masks=np.stack(truth()[10:22]), **more)
     with pytest.raises(ValueError, match=message):
-        posefit.track(tmp_path / "a.npz")
+        posefit.track(stack(tmp_path / "a.npz", truth()[10:22], **more))
 
 
 def frame_numbers(video: Video, *chosen: Any) -> list[int]:
@@ -243,9 +220,7 @@ def test_a_very_short_frame_does_not_make_thousands(tmp_path: Path) -> None:
     assert video.count() <= 4 * 7
 
 
-def test_a_rate_that_a_video_does_not_state_is_guessed_aloud(
-    filmed: tuple[Path, list[Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_unstated_rate_is_guessed_aloud(filmed: Film, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened = cv2.VideoCapture
 
     class Timeless:
@@ -264,7 +239,7 @@ def test_a_rate_that_a_video_does_not_state_is_guessed_aloud(
     assert arrays(tmp_path / "out" / "masks.npz")["fps"] == 30.0
 
 
-def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: Film, tmp_path: Path) -> None:
     pictures = list(Video.of(filmed[0]).frames(0, None, SIZE))
     taken = [k for k in range(len(pictures)) if k % 10 not in (3, 4, 7)]
     path = write_matroska(tmp_path / "a.mkv", [pictures[k] for k in taken], [40 * k for k in taken])
@@ -283,9 +258,7 @@ def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: tuple[Path, list[Any]],
     assert np.abs(middles - true)[stored["usable"]].max() < 3.0  # pixels: the frame at its own time
 
 
-def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_there(
-    filmed: tuple[Path, list[Any]], segmenter: Callable[[str, Any], None]
-) -> None:
+def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_there(filmed: Film, segmenter: Any) -> None:
     segmenter("box", Box)
     masks = Segmentation(Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)).read().masks
     assert masks.landmarks is not None

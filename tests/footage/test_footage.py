@@ -25,7 +25,7 @@ from posefit.progress import Progress
 from posefit.uncertainty.modes import nearer_mirrored
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, iou, truth, walk
+from tests.footage.conftest import ALL, EMPTY, NOBODY, SIZE, Film, camera, encoded, film, iou, stack, truth, walk
 from tests.tracking.scenes import stopping
 
 QUICK: dict[str, Any] = {
@@ -38,7 +38,7 @@ QUICK: dict[str, Any] = {
 BRIEF = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0"]
 
 
-def test_a_video_is_tracked_from_nothing_but_its_frames(filmed: tuple[Path, list[Any]]) -> None:
+def test_a_video_is_tracked_from_nothing_but_its_frames(filmed: Film) -> None:
     settings = {**QUICK, "body_frames": 12, "restarts": 4, "evaluations": 1000}
     result = posefit.track(filmed[0], height=1.7, **settings)
     assert result.summary["frames"] == 24
@@ -65,14 +65,10 @@ def toml(path: Path, *cameras: posefit.Camera) -> Path:
     return path
 
 
-def test_two_calibrated_cameras_place_the_person(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+def test_two_calibrated_cameras_place_the_person(filmed: Film, tmp_path: Path) -> None:
     calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
-    for name, azimuth in (("a.npz", np.pi / 2), ("b.npz", 0.6)):
-        np.savez(tmp_path / name, masks=np.stack(truth(azimuth)[6:30]).astype(np.uint8))
-    sources = [tmp_path / "a.npz", tmp_path / "b.npz"]
-    result = posefit.track(
-        sources, camera=calibration, up="y", **{**QUICK, "method": "sapso@pca", "frames": (None, None)}
-    )
+    sources = [stack(tmp_path / f"{k}.npz", truth(azimuth)[6:30]) for k, azimuth in enumerate((np.pi / 2, 0.6))]
+    result = posefit.track(sources, camera=calibration, up="y", **{**QUICK, "method": "sapso@pca", "frames": ALL})
     assert result.summary["views"] == 2
     motion = walk().frames(6, 30)
     away = np.linalg.norm(result.motion.translations - motion.translations, axis=1)
@@ -89,18 +85,17 @@ def test_two_calibrated_cameras_place_the_person(filmed: tuple[Path, list[Any]],
 
 
 def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path: Path) -> None:
-    side, front = (np.stack(truth(azimuth)[8:14]).astype(np.uint8) for azimuth in (np.pi / 2, 0.6))
-    usable = np.array([True, True, False, True, True, True])
-    np.savez(tmp_path / "a.npz", masks=side, usable=usable)
-    np.savez(tmp_path / "b.npz", masks=front)
-    views = Views([read_masks(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
+    side, front = (truth(azimuth)[8:14] for azimuth in (np.pi / 2, 0.6))
+    usable = np.arange(6) != 2
+    paths = [stack(tmp_path / "a.npz", side, usable=usable), stack(tmp_path / "b.npz", front)]
+    views = Views([read_masks(path, ALL) for path in paths])
     assert [views[k].usable for k in range(6)] == [True] * 6
     assert not views[2].silhouettes[0].valid.any()
     assert views[2].silhouettes[1].valid.all()
     assert views[3].silhouettes[0].valid.all()
-    np.savez(tmp_path / "b.npz", masks=front, usable=~usable)  # no frame shows enough in both
+    stack(tmp_path / "b.npz", front, usable=~usable)  # no frame shows enough in both
     calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
-    scene = scene_of([tmp_path / "a.npz", tmp_path / "b.npz"], camera=[calibration], up="y")
+    scene = scene_of(paths, camera=[calibration], up="y")
     assert np.linalg.norm(scene.anchor - walk().translations[8]) < 1.0
 
 
@@ -114,16 +109,14 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path:
     bent = np.stack([x, y], axis=-1).reshape(-1, 1, 2)
     undone = cv2.undistortPoints(bent, one.matrix, one.distortion, P=one.matrix).reshape(SIZE[1], SIZE[0], 2)
     bent_mask = cv2.remap(straight.astype(np.uint8), undone.astype(np.float32), None, cv2.INTER_NEAREST)
-    np.savez(tmp_path / "a.npz", masks=bent_mask[None])
-    masks = undistorted(read_masks(tmp_path / "a.npz", (None, None)), one, one.maps(SIZE))
-    silhouette = masks.silhouette(0)
+    masks = read_masks(stack(tmp_path / "a.npz", [bent_mask]), ALL)
+    silhouette = undistorted(masks, one, one.maps(SIZE)).silhouette(0)
     assert iou(silhouette.mask, straight) > 0.93 > iou(bent_mask > 0, straight)
     assert not silhouette.valid.all()
 
 
 def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
-    path = tmp_path / "a.npz"
-    np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8), usable=np.arange(20) != 11)
+    path = stack(tmp_path / "a.npz", truth()[10:30], usable=np.arange(20) != 11)
     settings: dict[str, Any] = {"evaluations": 400, "restarts": 1, "body_frames": 0, "method": "sapso"}
     whole = posefit.track(path, out=tmp_path / "whole", **settings)
     messages: list[str] = []
@@ -133,29 +126,28 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
     assert "11 finished frames are kept: the same command with --resume goes on from there" in messages
     again = posefit.track(path, out=tmp_path / "out", resume=True, progress=Progress(messages.append), **settings)
     assert "going on from frame 11 of 20" in messages
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        path.name for path in (tmp_path / "whole").iterdir()
-    }
+    out, files = ({path.name for path in (tmp_path / name).iterdir()} for name in ("out", "whole"))
+    assert out == files
     assert not list(tmp_path.glob(".out.*"))
     np.testing.assert_array_equal(again.motion.poses, whole.motion.poses)
     np.testing.assert_array_equal(again.motion.translations, whole.motion.translations)
 
 
 def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
-    for out, message in ((tmp_path / "out", "expected a track that was interrupted to resume, got none"),
-                         (None, "resume must be given with out")):  # fmt: skip
-        with pytest.raises(ValueError, match=message):
-            posefit.track("walk", resume=True, out=out)
+    with pytest.raises(ValueError, match="expected a track that was interrupted to resume, got none"):
+        posefit.track("walk", resume=True, out=tmp_path / "out")
+    with pytest.raises(ValueError, match="resume must be given with out"):
+        posefit.track("walk", resume=True)
 
 
 @pytest.mark.slow
 def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
-    np.savez(tmp_path / "a.npz", masks=np.stack(truth()[10:30]).astype(np.uint8))
+    words = ["track", str(stack(tmp_path / "a.npz", truth()[10:30])), "--out", str(tmp_path / "out"), *BRIEF]
     script = (
         "import resource, sys\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (24_000, 24_000))\n"
         "from posefit.cli import main\n"
-        f"sys.exit(main({['track', str(tmp_path / 'a.npz'), '--out', str(tmp_path / 'out'), *BRIEF]!r}))\n"
+        f"sys.exit(main({words!r}))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
@@ -164,7 +156,7 @@ def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     assert "expected room to write to, got File too large" in lines[0]
     assert "finished frames are kept" in lines[0]
     assert not (tmp_path / "out").exists()
-    again = run("track", tmp_path / "a.npz", "--out", tmp_path / "out", *BRIEF, "--resume")
+    again = run(*words, "--resume")
     assert again.exit_code == 0, again.stderr
     assert "going on from frame" in again.stderr
 
@@ -174,15 +166,11 @@ def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
     crowd = [mask | np.roll(mask, SIZE[0] // 2, axis=1) for mask in masks]  # the same person half the picture away
     crowded = extract(film(tmp_path / "crowd.avi", crowd), tmp_path / "one")
     assert any("2 people: 1 at " in warning and "--person" in warning for warning in crowded["warnings"])
-    capture = cv2.VideoCapture(str(film(tmp_path / "still.avi", masks)))
-    writer = cv2.VideoWriter(str(tmp_path / "moving.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
-    for k in range(len(masks)):
-        writer.write(np.roll(capture.read()[1], k, axis=1))
-    writer.release()
-    capture.release()
-    moving = extract(tmp_path / "moving.avi", tmp_path / "two")
+    still = film(tmp_path / "still.avi", masks)
+    panned = [np.roll(image, k, axis=1) for k, image in enumerate(Video.of(still).frames(0, None, SIZE))]
+    moving = extract(encoded(tmp_path / "moving.avi", panned), tmp_path / "two")
     assert any("the camera seems to move" in warning for warning in moving["warnings"])
-    assert extract(tmp_path / "still.avi", tmp_path / "three")["warnings"] == []
+    assert extract(still, tmp_path / "three")["warnings"] == []
 
 
 def in_front(image: Any, k: int) -> Any:
@@ -199,16 +187,14 @@ def flickering(image: Any, k: int) -> Any:
 
 
 @each("change", [in_front, flickering])
-def test_a_camera_that_stands_still_does_not_seem_to_move(
-    filmed: tuple[Path, list[Any]], change: Callable[[Any, int], Any]
-) -> None:
+def test_a_camera_that_stands_still_does_not_seem_to_move(filmed: Film, change: Callable[[Any, int], Any]) -> None:
     camera_motion = CameraMotion(SIZE)
     for k, image in enumerate(Video.of(filmed[0]).frames(0, None, SIZE)):
         camera_motion.add(k, np.clip(change(image.astype(np.float32), k), 0, 255).astype(np.uint8))
     assert not camera_motion.moves
 
 
-def test_a_video_that_changes_its_size_is_named(filmed: tuple[Path, list[Any]]) -> None:
+def test_a_video_that_changes_its_size_is_named(filmed: Film) -> None:
     with pytest.raises(ValueError, match="walk.avi: expected frames of 160x60, got 160x120 in frame 0"):
         list(replace(Video.of(filmed[0]), size=(160, 60)).frames(0, None, (160, 60)))
 
@@ -229,9 +215,7 @@ def test_a_video_that_changes_its_size_is_named(filmed: tuple[Path, list[Any]]) 
         (["VIDEO", "--frames", "0:5"], "expected a person who moves before a still background, got none in any frame"),
     ],
 )
-def test_a_mistake_with_footage_is_one_line_and_leaves_nothing(
-    filmed: tuple[Path, list[Any]], tmp_path: Path, words: list[str], message: str
-) -> None:
+def test_a_mistake_with_footage_leaves_one_line(filmed: Film, tmp_path: Path, words: list[str], message: str) -> None:
     inputs = tmp_path / "in"
     inputs.mkdir()
     (inputs / "large.json").write_text(posefit.Camera.around(np.zeros(3), 0.0, 4.0, (320, 240)).to_json())

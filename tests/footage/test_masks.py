@@ -22,7 +22,7 @@ from posefit.footage.source import body_of, scene_of
 from posefit.tracking.options import text_person
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.footage.conftest import ALL, SIZE, camera
+from tests.footage.conftest import ALL, NOBODY, SIZE, camera, stack
 
 QUICK = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
 
@@ -46,22 +46,19 @@ def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> tuple[
     return masks, warnings
 
 
-def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]]) -> None:
+def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]], **how: Any) -> None:
     """Write a PNG with a palette, as tools for annotation do; OpenCV writes none."""
     image = images.Image.frombytes("P", numbers.shape[::-1], numbers.astype(np.uint8).tobytes())
     image.putpalette([value for colour in colours for value in colour])
-    image.save(path)
+    image.save(path, **how)
 
 
 @each("kind", [np.uint8, np.uint16])
 @each("values", [(0, 1), (0, 255), (0, 38), (64, 192)])
-def test_two_values_are_a_mask_whichever_they_are(
-    walk: list[Any], tmp_path: Path, kind: Any, values: tuple[int, int]
-) -> None:
+def test_any_two_values_are_a_mask(walk: list[Any], tmp_path: Path, kind: Any, values: tuple[int, int]) -> None:
     images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
     assert check(folder(tmp_path / "a", images), walk)[1] == []
-    np.savez(tmp_path / "a.npz", masks=np.stack(images))
-    check(tmp_path / "a.npz", walk)
+    check(stack(tmp_path / "a.npz", images), walk)
 
 
 def softened(mask: Any) -> Any:
@@ -74,21 +71,16 @@ def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path, kind: Any,
     soft = [(softened(mask) * full).astype(kind) for mask in walk]
     soft[2] = (soft[2] * 0.3).astype(kind)  # no person for the network; the frame's own scale would show one
     wanted = [mask > (full // 2 if full > 1 else 0.5) for mask in soft]
-    np.savez(tmp_path / "a.npz", masks=np.stack(soft))
-    assert not check(tmp_path / "a.npz", wanted)[0].usable[2]
+    assert not check(stack(tmp_path / "a.npz", soft), wanted)[0].usable[2]
     if np.issubdtype(kind, np.integer):
         check(folder(tmp_path / "a", soft), wanted)
 
 
 def test_the_alpha_of_a_person_cut_out_is_the_mask(walk: list[Any], tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    cut_out = [
-        np.dstack([rng.integers(0, 255, (*mask.shape, 3)), 255 * softened(mask)]).astype(np.uint8) for mask in walk
-    ]
-    assert check(folder(tmp_path / "a", cut_out), [one[..., 3] > 127 for one in cut_out])[1] == []
-    opaque = [
-        np.dstack([255 * mask, 255 * mask, 255 * mask, np.full(mask.shape, 255)]).astype(np.uint8) for mask in walk
-    ]
+    cut = [np.dstack([rng.integers(0, 255, (*mask.shape, 3)), 255 * softened(mask)]).astype(np.uint8) for mask in walk]
+    assert check(folder(tmp_path / "a", cut), [one[..., 3] > 127 for one in cut])[1] == []
+    opaque = [np.dstack([*[255 * mask] * 3, np.full(mask.shape, 255)]).astype(np.uint8) for mask in walk]
     check(folder(tmp_path / "b", opaque), walk)
 
 
@@ -120,8 +112,7 @@ def test_one_of_several_labels_is_chosen(walk: list[Any], tmp_path: Path, kind: 
         label = 0x008000
         folder(path, [np.array(PALETTE, dtype=np.uint8)[numbers][..., ::-1] for numbers in images])
     else:
-        path = tmp_path / "masks.npz"
-        np.savez(path, masks=np.stack(images).astype(np.int32))
+        path = stack(tmp_path / "masks.npz", np.stack(images).astype(np.int32))
     check(path, walk, label)
     names = "0x800000, 0x008000, 0x808000" if kind == "colours" else "1, 2, 3"
     error = error_of("track", path, "--out", tmp_path / "out", *QUICK)
@@ -145,9 +136,8 @@ def test_a_palette_of_one_colour_and_one_of_greys_need_no_label(walk: list[Any],
 
 def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path) -> None:
     images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
-    smooth = [
-        cv2.resize(cv2.resize(one, (480, 360), interpolation=0), SIZE, interpolation=cv2.INTER_AREA) for one in images
-    ]
+    large = [cv2.resize(one, (480, 360), interpolation=0) for one in images]
+    smooth = [cv2.resize(one, SIZE, interpolation=cv2.INTER_AREA) for one in large]
     smooth[0][5, 5] = 90
     check(folder(tmp_path / "a", smooth), [one > 127 for one in smooth])
 
@@ -168,9 +158,7 @@ def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path)
         (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
     ],
 )
-def test_a_mistake_with_masks_is_one_line_and_leaves_nothing(
-    walk: list[Any], tmp_path: Path, words: list[str], message: str
-) -> None:
+def test_a_mistake_with_masks_leaves_one_line(walk: list[Any], tmp_path: Path, words: list[str], message: str) -> None:
     inputs = tmp_path / "in"
     inputs.mkdir()
     images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
@@ -197,11 +185,6 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
     assert [Path(name).name for name in read_masks(path, ALL).names] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
 
 
-def stack(path: Path, masks: Sequence[Any]) -> Path:
-    np.savez(path, masks=np.stack(masks))
-    return path
-
-
 def test_inverted_masks_are_turned_round_with_a_warning(walk: list[Any], tmp_path: Path) -> None:
     path = stack(tmp_path / "a.npz", [~mask for mask in walk])
     (warning,) = check(path, walk)[1]
@@ -215,10 +198,7 @@ def test_a_person_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:
 
 
 def test_empty_and_full_masks_are_held_and_counted(walk: list[Any], tmp_path: Path) -> None:
-    masks = [mask.copy() for mask in walk]
-    masks[0][:] = False
-    masks[3][:] = False
-    masks[4][:] = True
+    masks = [NOBODY, walk[1], walk[2], NOBODY, ~NOBODY, walk[5]]
     path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in masks])
     packed, _ = check(path, masks)
     assert packed.usable.tolist() == [False, True, True, False, False, True]
@@ -290,8 +270,7 @@ def test_a_person_in_pieces_is_one_and_specks_are_none(tmp_path: Path) -> None:
     known = np.ones_like(tree)
     hidden = blob((60, 60), wide=60)
     known[:, 45:75] = False
-    np.savez(tmp_path / "b.npz", masks=[hidden & known] * 3, valid=[known] * 3)
-    check(tmp_path / "b.npz", [hidden & known] * 3)
+    check(stack(tmp_path / "b.npz", [hidden & known] * 3, valid=[known] * 3), [hidden & known] * 3)
 
 
 def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
@@ -312,9 +291,8 @@ def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
 
 def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[Any], tmp_path: Path) -> None:
     cameras = [camera(np.pi / 2), camera(0.6)]
-    for name, count, fps in (("a", 6, 30.0), ("b", 4, 30.0), ("c", 6, 60.0)):
-        np.savez(tmp_path / f"{name}.npz", masks=walk[:count], fps=fps)
-    a, b, c = (tmp_path / f"{name}.npz" for name in "abc")
+    files = (("a", 6, 30.0), ("b", 4, 30.0), ("c", 6, 60.0))
+    a, b, c = (stack(tmp_path / f"{name}.npz", walk[:count], fps=fps) for name, count, fps in files)
     with pytest.raises(ValueError, match=rf"views must have the same frames, got 6 of {a} and 4 of {b}"):
         scene_of([a, b], camera=cameras)
     with pytest.raises(ValueError, match=rf"views must have one frame rate.*, got 30 of {a} and 60 of {c}"):
@@ -324,38 +302,33 @@ def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[An
 def test_views_of_videos_end_with_the_shortest(walk: list[Any], tmp_path: Path) -> None:
     views = []
     for name, count in (("a", 6), ("b", 4)):
-        np.savez(tmp_path / f"{name}.npz", masks=walk[:count])
-        views.append(CameraView(read(tmp_path / f"{name}.npz")[0], [], f"{name}.mp4", filmed=SIZE))
+        masks, _ = read(stack(tmp_path / f"{name}.npz", walk[:count]))
+        views.append(CameraView(masks, [], f"{name}.mp4", filmed=SIZE))
     scene = combined(views, "a", body_of(None, None)[0], [camera(np.pi / 2), camera(np.pi / 2)], None, None)
     assert len(scene.observations) == 4
     assert scene.warnings == ["the videos differ in length; the first 4 frames are used of a.mp4 6, b.mp4 4"]
 
 
-def test_masks_that_would_not_fit_in_memory_are_refused(
-    walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_masks_beyond_the_memory_are_refused(walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = stack(tmp_path / "a.npz", walk)
     monkeypatch.setattr("posefit.footage.masks.allowed_bytes", lambda: 6 * SIZE[0] * SIZE[1] // 8 - 1)
     with pytest.raises(ValueError, match="frames must be so few that their masks fit in .* got 6 of 160x120 pixels"):
         read(path)
 
 
+def chunk(kind: bytes, content: bytes) -> bytes:
+    """Return a part of a PNG file."""
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
 def bomb(path: Path, side: int) -> None:
     """Write a PNG file whose header states a size and whose pixels are not there."""
-    chunk = b"IHDR" + struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
-    content = zlib.compress(bytes(100))
-    data = b"IDAT" + content
-    path.write_bytes(
-        b"\x89PNG\r\n\x1a\n"
-        + struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
-        + struct.pack(">I", len(content)) + data + struct.pack(">I", zlib.crc32(data))
-        + bytes(4) + b"IEND" + struct.pack(">I", zlib.crc32(b"IEND"))
-    )  # fmt: skip
+    head = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
+    parts = chunk(b"IHDR", head), chunk(b"IDAT", zlib.compress(bytes(100))), chunk(b"IEND", b"")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
 
 
-def test_a_picture_of_too_many_pixels_is_refused_before_it_is_unpacked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_picture_of_too_many_pixels_is_never_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(images.Image.Image, "convert", None)
     for side, came in ((8_000, "8000x8000"), (12_000, "12000x12000"), (30_000, "far more")):
         bomb(tmp_path / "a.png", side)
@@ -402,33 +375,26 @@ def test_no_more_pixels_are_decoded_than_were_counted(tmp_path: Path, suffix: st
 
 
 def test_a_palette_is_the_files_own(tmp_path: Path) -> None:
-    image = images.Image.frombytes("P", (9, 9), np.eye(9, dtype=np.uint8).tobytes())
-    image.putpalette([0, 0, 0, 200, 0, 0])
     note = PngInfo()
     note.add_text("a", "PLTE")  # which stands before the palette
-    image.save(tmp_path / "a.png", pnginfo=note)
+    indexed(tmp_path / "a.png", np.eye(9), [(0, 0, 0), (200, 0, 0)], pnginfo=note)
     np.testing.assert_array_equal(read_masks(tmp_path, ALL).silhouette(0).mask, np.eye(9, dtype=bool))
 
 
-def test_masks_that_unpack_to_too_much_are_refused_by_their_shape(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stack = np.zeros((4, 20, 30), dtype=np.uint8)
-    stack[:, 5:9] = 255
-    folder = tmp_path / "masks"
-    folder.mkdir()
-    for k, frame in enumerate(stack):
-        assert cv2.imwrite(str(folder / f"{k}.png"), frame)
-    np.save(tmp_path / "a.npy", stack)
-    np.savez_compressed(tmp_path / "a.npz", masks=stack)
-    for path in (folder, tmp_path / "a.npz", tmp_path / "a.npy"):
-        monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{stack.nbytes / 1e9 - 1e-9:.9f}")
+def test_masks_that_unpack_to_too_much_are_refused_by_shape(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    masks = np.zeros((4, 20, 30), dtype=np.uint8)
+    masks[:, 5:9] = 255
+    pictures = folder(tmp_path / "masks", masks)
+    np.save(tmp_path / "a.npy", masks)
+    np.savez_compressed(tmp_path / "a.npz", masks=masks)
+    for path in (pictures, tmp_path / "a.npz", tmp_path / "a.npy"):
+        monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{masks.nbytes / 1e9 - 1e-9:.9f}")
         with pytest.raises(ValueError, match=f"{path.name}: expected masks that unpack to at most .* GB, got "):
             read_masks(path, ALL)
-        monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{stack.nbytes / 1e9:.9f}")
+        monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{masks.nbytes / 1e9:.9f}")
         assert len(read_masks(path, ALL)) == 4
     monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", "lots")
     with pytest.raises(ValueError, match="POSEFIT_DECODED_GIGABYTES must be a number, got 'lots'"):
-        read_masks(folder, ALL)
+        read_masks(pictures, ALL)
     with pytest.raises(ValueError, match="masks: expected at most 50 million pixels a frame, got 10000x6000"):
         read_masks(np.broadcast_to(np.False_, (1, 6_000, 10_000)), ALL)

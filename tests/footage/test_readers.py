@@ -48,9 +48,7 @@ def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) 
 
 
 @each("suffix", [".gif", ".webp", ".tif"])
-def test_a_folder_of_images_of_any_kind_is_read_as_pillow_reads_it(
-    walk: list[Any], tmp_path: Path, suffix: str
-) -> None:
+def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(walk: list[Any], tmp_path: Path, suffix: str) -> None:
     for k, image in enumerate(drawn(walk)):
         image.save(tmp_path / f"{k:03}{suffix}")
     wanted = [read_by_pillow(tmp_path / f"{k:03}{suffix}") for k in range(len(walk))]
@@ -113,9 +111,7 @@ def test_what_numbers_in_names_mean_is_reported(names: list[str], count: int, gu
         (["img_3.png", "img_4.png", "mask_3.png"], "expected one image a frame, got img_3.png and mask_3.png"),
     ],
 )
-def test_other_pictures_beside_masks_are_refused(
-    walk: list[Any], tmp_path: Path, names: list[str], message: str
-) -> None:
+def test_other_pictures_with_masks_are_refused(walk: list[Any], tmp_path: Path, names: list[str], message: str) -> None:
     for name in names:
         drawn(walk)[0].save(tmp_path / name)
     with pytest.raises(ValueError, match=message):
@@ -133,18 +129,11 @@ def test_a_photo_among_jpegs_is_refused_by_name(walk: list[Any], tmp_path: Path)
 
 
 @each("values", [(0.0, 0.3), (0.0, 2.0), (-3.0, 3.0), (0.0, 1.0), (-1.0, 0.0)])
-def test_two_fractions_are_a_mask_whichever_they_are(
-    walk: list[Any], tmp_path: Path, values: tuple[float, float]
-) -> None:
+def test_any_two_fractions_are_a_mask(walk: list[Any], tmp_path: Path, values: tuple[float, float]) -> None:
     np.save(tmp_path / "a.npy", np.where(np.stack(walk), values[1], values[0]).astype(np.float32))
     guesses = check(tmp_path / "a.npy", walk)
     usual = values == (0.0, 1.0)
     assert guesses == ([] if usual else [f"{tmp_path / 'a.npy'}: masks of values from {min(values):g} to {max(values):g}: the person is the higher of two"])  # fmt: skip
-
-
-def degrees_of(soft: Any, scale: float) -> Any:
-    """Return degrees a little below 0, as bicubic scaling makes them."""
-    return soft * scale - 0.02 * scale
 
 
 def test_labels_may_be_whole_numbers_held_as_fractions(walk: list[Any], tmp_path: Path) -> None:
@@ -162,8 +151,9 @@ def test_logits_are_cut_at_zero_and_degrees_half_way(walk: list[Any], tmp_path: 
     np.save(tmp_path / "a.npy", logits)
     (guess,) = check(tmp_path / "a.npy", list(logits > 0.0))
     assert guess.endswith("masks of values from -20 to 10 are logits: the person is above 0")
-    for scale, threshold in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0), (10.0, 0.5 * float(degrees_of(soft, 10.0).max()))):
-        degrees = degrees_of(soft, scale)
+    for scale, half in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0), (10.0, None)):
+        degrees = soft * scale - 0.02 * scale  # a little below 0, as bicubic scaling makes them
+        threshold = half or 0.5 * float(degrees.max())
         np.save(tmp_path / "a.npy", degrees)
         (guess,) = check(tmp_path / "a.npy", list(degrees > threshold))
         assert guess.endswith(f"are degrees: the person is above {threshold:g}")
@@ -182,10 +172,9 @@ def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) 
 def test_a_person_who_touches_the_border_in_all_masks_is_followed(walk: list[Any], tmp_path: Path) -> None:
     for k, mask in enumerate(walk):  # cut to the person, as silhouettes of gait are
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        cut = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        Image.fromarray(255 * cv2.resize(cut.astype(np.uint8), (88, 128), interpolation=cv2.INTER_NEAREST)).save(
-            tmp_path / f"{k:03}.gif"
-        )
+        cut = 255 * mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.uint8)
+        large = cv2.resize(cut, (88, 128), interpolation=cv2.INTER_NEAREST)
+        Image.fromarray(large).save(tmp_path / f"{k:03}.gif")
     scene = scene_of([tmp_path])
     assert [scene.observations[k].usable for k in range(len(walk))] == [True] * len(walk)
 

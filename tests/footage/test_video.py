@@ -1,10 +1,10 @@
 """Films: what is no video, frames that were never written, names of files, pictures one a frame."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ from posefit.footage.source import kind_of, scene_of
 from posefit.footage.video import Video
 from tests.cases import each
 from tests.commands import error_of
-from tests.footage.conftest import EMPTY, SIZE, film, truth
+from tests.footage.conftest import EMPTY, SIZE, Film, film, iou, stack, truth
 from tests.footage.matroska import write_matroska
 
 
@@ -47,24 +47,20 @@ def test_a_relative_name_with_a_colon_is_a_file(tmp_path: Path, monkeypatch: pyt
     assert opencv_name("run-10:30") == str(tmp_path / "run-10:30")
 
 
-@each("where", ["source", "out", "extract", "live", "masks"])
-def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Path, where: str) -> None:
-    strange = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9")
-    film(tmp_path / "walk.avi", truth()[:4])
-    words: tuple[Any, ...] = ("track", tmp_path / "walk.avi", "--out", strange)
-    if where == "source":
-        os.rename(tmp_path / "walk.avi", f"{strange}.avi")
-        words = ("track", f"{strange}.avi", "--out", tmp_path / "out")
-    elif where == "masks":
-        np.savez(strange + ".npz", masks=truth()[:4])
-        (tmp_path / "walk.avi").unlink()
-        words = ("track", strange + ".npz", "--out", tmp_path / "out")
-    elif where == "live":
-        words = ("track", "--live", strange)
-    elif where == "extract":
-        words = ("extract", tmp_path / "walk.avi", "--out", strange)
-    assert "expected a name in UTF-8, got one that is not" in error_of(*words)
-    assert len(list(tmp_path.iterdir())) == 1
+def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Path) -> None:
+    strange, out = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"), tmp_path / "out"
+    path, _ = film(tmp_path / "walk.avi", truth()[:4]), stack(Path(f"{strange}.npz"), truth()[:4])
+    shutil.copy(path, f"{strange}.avi")
+    before = sorted(tmp_path.iterdir())
+    for words in (
+        ("track", path, "--out", strange),
+        ("track", f"{strange}.avi", "--out", out),
+        ("track", f"{strange}.npz", "--out", out),
+        ("track", "--live", strange),
+        ("extract", path, "--out", strange),
+    ):
+        assert "expected a name in UTF-8, got one that is not" in error_of(*words), words
+        assert sorted(tmp_path.iterdir()) == before, words
 
 
 def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(tmp_path: Path) -> None:
@@ -85,22 +81,19 @@ def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:
 
 
 @each("suffix", [".png", ".jpg", ".webp"])
-def test_pictures_are_a_film(filmed: tuple[Path, list[Any]], tmp_path: Path, suffix: str) -> None:
+def test_pictures_are_a_film(filmed: Film, tmp_path: Path, suffix: str) -> None:
     path, masks = filmed
     folder = written(tmp_path / "a", path, suffix, list(range(len(masks))))
     assert kind_of(folder) == "pictures"
     assert kind_of((folder / f"frame0{suffix}",)) == "masks"  # a single one, which is refused there
     scene, other = (scene_of([source], fps=fps) for source, fps in ((folder, 25.0), (path, None)))
     assert (scene.count, scene.fps) == (len(masks), 25.0)
-    overlaps = []
-    for k in range(EMPTY + 12, EMPTY + 30):
-        first, second = (one.observations[k].silhouettes[0].mask for one in (scene, other))
-        overlaps.append((first & second).sum() / (first | second).sum())
-    assert np.median(overlaps) > 0.9
+    views = [[one.observations[k].silhouettes[0].mask for k in range(EMPTY + 12, EMPTY + 30)] for one in (scene, other)]
+    assert np.median([iou(*pair) for pair in zip(*views, strict=True)]) > 0.9
     assert "30 frames a second" in scene_of([folder]).guesses
 
 
-def test_a_picture_that_is_missing_is_held(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+def test_a_picture_that_is_missing_is_held(filmed: Film, tmp_path: Path) -> None:
     numbers = [number for number in range(60) if number not in (30, 31)]
     folder = written(tmp_path / "a", filmed[0], ".png", numbers)
     scene = scene_of([folder])

@@ -80,9 +80,8 @@ def corpus(folder: Path) -> list[Seed]:
     ]
     texts += [(suffix, opencv(folder / f"calibration{suffix}").read_text()) for suffix in (".yml", ".json", ".xml")]
     seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]
-    seeds += [
-        Seed(kind, ".sqlite3" if kind == "ledger" else ".jsonl", content) for kind, content in written(folder).items()
-    ]
+    suffixes = {"ledger": ".sqlite3"}
+    seeds += [Seed(kind, suffixes.get(kind, ".jsonl"), content) for kind, content in written(folder).items()]
     return [*seeds, Seed("plan", ".toml", PLAN.encode())]
 
 

@@ -27,19 +27,16 @@ def test_an_input_is_the_same_for_the_same_seed_and_number():
 def test_the_harness_tells_what_is_neither_read_nor_refused(tmp_path):
     path = tmp_path / "subject.toml"
 
-    def refuse(_):
-        raise ValueError(f"{path}: expected a plan, got none")
+    def raising(error):
+        def read(_):
+            raise error
 
-    def mumble(_):
-        raise ValueError("no")
-
-    def fail(_):
-        raise KeyError("rows")
+        return read
 
     assert outcome(lambda _: None, path)[0] == "read"
-    assert outcome(refuse, path)[0] == "refused"
-    assert outcome(mumble, path)[0] == "unclean"
-    assert outcome(fail, path)[0] == "unclean"
+    assert outcome(raising(ValueError(f"{path}: expected a plan, got none")), path)[0] == "refused"
+    assert outcome(raising(ValueError("no")), path)[0] == "unclean"
+    assert outcome(raising(KeyError("rows")), path)[0] == "unclean"
     tally = Tally()
     tally.add(0, ["read", "plan", MEGABYTES + 1, ""], 0.0)
     tally.add(1, ["refused", "plan", 1, ""], SECONDS + 1.0)

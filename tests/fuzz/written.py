@@ -86,10 +86,8 @@ def readers() -> dict[str, Callable[[Path], object]]:
             with Writer(file):
                 pass
             with closing(sqlite3.connect(file)) as database, database:
-                values = "a" * 64, kind, spec, status, row if status != "done" else "[]", row
-                database.execute(
-                    "INSERT INTO cells (key, kind, spec, status, faults, row) VALUES (?, ?, ?, ?, ?, ?)", values
-                )
+                cell = "a" * 64, kind, spec, status, row if status != "done" else "[]", row
+                database.execute("INSERT INTO cells (key, kind, spec, status, faults, row) VALUES (?,?,?,?,?,?)", cell)
             return reported(file)
 
         return read

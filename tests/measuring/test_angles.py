@@ -1,7 +1,7 @@
 """Clinical angles of whole bodies: zero where a person stands, one sign for both sides; and files for other programs."""
 
-import importlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from posefit.measuring.gait import Gait, Step, gait_of
 from posefit.measuring.tables import STEP_COLUMNS, write_angles, write_gait, write_trc
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import write_amc
-from posefit.motion.bvh import write_bvh
+from posefit.motion.bvh import NAMES, write_bvh
 from posefit.motion.motion import Motion
 from posefit.motion.opensim import write_mot
 from tests.cases import each
@@ -42,21 +42,17 @@ def test_the_centres_are_where_bones_meet() -> None:
     assert PLACES[JOINTS.index("lowerback")] == "lumbar"  # not of the left side
 
 
-def test_legs_are_at_zero_where_they_stand_straight() -> None:
-    angles = measured(lfemur_z=-20.0, rfemur_z=20.0)  # the legs of the pose of rest are apart by 20 degrees each
-    assert [angles[name] for name in COLUMNS[:18]] == pytest.approx([0.0] * 18, abs=1e-3)
-
-
 @each(("side", "inwards"), [("left", -20.0), ("right", 20.0)])
-def test_a_leg_moves_in_clinical_words(side: str, inwards: float) -> None:
+def test_a_leg_is_at_zero_where_it_stands_straight_and_moves_in_clinical_words(side: str, inwards: float) -> None:
     def leg(**turned: float) -> dict[str, float]:
         angles = measured(**{f"{side[0]}{name}": value for name, value in turned.items()})
         return {
             name.removeprefix(f"{side}_"): round(value, 2)
             for name, value in angles.items()
-            if name.startswith(side) and abs(value) > 1e-3 and "shoulder" not in name and "elbow" not in name
+            if name.startswith(side) and not abs(value) <= 1e-3 and "shoulder" not in name and "elbow" not in name
         }
 
+    assert leg(femur_z=inwards) == {}  # the legs of the pose of rest are apart by 20 degrees each
     assert leg(femur_z=inwards, femur_x=-30.0) == {"hip_flexion": 30.0}
     assert leg(femur_z=inwards, tibia_x=60.0) == {"knee_flexion": 60.0}
     assert leg(femur_z=inwards, foot_x=-15.0) == {"ankle_dorsiflexion": 15.0}
@@ -125,18 +121,20 @@ def walk() -> Motion:
     return recorded.clip("02_01").motion()
 
 
+def read_c3d(path: Path) -> Any:
+    return pytest.importorskip("ezc3d").c3d(str(path))
+
+
 def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
-    ezc3d = pytest.importorskip("ezc3d")
     write_c3d(tmp_path / "walk.c3d", walk, BLANK, gait_of(walk))
-    read = ezc3d.c3d(str(tmp_path / "walk.c3d"))
-    points, expected = read["data"]["points"], walk.joints
+    read = read_c3d(tmp_path / "walk.c3d")
+    points, header = read["data"]["points"], read["header"]["points"]
     parameters = {name: read["parameters"]["POINT"][name]["value"] for name in ("LABELS", "UNITS", "RATE")}
     assert parameters == {"LABELS": list(PLACES), "UNITS": ["mm"], "RATE": [30.0]}
-    assert read["header"]["points"]["frame_rate"] == 30.0
-    assert (read["header"]["points"]["first_frame"], read["header"]["points"]["last_frame"]) == (0, len(walk) - 1)
+    assert (header["frame_rate"], header["first_frame"], header["last_frame"]) == (30.0, 0, len(walk) - 1)
     metres = points[:3].transpose(2, 1, 0) / 1e3
     known = np.array([k not in BLANK for k in range(len(walk))])
-    np.testing.assert_allclose(metres[known], expected[known], atol=TENTH)
+    np.testing.assert_allclose(metres[known], walk.joints[known], atol=TENTH)
     assert np.isnan(metres[~known]).all()
     residuals = read["data"]["meta_points"]["residuals"][0].T
     assert (residuals[known] == 0.0).all()
@@ -144,13 +142,10 @@ def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
 
 
 def test_a_c3d_has_the_events_of_gait(walk: Motion, tmp_path: Path) -> None:
-    ezc3d = pytest.importorskip("ezc3d")
     gait = gait_of(walk)
     write_c3d(tmp_path / "walk.c3d", walk, (), gait)
-    events = {
-        name: ezc3d.c3d(str(tmp_path / "walk.c3d"))["parameters"]["EVENT"][name]["value"]
-        for name in ("CONTEXTS", "LABELS", "TIMES")
-    }
+    read = read_c3d(tmp_path / "walk.c3d")["parameters"]["EVENT"]
+    events = {name: read[name]["value"] for name in ("CONTEXTS", "LABELS", "TIMES")}
     strikes = [k for k, label in enumerate(events["LABELS"]) if label == "Foot Strike"]
     assert [events["CONTEXTS"][k] for k in strikes] == ["Right", "Left", "Right", "Left"]
     seconds = [step.strike_seconds for step in gait.steps]
@@ -158,17 +153,16 @@ def test_a_c3d_has_the_events_of_gait(walk: Motion, tmp_path: Path) -> None:
     assert (events["TIMES"][0] == 0.0).all()
     assert events["LABELS"].count("Foot Off") == sum(step.toe_off_seconds is not None for step in gait.steps)
     write_c3d(tmp_path / "dance.c3d", walk, (), NO_WALK)
-    used = ezc3d.c3d(str(tmp_path / "dance.c3d"))["parameters"].get("EVENT", {}).get("USED", {"value": [0]})
+    used = read_c3d(tmp_path / "dance.c3d")["parameters"].get("EVENT", {}).get("USED", {"value": [0]})
     assert used["value"][0] == 0
 
 
 def test_a_long_c3d_counts_its_frames_and_its_events(walk: Motion, tmp_path: Path) -> None:
-    ezc3d = pytest.importorskip("ezc3d")
     many = np.arange(70_000) % len(walk)
     longer = Motion("long", walk.skeleton, walk.poses[many], walk.translations[many], 30.0)
     gait = Gait(steps=[Step(foot="left", strike_seconds=float(k)) for k in range(2_000)])
     write_c3d(tmp_path / "long.c3d", longer, (), gait)
-    read = ezc3d.c3d(str(tmp_path / "long.c3d"))
+    read = read_c3d(tmp_path / "long.c3d")
     assert read["data"]["points"].shape[2] == 70_000
     times = read["parameters"]["EVENT"]["TIMES"]["value"]
     assert times.shape == (2, MAX_EVENTS)
@@ -194,9 +188,8 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
     nodes = read.node_positions()  # its own forward kinematics
     points = np.empty((len(walk), len(JOINTS), 3))
     points[:, 0] = nodes[:, 0]
-    named = importlib.import_module("posefit.motion.bvh").NAMES
     for joint, name in enumerate(JOINTS[1:], 1):
-        node = next(one for one in read.nodes if one.name == named[name])  # begins where the bone begins
+        node = next(one for one in read.nodes if one.name == NAMES[name])  # begins where the bone begins
         points[:, joint] = nodes[:, read.node_index[node.children[0].name]]
     np.testing.assert_allclose(points, walk.joints, atol=TENTH)
 
@@ -207,10 +200,9 @@ def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion
     assert table.dtype.names == ("frame", "seconds", *COLUMNS)
     np.testing.assert_array_equal(table["frame"], np.arange(count))
     np.testing.assert_allclose(table["seconds"], np.arange(count) / 30.0, atol=1e-6)
+    blank = np.isin(np.arange(count), [*BLANK])
     for name, values in clinical_angles(walk.skeleton, walk.poses).items():
-        np.testing.assert_allclose(
-            table[name], np.where(np.isin(np.arange(count), [*BLANK]), np.nan, values), atol=1e-3
-        )
+        np.testing.assert_allclose(table[name], np.where(blank, np.nan, values), atol=1e-3)
 
 
 def test_angles_of_recorded_people_do_not_jump() -> None:
@@ -239,7 +231,7 @@ def test_a_whole_turn_of_a_joint_is_one_angle_that_grows() -> None:
 
 
 def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(walk: Motion, tmp_path: Path) -> None:
-    ezc3d, part = pytest.importorskip("ezc3d"), walk.frames(20, 80)
+    part = walk.frames(20, 80)
     gait = gait_of(part)
     write_angles(tmp_path / "a.csv", part)
     write_trc(tmp_path / "a.trc", part)
@@ -252,8 +244,8 @@ def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(walk: Motion, tmp_
     lines = [line.split("\t") for line in (tmp_path / "a.trc").read_text().splitlines()]
     assert dict(zip(lines[1], lines[2], strict=True))["OrigDataStartFrame"] == "21"
     assert (lines[6][0], float(lines[6][1])) == ("21", pytest.approx(20 / 30.0, abs=1e-6))
-    read = ezc3d.c3d(str(tmp_path / "a.c3d"))
-    assert (read["header"]["points"]["first_frame"], read["header"]["points"]["last_frame"]) == (20, 79)
+    read = read_c3d(tmp_path / "a.c3d")
+    assert [read["header"]["points"][name] for name in ("first_frame", "last_frame")] == [20, 79]
     assert read["data"]["points"].shape[2] == 60
     assert gait.steps[0].strike_seconds > 20 / 30.0
     assert read["parameters"]["EVENT"]["TIMES"]["value"][1].min() > 20 / 30.0

@@ -42,7 +42,8 @@ def test_thirty_frames_a_second_are_as_good_as_120() -> None:
 
 
 WALKER = walker()
-WAITING = np.append(np.arange(len(WALKER)), np.full(999, len(WALKER) - 1))  # it stands still at the end
+LONGER = np.append(np.arange(len(WALKER)), np.full(999, len(WALKER) - 1))
+WAITING = replace(WALKER, poses=WALKER.poses[LONGER], translations=WALKER.translations[LONGER])  # still at the end
 
 
 @each(
@@ -57,10 +58,7 @@ WAITING = np.append(np.arange(len(WALKER)), np.full(999, len(WALKER) - 1))  # it
         (walker(speed=-SPEED), "the person moves backwards at 1.00 m/s"),
         (WALKER.frames(0, 1), "no strikes of a foot detected"),
         (replace(WALKER, fps=10.0), "fewer than 12 frames a second"),
-        (
-            replace(WALKER, poses=WALKER.poses[WAITING], translations=WALKER.translations[WAITING]),
-            "steps of a walk in 3.6 of 14.2 s",
-        ),
+        (WAITING, "steps of a walk in 3.6 of 14.2 s"),
     ],
 )
 def test_what_is_no_walk_has_a_reason_and_no_figures(motion: Motion, why: str) -> None:
@@ -120,9 +118,8 @@ def limping(lengths: tuple[float, float], seconds: tuple[float, float], speed: f
     swing = np.arcsin((0.3 + 0.5 * np.array([apart, -apart])) / leg)
     first = {"l": 0.3, "r": 0.3 + seconds[1]}
     assert stride == pytest.approx(STRIDE)
-    return walker(
-        6.0, 30.0, sum(lengths) / stride if speed is None else speed, 0.7, first, dict(zip("lr", swing, strict=True))
-    )
+    forwards = sum(lengths) / stride if speed is None else speed
+    return walker(6.0, 30.0, forwards, 0.7, first, dict(zip("lr", swing, strict=True)))
 
 
 @each(("lengths", "seconds"), LIMPS)
@@ -140,9 +137,7 @@ def test_left_and_right_of_a_limp_are_apart(lengths: tuple[float, float], second
 
 
 @each(("lengths", "seconds"), LIMPS)
-def test_of_who_walks_in_one_place_times_alone_are_known(
-    lengths: tuple[float, float], seconds: tuple[float, float]
-) -> None:
+def test_of_who_walks_in_place_only_times_are_known(lengths: tuple[float, float], seconds: tuple[float, float]) -> None:
     gait = gait_of(limping(lengths, seconds, 0.05))  # a belt that moves a little slower than they
     assert gait.cadence == pytest.approx(100.0, abs=1.0)
     assert [gait.left.step_seconds, gait.right.step_seconds] == pytest.approx(seconds, abs=0.03)
@@ -202,17 +197,9 @@ def test_a_few_frames_are_not_worth_a_warning() -> None:
     assert backwards_warning(np.arange(100) < 5).startswith("the person seems to walk backwards in 5 of 100 frames")
 
 
-@pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("track") / "out"
-
-
-@pytest.fixture(scope="module")
-def tracked(out: Path) -> posefit.Track:
-    return posefit.track("walk", size=(160, 120), out=out)
-
-
-def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> None:
+def test_a_track_of_a_walk_has_its_gait(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    tracked = posefit.track("walk", size=(160, 120), out=out)
     gait = json.loads((out / "summary.json").read_text())["gait"]
     assert gait == tracked.summary["gait"]
     assert gait["walk"] is True

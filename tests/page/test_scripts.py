@@ -40,11 +40,10 @@ def test_the_linter_accepts_whole_scripts_and_rejects_planted_mistakes(tmp_path)
         status, output = linted(tmp_path / "page.js", one_script(page.__name__, page.SCRIPTS))
         assert status == 0, output
         assert "on 1 file" in output
+    whole = one_script(report_page.__name__, report_page.SCRIPTS)
     mistakes = {"missing(1);": "no-undef", "const unused = 1;": "no-unused-vars", "if (D == null) paint();": "eqeqeq"}
     for mistake, rule in mistakes.items():
-        planted = re.sub(
-            r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", one_script(report_page.__name__, report_page.SCRIPTS)
-        )
+        planted = re.sub(r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", whole)
         status, output = linted(tmp_path / "page.js", planted)
         assert status != 0
         assert rule in output
@@ -74,10 +73,7 @@ def test_colours_have_contrast_with_their_background_in_light_and_dark():
         shown = {**colours, **{name: base[name] for name in ("ink", "soft", "accent", "bad")}}
         for name, colour in shown.items():
             if colour.startswith("#"):
-                assert min(contrast(colour, base[behind]) for behind in ("back", "card")) >= MIN_CONTRAST, (
-                    name,
-                    colour,
-                )
-        assert (
-            len({colours[f"c{k}"] for k in range(report_page.COLOUR_COUNT)}) == report_page.COLOUR_COUNT == len(COLOURS)
-        )
+                least = min(contrast(colour, base[behind]) for behind in ("back", "card"))
+                assert least >= MIN_CONTRAST, (name, colour)
+        drawn = {colours[f"c{k}"] for k in range(report_page.COLOUR_COUNT)}
+        assert len(drawn) == report_page.COLOUR_COUNT == len(COLOURS)

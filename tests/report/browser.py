@@ -14,6 +14,7 @@ import pytest
 
 from posefit.sweep.cell import CellResult, TrackCell, cell_from, packed_joints
 from posefit.sweep.ledger import FILE, Writer
+from tests.commands import run
 
 # what no page may take for markup
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028'\"&"
@@ -90,6 +91,14 @@ def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
     } | more
 
 
+def written(made: Path, *words: object) -> tuple[list[str], str]:
+    """Return the lines that `posefit report` prints of a ledger, and the page that it writes beside it."""
+    out = made.with_name("report.html")
+    done = run("report", made, "--out", out, *words)
+    assert done.exit_code == 0, done.stderr
+    return done.stdout.splitlines(), out.read_text("utf-8")
+
+
 def data_in(page: str) -> dict[str, Any]:
     """Return the data that a page holds."""
     data: dict[str, Any] = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
@@ -106,15 +115,13 @@ def sure(coverage: float, width: float, modes: list[list[float]], unknown: float
     }
 
 
-def ledger(
-    path: Path, results: Iterable[CellResult], failures: list[tuple[TrackCell, list[str]]] | None = None
-) -> Path:
+def ledger(path: Path, results: Iterable[CellResult], failures: Iterable[tuple[TrackCell, list[str]]] = ()) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
     with Writer(path / FILE) as writer, writer.transaction():
         for done in results:
             writer.add(cell_from(done.row["spec"]))
             writer.finish(done.row["key"], done)
-        for cell, reasons in failures or []:
+        for cell, reasons in failures:
             writer.add(cell)
             lost = "UPDATE cells SET status = 'quarantined', faults = ? WHERE key = ?"
             writer._db.execute(lost, [json.dumps(reasons), cell.key])

@@ -29,9 +29,12 @@ def contest_of_results(path: Path, results: Iterable[CellResult]) -> Contest:
     return contest_in(ledger(path / "results", results))
 
 
+def results_of(errors: Errors) -> list[CellResult]:
+    return [result(replace(FIRST, method=m, instance=i, seed=s), error) for (m, i, s), error in errors.items()]
+
+
 def contest_of_errors(path: Path, errors: Errors) -> Contest:
-    cells = {(m, i, s): replace(FIRST, method=m, instance=i, seed=s) for m, i, s in errors}
-    return contest_of_results(path, [result(cells[key], error) for key, error in errors.items()])
+    return contest_of_results(path, results_of(errors))
 
 
 def full(methods: dict[str, float], instances: int = 2, seeds: int = 2) -> Errors:

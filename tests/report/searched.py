@@ -41,7 +41,7 @@ def searched(
         for method, targets in methods.items()
         for problem in problems
     ]
-    return ledger(path, made, list(lost))
+    return ledger(path, made, lost)
 
 
 def problems(functions: Iterable[int], dimensions: Iterable[int], instances: int) -> list[tuple[int, int, int]]:

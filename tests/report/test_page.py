@@ -13,8 +13,7 @@ import pytest
 from posefit.errors import printable
 from posefit.report.repeat import repeat_command
 from posefit.sweep.ledger import Ledger
-from tests.commands import run
-from tests.report.browser import EVIL, ledger, opened, result, sure
+from tests.report.browser import EVIL, ledger, opened, result, sure, written
 from tests.report.searched import cell, problems, search_result, searched
 from tests.sweep.fake import cells
 
@@ -22,12 +21,10 @@ FIRST = replace(cells(1)[0], frames=4)
 METHODS = 9  # more than there are colours
 
 
-def written(made: Path) -> Path:
+def page_of(made: Path) -> Path:
     """Return the page of a ledger."""
-    out = made.with_name("report.html")
-    done = run("report", made, "--out", out)
-    assert done.exit_code == 0, done.stderr
-    return out
+    written(made)
+    return made.with_name("report.html")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +40,7 @@ def tracks(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if (m, i) != (4, 7):
             made.append(result(cell, 1.0 + 0.3 * m + 0.1 * ((3 * m + i) % 5) + 0.05 * s, **more))
     lost = [(replace(FIRST, method="method-4@pca", instance=7, seed=s), ["ValueError: it had to"]) for s in range(2)]
-    return written(ledger(tmp_path_factory.mktemp("tracks") / "results", made, lost))
+    return page_of(ledger(tmp_path_factory.mktemp("tracks") / "results", made, lost))
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +49,7 @@ def searches(tmp_path_factory: pytest.TempPathFactory) -> Path:
     methods = {"cma": 14, "pso": 11, "sapso": 10, "annealed": 7, "scipy": 5, "random": 2}
     lost = [(cell(EVIL, settings={EVIL: EVIL}), [f"ValueError: {EVIL}"])]
     path = tmp_path_factory.mktemp("searches") / "results"
-    return written(searched(path, methods, problems([1, 5], [9, 24], 3), lost))
+    return page_of(searched(path, methods, problems([1, 5], [9, 24], 3), lost))
 
 
 @contextmanager
@@ -90,10 +87,7 @@ def test_it_opens_without_errors_and_is_accessible_in_every_width_and_scheme(
     chromium: Any, tracks: Path, searches: Path, width: int
 ) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install posefit[browser]")
-    figures = {
-        tracks: ("standing", "convergence", "profile", "joint-errors"),
-        searches: ("standing", "chart-0"),
-    }
+    figures = {tracks: ("standing", "convergence", "profile", "joint-errors"), searches: ("standing", "chart-0")}
     for path, names in figures.items():
         for scheme in ("light", "dark"):
             with shown(chromium, path, width, color_scheme=scheme, bypass_csp=True) as page:
@@ -182,7 +176,7 @@ def test_hostile_names_are_text_and_commands_repeat_their_rows(chromium: Any, tm
     rows = [result(cell, 1.0 + k) for k, cell in enumerate([*named, *plain])]
     lost = [(replace(FIRST, method=EVIL, seed=7), [f"ValueError: {EVIL}"])]
     made = ledger(tmp_path / "results", rows, lost)
-    with shown(chromium, written(made)) as page:
+    with shown(chromium, page_of(made)) as page:
         for part in ("#headline", "#facts", "#lost"):
             assert printable(EVIL) in page.locator(part).text_content()
         assert page.locator("img").count() == 0
@@ -226,12 +220,12 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
 
 def test_pages_of_one_run_or_of_failures_alone_open(chromium: Any, tmp_path: Path) -> None:
     search = cell("cma")
-    single = written(ledger(tmp_path / "one" / "results", [search_result(search, 5)]))
+    single = page_of(ledger(tmp_path / "one" / "results", [search_result(search, 5)]))
     with shown(chromium, single) as page:
         assert "if a function has several" in page.inner_text("#standing-note")
     for k, (lost, name) in enumerate(((replace(FIRST, seed=7), "random@pca on walk"), (search, "cma on f1 in 9D"))):
         failed = ledger(tmp_path / str(k) / "results", [], [(lost, ["its process died of SIGSEGV"])])
-        with shown(chromium, written(failed), 390) as page:
+        with shown(chromium, page_of(failed), 390) as page:
             assert page.inner_text("#headline") == "Every cell failed."
             assert "its process died of SIGSEGV" in page.inner_text("#problems")
             assert name in page.inner_text("#failures")

@@ -13,7 +13,7 @@ import pytest
 
 from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import run_cell
-from posefit.sweep.check import cell_of
+from posefit.sweep.check import cell_of, search_of
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from tests.sweep.fake import cells
@@ -25,6 +25,10 @@ SPECS: list[dict[str, Any]] = [
     {"method": "cma@pca", "motion": "walk-a", "corruption": {"holes": 0.3, "dropped": 0.1}, "train": ["walk", "run"]},
     {"method": "sapso@pca", "motion": "walk", "settings": {"tracker.root_range_degrees": "40,10,10"}, "seed": 1},
 ]
+SEARCH: dict[str, Any] = {
+    **{"method": "pso", "suite": "posefit-2026.3", "function": 7, "dimension": 24, "instance": 3, "seed": 5},
+    **{"budget": 30, "infeasible": "reject", "settings": {"population_size": 20}},
+}
 
 
 def plan_in(text: str) -> dict[str, Any]:
@@ -35,8 +39,7 @@ def plan_in(text: str) -> dict[str, Any]:
 
 
 def test_the_command_is_a_plan_of_the_cell() -> None:
-    for spec in SPECS:
-        cell = cell_of(SMALL | spec)
+    for cell in (search_of(SEARCH), *(cell_of(SMALL | spec) for spec in SPECS)):
         assert [planned.key for planned in Plan.of(plan_in(repeat_command(cell.spec)))] == [cell.key]
 
 

@@ -18,7 +18,6 @@ from tests.sweep.fake import cells
 ROOT = Path(__file__).parents[2]
 METHODS = 10
 PROPOSED, FALLING = list(range(40, 2480, 40)), 20.0 / np.arange(1.0, 62.0)  # of the trace of every row
-counted = pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="reads what it took from /proc")
 REPORT = """
 import json, sys, time
 from posefit.report.write import write_report
@@ -30,11 +29,11 @@ print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
 """
 
 
-def rows(instances: int, seeds: int, methods: int = METHODS) -> Iterator[CellResult]:
+def rows(instances: int, seeds: int) -> Iterator[CellResult]:
     """Yield results as large as those of real cells; of one picture, whatever the row."""
     first, rng = replace(cells(1)[0], frames=60), np.random.default_rng(0)
     picture = result(first, 1.0).joints
-    for m in range(methods):
+    for m in range(METHODS):
         for i in range(instances):
             for s, error in enumerate(rng.gamma(2.0, 1.0, seeds).tolist()):
                 trace: dict[str, Any] = {"evaluations": PROPOSED, "cost": np.round(FALLING + error, 4).tolist()}
@@ -43,7 +42,7 @@ def rows(instances: int, seeds: int, methods: int = METHODS) -> Iterator[CellRes
 
 
 @pytest.mark.slow
-@counted
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads what it took from /proc")
 @pytest.mark.parametrize(("instances", "seeds"), [(100, 100), (5000, 2)])
 def test_100_000_rows_are_reported_in_2_gigabytes(tmp_path: Path, instances: int, seeds: int) -> None:
     made = ledger(tmp_path / "ledger", rows(instances, seeds))

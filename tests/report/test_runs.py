@@ -10,16 +10,16 @@ import numpy as np
 from posefit.report.kind import Runs
 from posefit.report.runs import distinct, runs_of
 from posefit.report.tracks import TRACKS
-from posefit.sweep.cell import CellResult, TrackCell
+from posefit.sweep.cell import CellResult
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
-from tests.report.contests import FIRST
+from tests.report.contests import FIRST, full, results_of
 
 SAPSO, COOLER = replace(FIRST, method="sapso@pca"), replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
 
 
-def read(path: Path, *results: CellResult, lost: list[tuple[TrackCell, list[str]]] | None = None) -> Runs:
-    return runs_of(Ledger(ledger(path / "results", results, lost)))
+def read(path: Path, *results: CellResult) -> Runs:
+    return runs_of(Ledger(ledger(path / "results", results)))
 
 
 def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_first(tmp_path: Path) -> None:
@@ -42,11 +42,8 @@ def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_firs
 
 
 def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
-    several = [
-        {"sapso.seed": 1, "pca.seed": 2, "sapso.cooling": 0.9},
-        {"sapso.seed": 1, "pca.seed": 2},
-        {"pca.seed": 3},
-    ]
+    all_of_them = {"sapso.seed": 1, "pca.seed": 2, "sapso.cooling": 0.9}
+    several = [all_of_them, {"sapso.seed": 1, "pca.seed": 2}, {"pca.seed": 3}]
     runs = read(tmp_path, *(result(replace(SAPSO, settings=s), 1.0 + k) for k, s in enumerate(several)))
     assert runs.methods == (
         "sapso@pca (pca.seed 2, cooling 0.9, sapso.seed 1)",
@@ -79,9 +76,7 @@ def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -
 
 
 def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(tmp_path: Path) -> None:
-    made = [
-        result(replace(FIRST, method=m, instance=i, seed=s), 1.0 + i) for m in "ab" for i in range(3) for s in range(2)
-    ]
+    made = results_of(full({"a": 1.0, "b": 1.0}, instances=3))
     runs, mixed = read(tmp_path / "a", *made), read(tmp_path / "b", *random.Random(0).sample(made, len(made)))
     assert runs.keys == mixed.keys
     assert (runs.figures["error"] == mixed.figures["error"]).all()

@@ -1,6 +1,5 @@
 """Reports of single searches: the numbers worked by hand, what the command writes and prints, and mistakes."""
 
-import csv
 import json
 import math
 from pathlib import Path
@@ -9,15 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.reading import parsed_toml
 from posefit.report.content import data_of
 from posefit.report.leaderboard import leaderboard
-from posefit.report.repeat import repeat_command
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.plan import Plan
 from tests.commands import error_of, run
-from tests.report.browser import data_in, ledger, result
+from tests.files import csv_rows
+from tests.report.browser import data_in, ledger, result, written
 from tests.report.contests import FIRST, baselines, contest_in, sentences
 from tests.report.searched import cell, problems, search_result, searched
 
@@ -94,20 +91,17 @@ def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> Non
 
 def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_page(tmp_path: Path) -> None:
     results = searched(tmp_path / "results", {"cma": 10, "random": 2}, problems([1, 5], [9], 3), [LOST])
-    done = run("report", results, "--out", tmp_path / "page.html", "--csv", tmp_path / "rows.csv")
-    assert done.exit_code == 0, done.stderr
-    lines = done.stdout.splitlines()
+    lines, page = written(results, "--csv", tmp_path / "rows.csv")
     assert lines[0].startswith("cma leads with 37.9 % of all targets reached (95 % interval ")
     assert lines[3:5] == ["1 cell failed, left out of all figures: pso 1", "  1 x ValueError: it had to"]
     assert lines[5] == "no cell finished, so not on the leaderboard: pso"
     assert lines[6].split() == ["targets", "%", "95", "%", "interval", "behind", "p", "above"]
     assert [line.split()[:2] for line in lines[7:9]] == [["cma", "37.9"], ["random", "10.3"]]
-    data = data_in((tmp_path / "page.html").read_text("utf-8"))
+    data = data_in(page)
     assert data["answer"] == lines[:3]
     assert data["failures"][0]["name"] == "pso on f1 in 9D, instance 10001, seed 3"
     assert data["baselines"] == [{"baseline": "random", "reached": pytest.approx(10.345)}]
-    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
-        assert len(list(csv.DictReader(file))) == 12 + 1
+    assert len(csv_rows(tmp_path / "rows.csv")) == 12 + 1
     printed = json.loads(run("report", results, "--json").stdout)
     assert [row["name"] for row in printed["leaderboard"]] == ["cma", "random"]
     assert printed["times"][0]["times"][0] == 50.0
@@ -115,13 +109,6 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     mistake = error_of("report", results, "--figures", tmp_path / "new")
     assert "--figures must be given with a sweep of tracks, got one of single searches" in mistake
     assert not (tmp_path / "new").exists()
-
-
-def test_the_command_of_a_search_is_a_plan_of_that_one_cell() -> None:
-    search = cell("pso", 7, 24, 3, seed=5, budget=30, infeasible="reject", settings={"population_size": 20})
-    plan = repeat_command(search.spec).partition("<<'END'\n")[2].removesuffix("END")
-    (other,) = Plan.of(parsed_toml(plan))
-    assert other.spec == {**search.spec, "version": other.version}
 
 
 def test_a_ledger_of_tracks_and_searches_is_refused(tmp_path: Path) -> None:

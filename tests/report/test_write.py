@@ -1,6 +1,5 @@
 """What `posefit report` writes and prints, and one line for every mistake."""
 
-import csv
 import json
 import re
 import sys
@@ -14,8 +13,9 @@ from posefit.page.document import embedded, plain
 from posefit.report.page import MARK
 from posefit.sweep.table import write_csv
 from tests.commands import error_of, run
-from tests.report.browser import data_in, ledger, result, sure
-from tests.report.contests import FIRST, full
+from tests.files import csv_rows
+from tests.report.browser import data_in, ledger, result, sure, written
+from tests.report.contests import FIRST, full, results_of
 
 LOST = [(replace(FIRST, seed=9), ["its process died", "ValueError: it had to", "its process died"])]
 
@@ -28,14 +28,6 @@ def results(tmp_path: Path) -> Path:
         for (method, i, s), error in full({"random@pca": 2.0, "sapso@pca": 1.0}).items()
     ]
     return ledger(tmp_path / "results", made, LOST)
-
-
-def written(made: Path, *words: object) -> tuple[list[str], str]:
-    """Return the lines that the command prints, and the page that it writes."""
-    out = made.with_name("report.html")
-    done = run("report", made, "--out", out, *words)
-    assert done.exit_code == 0, done.stderr
-    return done.stdout.splitlines(), out.read_text("utf-8")
 
 
 def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, tmp_path: Path) -> None:
@@ -60,9 +52,7 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
 
 
-def test_the_same_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(
-    results: Path, tmp_path: Path
-) -> None:
+def test_a_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(results: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     done = run("report", results)
     assert done.exit_code == 0, done.stderr
@@ -81,13 +71,8 @@ def test_the_same_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_r
 
 
 def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_path: Path) -> None:
-    made = [
-        result(replace(FIRST, method=m, instance=i, seed=s), 1.0 + i)
-        for m in ("random@pca", "sapso@pca")
-        for i in range(3)
-        for s in range(2)
-        if (m, i) != ("sapso@pca", 1)
-    ]
+    errors = full({"random@pca": 1.0, "sapso@pca": 1.0}, instances=3)
+    made = results_of({key: error for key, error in errors.items() if key[:2] != ("sapso@pca", 1)})
     lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
     lines, page = written(ledger(tmp_path / "results", made, lost))
     assert lines[4:9] == [
@@ -108,20 +93,16 @@ def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: 
         "  1 x its process died",
         "  1 x ValueError: it had to",
     ]
-    data = data_in(page)
-    assert data["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
+    assert data_in(page)["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
 
 
 def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     figures, rows = tmp_path / "figures", tmp_path / "rows.csv"
     written(results, "--figures", figures, "--csv", rows)
-    names = ("convergence", "profile")
-    drawn = {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
+    drawn = {f"{name}.{kind}" for name in ("convergence", "profile") for kind in ("png", "pdf")}
     assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.csv"}
-    with rows.open(newline="", encoding="utf-8") as file:
-        statuses = [row["status"] for row in csv.DictReader(file)]
-    assert sorted(statuses) == ["done"] * 8 + ["quarantined"]
+    assert sorted(row["status"] for row in csv_rows(rows)) == ["done"] * 8 + ["quarantined"]
 
 
 def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
@@ -134,8 +115,7 @@ def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
     head, first, *_ = (figures / "leaderboard.csv").read_text().splitlines()
     assert "flagged unknown,80 % interval holds,80 % interval (mm)" in head
     assert ",0.8,60.0," in first
-    with rows.open(newline="", encoding="utf-8") as file:
-        row = next(csv.DictReader(file))
+    row = csv_rows(rows)[0]
     assert (row["interval_mm.80"], row["coverage.80"]) == ("60.0", "0.8")
     assert "mode_reliability" not in row
     data = data_in(page)

@@ -34,6 +34,16 @@ def walk(frames: int, views: Sequence[float] = (45.0,), size: tuple[int, int] = 
     return synthetic(built_in.motion("walk", frames=frames), views, size, [], (None, None))
 
 
+def masks_of(scene: Scene, view: int = 0) -> list[Array]:
+    """Return the masks of a view of a scene."""
+    return [observation.silhouettes[view].mask for observation in scene.observations]
+
+
+def rows_of(some: Iterable[Observation], observations: Sequence[Observation]) -> list[int]:
+    """Return the numbers that some of the observations have."""
+    return [next(k for k, other in enumerate(observations) if other is one) for one in some]
+
+
 def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observation) -> Frame:
     """Return the frame of a tracker that estimates a pose."""
     views = zip(scene.cameras, observation.silhouettes, strict=True)

@@ -91,11 +91,9 @@ def drawn_body(body: Body, camera: Camera, joints: Array) -> Array:
 
 def pulled(numbers: Array, mask: kernels.Contour, scale: float) -> tuple[Array, Array]:
     """Return half the second derivatives (106, 106) and half the gradient (106,) by the numbers of a drawn body."""
-    centres, radii = numbers[: 2 * len(JOINTS)].reshape(-1, 2), numbers[2 * len(JOINTS) :].reshape(-1, 2)
+    centres, radii = (part.reshape(-1, 2) for part in np.split(numbers, [2 * len(JOINTS)]))
     blocks, forces = np.zeros((len(BONES), 6, 6)), np.zeros((len(BONES), 6))
-    kernels.add_pulls(
-        BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), mask, scale, blocks, forces
-    )
+    kernels.add_pulls(BONE_STARTS, centres, radii, mask, scale, blocks, forces)
     curves, slopes = np.zeros((COUNT, COUNT)), np.zeros(COUNT)
     for b, parent in enumerate(BONE_STARTS):
         rows = [2 * parent, 2 * parent + 1, 2 * b + 2, 2 * b + 3, *(2 * (len(JOINTS) + b) + np.arange(2))]
@@ -110,8 +108,7 @@ def pull_of_view(view: MaskContours, k: int, here: Array, there: Array, reach: f
     The drawn body's numbers are `here` (106,), and `there` (n, 106) where each parameter is off by `STEP`.
     """
     root = view.metres[k]
-    points = view.points[view.starts[k] : view.starts[k + 1]]
-    points = np.ascontiguousarray(points)
+    points = np.ascontiguousarray(view.points[view.starts[k] : view.starts[k + 1]])
     mask = kernels.Contour(view.fields[k], view.corners[k], view.sizes[k], points, view.step)
     curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
     deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
@@ -172,9 +169,7 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     poses = estimate_of(motion).poses
     changes, places = growth(body, body.stature, replace(motion, poses=poses)), motion.translations
     views = [MaskContours.of(camera, k, scene.observations, places) for k, camera in enumerate(scene.cameras)]
-    curves, slopes, mixed, factor_hessian, factor_gradient = contour_squares(
-        body, views, poses, places, 0.09, [changes] * 2
-    )
+    curves, slopes, mixed, hessian, gradient = contour_squares(body, views, poses, places, 0.09, [changes] * 2)
     expected = np.zeros((3, 69 + len(NAMES), 69 + len(NAMES))), np.zeros((3, 69 + len(NAMES)))
     grown = [shaped(body, np.exp(STEP * row), body.stature) for row in np.eye(len(NAMES))]
     for k in range(3):
@@ -189,10 +184,10 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     scale = np.abs(expected[0]).max()
     np.testing.assert_allclose(curves, expected[0][:, :69, :69][:, free][:, :, free], atol=1e-3 * scale)
     np.testing.assert_allclose(mixed, expected[0][:, :69, 69:][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(factor_hessian, expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(hessian, expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
     scale = np.abs(expected[1]).max()
     np.testing.assert_allclose(slopes, expected[1][:, :69][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(factor_gradient, expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(gradient, expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
 
 
 def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
@@ -354,18 +349,15 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     estimate = estimate_of(truth, 3.0)
     sure = Recalibration(joint_spreads=np.append(0.0, np.full(len(JOINTS) - 1, 0.006)))
     posterior = Posterior(estimate.poses[:2], estimate.translations[:2], np.ones(2), recalibration=sure)
-    nothing = np.zeros((1, 3), np.int64)
-    frames = [
-        Frame(pose, place, 0.0, nothing, 0, posterior=posterior)
-        for pose, place in zip(estimate.poses, estimate.translations, strict=True)
-    ]
+    known, nothing = zip(estimate.poses, estimate.translations, strict=True), np.zeros((1, 3), np.int64)
+    frames = [Frame(*pose, 0.0, nothing, 0, posterior=posterior) for pose in known]
     (_, alone, none), (_, both, shape) = (smooth(scene, frames, each, 0.5) for each in (None, average_shape(scene)))
     assert none is None
     costs = [np.mean([frame.cost for frame in each]) for each in (both, alone)]
     assert costs[0] < 0.7 * costs[1]
     assert shape.cost == pytest.approx(costs[0])
-    moved, pose, known = both[0].posterior, both[0].pose, alone[0].posterior
-    assert known.recalibration is moved.recalibration is sure
+    moved, pose = both[0].posterior, both[0].pose
+    assert alone[0].posterior.recalibration is moved.recalibration is sure
     np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
     apart = estimate.translations[1] - estimate.translations[0]
     np.testing.assert_allclose(moved.translations[1] - both[0].translation, apart)

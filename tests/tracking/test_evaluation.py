@@ -164,9 +164,7 @@ def test_frames_are_lost_from_a_probability_of_a_half_on(scene: Scene) -> None:
             replace(frames[0], lost=lost)
 
 
-def test_held_and_lost_frames_are_blank_for_other_programs_and_have_their_numbers_as_filmed(
-    scene: Scene, tmp_path: Path
-) -> None:
+def test_held_and_lost_frames_are_blank_for_other_programs_and_numbered_as_filmed(scene: Scene, tmp_path: Path) -> None:
     observations = list(scene.observations)
     observations[1] = replace(observations[1], usable=False)
     frames = uncertain_frames(scene, [0.0, 0.0, 0.3, 0.4, 0.5, 0.0], coherent=True)

@@ -97,9 +97,7 @@ def test_a_first_frame_that_was_being_written_is_cut_off(tmp_path: Path) -> None
         (b'"evaluations"', b'"evaluation"', True, "unexpected keyword argument 'evaluation'"),
     ],
 )
-def test_frames_before_the_first_damaged_one_are_kept(
-    old: bytes, new: bytes, right: bool, reason: str, tmp_path: Path
-) -> None:
+def test_frames_before_the_damage_are_kept(old: bytes, new: bytes, right: bool, reason: str, tmp_path: Path) -> None:
     lines = written(tmp_path)["frames"].splitlines(keepends=True)
     assert old in lines[1]
     lines[1] = lines[1].replace(old, new, 1)

@@ -25,7 +25,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.lookup import Lookup
 from tests.cases import each
 from tests.testing import planted
-from tests.tracking.scenes import frame_of, walk
+from tests.tracking.scenes import frame_of, masks_of, rows_of, walk
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
@@ -61,9 +61,7 @@ def test_a_tracker_that_needs_its_whole_budget_is_not_warmed_up() -> None:
 
 
 @each(("size", "rows"), [((320, 240), 240), ((640, 479), 479), ((640, 480), 240), ((960, 721), 240)])
-def test_restarts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole_one(
-    size: tuple[int, int], rows: int
-) -> None:
+def test_restarts_see_small_pictures_and_the_best_goes_on_in_the_whole_one(size: tuple[int, int], rows: int) -> None:
     scene = walk(5, [90.0], size)
     motion, task = scene.truth, Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
     views: list[tuple[int, float]] = []
@@ -95,7 +93,7 @@ def test_restarts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_who
 )
 def test_too_few_frames_for_a_build_are_reported(tmp_path: Path, count: int, body_frames: int, message: str) -> None:
     scene = walk(count, [90.0], (120, 90))
-    np.savez(tmp_path / "a.npz", masks=[observation.silhouettes[0].mask for observation in scene.observations])
+    np.savez(tmp_path / "a.npz", masks=masks_of(scene))
     log: list[str] = []
     options: dict[str, Any] = {"method": "@loose", "evaluations": 80, "restarts": 1, "body_frames": body_frames}
     track = posefit.track(tmp_path / "a.npz", progress=Progress(log.append), **options)
@@ -117,7 +115,7 @@ def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int
     calls: list[tuple[list[int], float]] = []
 
     def follow(task: Task, chosen: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        rows = [next(k for k, other in enumerate(observations) if other is observation) for observation in chosen]
+        rows = rows_of(chosen, observations)
         calls.append((rows, task.fps))
         areas = np.zeros((len(scene.cameras), 3), np.int64)
         return iter([Frame(scene.truth.poses[0], scene.anchor, 0.0, areas, 0)] * len(rows))
@@ -138,12 +136,8 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
     assert few[0] == [10, 13, 16, 19, 22]
     assert many[0] == list(range(11))
     assert first_shown_whole(observations) == 10
-    assert (
-        first_shown_whole(
-            [replace(observation, silhouettes=observation.silhouettes[:1]) for observation in observations]
-        )
-        == 0
-    )
+    by_one = [replace(observation, silhouettes=observation.silhouettes[:1]) for observation in observations]
+    assert first_shown_whole(by_one) == 0
     whole = observations[0].silhouettes[0]
     cut = Silhouette.of(np.roll(whole.mask, -int(whole.extent[0]) - 5, axis=1))  # a part of it at the other edge
     observations = [replace(observations[0], silhouettes=[one]) for one in (unknown, cut, cut, whole)]
@@ -167,13 +161,8 @@ def test_a_build_that_begins_late_looks_for_the_pose_again(late: int, restarts: 
 
     fitted_build(task, replace(scene, observations=observations), follow, 5, None, 0, restarts=restarts)
     assert scene.fps == 30.0
-    if late < 15:  # half a second
-        assert starts == [(0.5, (first,))] * 2
-    elif not restarts:
-        assert starts == [(None, ())] * 2
-    else:
-        assert starts[0] == (None, ())
-        assert starts[1:] == [(frame.pose[0], (frame,))] * 2
+    begun = (0.5, (first,)) if late < 15 else (None, ())  # half a second
+    assert starts == ([begun] + [(frame.pose[0], (frame,))] * 2 if restarts else [begun] * 2)
 
 
 def test_the_first_pose_is_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,16 +174,14 @@ def test_the_first_pose_is_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> No
         return posterior(lookup, observation)
 
     monkeypatch.setattr(Lookup, "posterior", counted)
-    scene = walk(2, [90.0], (120, 90))
-    masks = [observation.silhouettes[0].mask for observation in scene.observations]
+    masks = masks_of(walk(2, [90.0], (120, 90)))
     posefit.track(masks, method="random@loose", evaluations=40, restarts=1, body_frames=0, smooth=False)
     assert len(asked) == 2  # once more to compile what a search needs
 
 
 def test_footage_without_a_truth_needs_no_angles_of_the_whole_library(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Task, "angles", property(lambda task: pytest.fail("all angles were put together")))
-    scene = walk(2, [90.0], (120, 90))
-    masks = [observation.silhouettes[0].mask for observation in scene.observations]
+    masks = masks_of(walk(2, [90.0], (120, 90)))
     track = posefit.track(masks, method="vsmm", evaluations=80, restarts=1, body_frames=0, smooth=False)
     assert track.truth is None
 

@@ -28,8 +28,10 @@ from posefit.progress import Progress
 from posefit.silhouette.cost import project
 from posefit.tracking.live import track_live, write_live
 from tests.cases import each
+from tests.files import arrays
 
 QUICK = {"evaluations": 200, "restarts": 2, "view_degrees": 45.0}
+PINHOLE = np.array([[165.0, 0.0, 79.5], [0.0, 165.0, 59.5], [0.0, 0.0, 1.0]])
 
 
 def pgm(mask):
@@ -142,8 +144,7 @@ def test_a_method_gets_the_landmarks_of_a_segmenter_also_through_a_lens(monkeypa
     monkeypatch.setattr(SynthesisTracker, "track", lambda self, frames, rng: follow(self, map(noted, frames), rng))
     raised = np.roll(walk, -5, axis=1)  # off the picture's lower border
     ppm = b"".join(b"P6 160 120 255\n" + np.repeat(255 * mask.astype(np.uint8), 3).tobytes() for mask in raised)
-    pinhole = np.array([[165.0, 0.0, 79.5], [0.0, 165.0, 59.5], [0.0, 0.0, 1.0]])
-    lens = Calibration("lens", (160, 120), pinhole, np.array([-0.2, 0.0, 0.0, 0.0]), None, None)
+    lens = Calibration("lens", (160, 120), PINHOLE, np.array([-0.2, 0.0, 0.0, 0.0]), None, None)
     for camera in ((), (lens,)):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(ppm)))
         observed.clear()
@@ -155,9 +156,7 @@ def test_a_method_gets_the_landmarks_of_a_segmenter_also_through_a_lens(monkeypa
 
 
 @each("damaged", [0, 5])
-def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off(
-    damaged, monkeypatch, every_frame, walk, tmp_path
-):
+def test_masks_in_a_pipe_become_poses_on_disk_also_if_it_breaks_off(damaged, monkeypatch, every_frame, walk, tmp_path):
     content, count = b"".join(map(pgm, walk)), 39 if damaged else 40
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content[: len(content) - damaged])))
     out = tmp_path / "out"
@@ -170,17 +169,13 @@ def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off
     rows = [json.loads(line) for line in (out / "frames.jsonl").read_text().splitlines()]
     assert [row["frame"] for row in rows] == list(range(count))
     assert np.median([row["cost"] for row in rows]) < 30.0
-    with np.load(out / "poses.npz") as arrays:
-        assert arrays["poses"].shape == (count, 66)
-        assert arrays["translations"].shape == (count, 3)
+    stored = arrays(out / "poses.npz")
+    assert (stored["poses"].shape, stored["translations"].shape) == ((count, 66), (count, 3))
 
 
-def test_what_a_stream_does_not_state_is_logged_and_the_unit_of_its_calibration_is_used(
-    monkeypatch, every_frame, walk, tmp_path
-):
+def test_what_a_stream_leaves_open_is_logged_and_its_calibrations_unit_counts(monkeypatch, every_frame, walk, tmp_path):
     write_bvh(tmp_path / "walk.bvh", built_in.motion("walk-b").turned(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
-    pinhole = np.array([[165.0, 0.0, 79.5], [0.0, 165.0, 59.5], [0.0, 0.0, 1.0]])
-    stated = Calibration("a", (160, 120), pinhole, np.zeros(4), np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 30.0]))
+    stated = Calibration("a", (160, 120), PINHOLE, np.zeros(4), np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 30.0]))
     assumed, person = "30 frames a second", "a person of 1.74 m"
     for options, guesses in (
         ({}, [assumed, "a level camera, 40 degrees across: distances and sizes are as good as that", person]),
@@ -251,4 +246,4 @@ def test_a_pipe_that_pauses_ends_the_process_with_one_line_and_keeps_its_frames(
     assert errors.splitlines()[-1] == "posefit: -: expected a frame, got none for 0.5 s"
     assert "Traceback" not in errors
     rows = (out / "frames.jsonl").read_text().splitlines()
-    assert len(np.load(out / "poses.npz")["poses"]) == len(rows) > 0
+    assert len(arrays(out / "poses.npz")["poses"]) == len(rows) > 0

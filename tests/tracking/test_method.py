@@ -23,6 +23,7 @@ from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
 from tests.cases import each
 from tests.testing import planted
+from tests.tracking.scenes import masks_of
 
 WALKS = ("walk-a", "walk-b", "walk-c")
 QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200}
@@ -50,13 +51,8 @@ def installed(monkeypatch: Any) -> Any:
     return install
 
 
-@each(
-    ("name", "later"),
-    [("particle", []), ("sapso", ["start", "start"]), ("random", ["anywhere", "anywhere"])],
-)
-def test_a_filter_carries_its_particles_and_the_others_are_built_again(
-    name: str, later: list[str], installed: Any
-) -> None:
+@each(("name", "later"), [("particle", []), ("sapso", ["start", "start"]), ("random", ["anywhere", "anywhere"])])
+def test_a_filter_carries_its_particles_and_others_are_built_again(name: str, later: list[str], installed: Any) -> None:
     built: list[str] = []
     offer = registry().offer("optimiser", name)
 
@@ -83,18 +79,18 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(in
     [
         ({"low": np.zeros((2, 3))}, r"low and high must be finite and of shape \(m,\), got \(2, 3\), \(6,\)"),
         (
-            {"inverse_transform": lambda latents: np.zeros((len(latents), 60))},
+            {"inverse_transform": lambda z: np.zeros((len(z), 60))},
             r"inverse_transform must return shape \(3, 63\), got \(3, 60\)",
         ),
         (
-            {"inverse_transform": lambda latents: np.full((len(latents), 63), np.nan)},
+            {"inverse_transform": lambda z: np.full((len(z), 63), np.nan)},
             "inverse_transform must return finite numbers",
         ),
-        ({"feasible": lambda latents: True}, r"feasible must return shape \(3,\), got \(\)"),
+        ({"feasible": lambda z: True}, r"feasible must return shape \(3,\), got \(\)"),
         ({"transform": lambda angles: 1 / 0}, "it must not fail, got ZeroDivisionError"),
         ({"low": np.full(6, 9.0)}, "low must not be above high, got 9 and [0-9.]+ of latent 0"),
         (
-            {"feasible": lambda latents: np.zeros(len(latents), dtype=bool)},
+            {"feasible": lambda z: np.zeros(len(z), dtype=bool)},
             "feasible must allow some poses, got none of [0-9]+ training poses and 1000 of the range",
         ),
     ],
@@ -271,8 +267,7 @@ def test_a_search_that_ends_long_before_its_budget_says_so(name: str) -> None:
 
 def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_path: Path) -> None:
     scene, log = scene_of(["09_01"], frames=(0, 8), size=(120, 90)), list[str]()
-    masks = [observation.silhouettes[0].mask for observation in scene.observations]
-    np.savez(tmp_path / "masks.npz", masks=masks)
+    np.savez(tmp_path / "masks.npz", masks=masks_of(scene))
     track = posefit.track(tmp_path / "masks.npz", evaluations=800, body_frames=5, progress=Progress(log.append))
     assert track.summary["method"] == "exemplars"
     assert track.summary["train"] == [clip.name for clip in recorded.clips()]
@@ -287,11 +282,10 @@ def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_p
 
 def test_footage_by_several_cameras_is_tracked_again_where_evaluations_are_enough(tmp_path: Path) -> None:
     scene = scene_of(["09_01"], frames=(0, 6), size=(120, 90), view_degrees=(0.0, 90.0))
-    views = [[observation.silhouettes[v].mask for observation in scene.observations] for v in range(2)]
-    for v, masks in enumerate(views):
-        np.savez(tmp_path / f"{v}.npz", masks=masks)
-    given: dict[str, Any] = {"train": ["walk-a"], "body_frames": 0, "camera": scene.cameras}
     paths, used = [tmp_path / "0.npz", tmp_path / "1.npz"], dict[int, int]()
+    for v, path in enumerate(paths):
+        np.savez(path, masks=masks_of(scene, v))
+    given: dict[str, Any] = {"train": ["walk-a"], "body_frames": 0, "camera": scene.cameras}
     for passes in (1, 2):  # of which each has as many evaluations
         log = list[str]()
         known = {"evaluations": 2440 * passes, "progress": Progress(log.append), **given}

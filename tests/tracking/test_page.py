@@ -1,7 +1,6 @@
 """The page of a track: pictures within their room, all of a long track's marks, no links; and in a real browser."""
 
 import base64
-import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,14 +19,8 @@ from posefit.output.page.stills import Stills, Strip
 from posefit.page.document import embedded
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from tests.report.browser import EVIL, Watched, opened
+from tests.report.browser import EVIL, Watched, data_in, opened
 from tests.tracking.scenes import MAXWELL, SIZE, exact_frames, uncertain_frames, viewed, walk
-
-
-def data_of(page: Path) -> dict[str, Any]:
-    """Return the data of a page."""
-    (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page.read_text("utf-8"))
-    return dict(json.loads(text))
 
 
 def numbers(text: str) -> Any:
@@ -110,7 +103,8 @@ def test_metres_are_whole_millimetres_and_what_is_not_known_has_a_number_of_its_
 def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> None:
     scene = walk(4)
     truth = scene.truth
-    data = data_of(viewed(tmp_path / "out", scene, uncertain_frames(scene, [0.0, 0.3, 0.0, 0.0])))
+    page = viewed(tmp_path / "out", scene, uncertain_frames(scene, [0.0, 0.3, 0.0, 0.0]))
+    data = data_in(page.read_text("utf-8"))
     joints = numbers(data["estimate"]).reshape(4, 27, 3)
     true = 1e3 * truth.joints
     np.testing.assert_allclose(joints - joints[0, 0], true - true[0, 0], atol=1.01)
@@ -138,15 +132,15 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
 def test_it_is_one_file_that_links_to_nothing_but_itself(tmp_path: Path) -> None:
     scene = walk(3)
     name = "</script><script>alert(1)</script>"
-    page = viewed(tmp_path / "out", replace(scene, name=name), exact_frames(scene))
-    text = page.read_text("utf-8")
+    text = viewed(tmp_path / "out", replace(scene, name=name), exact_frames(scene)).read_text("utf-8")
     assert re.findall(r"""<[^>]*\s(?:src|href|action|srcset|data)=["']?([^"'\s>]*)""", text) == ["#player"]
     assert "url(" not in text
     assert "@import" not in text
     assert text.count("</script>") == 2
-    assert data_of(page)["title"] == name
-    assert data_of(page)["film"] is data_of(page)["intervals"] is None
-    assert embedded(data_of(page)["others"]) == '{"at":[],"weights":[],"joints":""}'
+    data = data_in(text)
+    assert data["title"] == name
+    assert data["film"] is data["intervals"] is None
+    assert embedded(data["others"]) == '{"at":[],"weights":[],"joints":""}'
 
 
 FRAMES = 12
@@ -177,8 +171,7 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def picture(page: Any, canvas: str) -> Any:
     """Return what a canvas shows, (height, width, 4)."""
-    text = page.evaluate("id => document.getElementById(id).toDataURL()", canvas).partition(",")[2]
-    return cv2.imdecode(np.frombuffer(base64.b64decode(text), np.uint8), cv2.IMREAD_UNCHANGED)
+    return image(page.evaluate("id => document.getElementById(id).toDataURL()", canvas))
 
 
 def waited(browser: Watched, condition: Callable[[], Any]) -> None:

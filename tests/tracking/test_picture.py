@@ -61,9 +61,7 @@ def test_an_unsure_limb_fades_on_the_masks_and_beside_them(scene: Scene, frame: 
 
 
 @each(("weight", "drawn"), [(0.19, False), (0.2, False), (0.21, True), (0.7, True)])
-def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(
-    scene: Scene, frame: Frame, weight: float, drawn: bool
-) -> None:
+def test_another_mode_is_drawn_if_it_has_over_a_fifth(scene: Scene, frame: Frame, weight: float, drawn: bool) -> None:
     mirrored = mirrored_poses(scene.body.skeleton, frame.pose[None])[0]
     modes = [Mode(1.0 - weight, frame.pose, frame.translation), Mode(weight, mirrored, frame.translation)]
     posterior = Posterior(frame.pose[None], frame.translation[None], np.ones(1), modes=modes)

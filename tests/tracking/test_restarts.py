@@ -46,7 +46,7 @@ from posefit.tracking.trajectory import (
 )
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
-from tests.tracking.scenes import exact_frames, stopping, walk
+from tests.tracking.scenes import exact_frames, rows_of, stopping, walk
 
 WALK = built_in.motion("walk", frames=30)
 SKELETON = WALK.skeleton
@@ -287,9 +287,7 @@ def restarts_of(
 
 
 @each(("before", "gap", "expected"), [(3, 4, []), (3, 5, [(8, True)]), (3, 9, [(12, True)]), (0, 9, [])])
-def test_a_gap_is_of_five_frames_after_one_that_shows_the_person(
-    before: int, gap: int, expected: list[tuple[int, bool]]
-) -> None:
+def test_a_gap_is_five_frames_after_one_with_the_person(before: int, gap: int, expected: list[Any]) -> None:
     assert restarts_of(PlannedCosts([1.0] * 30, 5.0), [VISIBLE] * before + [GONE] * gap + [VISIBLE] * 10) == expected
 
 
@@ -316,9 +314,7 @@ TYPICAL, HIGH, LOWER = [2.0] * 10, [3.1] * 5, [2.9] * 5
         ([*TYPICAL, *HIGH, *HIGH, *HIGH, *HIGH], [(15, True)]),  # which is then typical
     ],
 )
-def test_costs_that_stay_high_for_half_a_second_lead_to_restarts(
-    costs: list[float], expected: list[tuple[int, bool]]
-) -> None:
+def test_costs_high_for_half_a_second_lead_to_restarts(costs: list[float], expected: list[tuple[int, bool]]) -> None:
     assert restarts_of(PlannedCosts(costs, 5.0), [VISIBLE] * len(costs)) == expected
 
 
@@ -353,19 +349,11 @@ def consensus(frames: Sequence[Frame], visible: bool = True) -> list[bool]:
     return facing_consensus(frames, [CAMERA, CAMERA], np.full(len(frames), visible), FPS).tolist()
 
 
-def rows_of(observations: Iterable[Observation]) -> list[int]:
-    """Return the numbers of some of the observations."""
-    return [next(k for k, other in enumerate(OBSERVATIONS) if other is observation) for observation in observations]
-
-
 @each(
     ("frames", "agrees"),
     [
         (frames_facing(SPINNING), [False] * 11 + [True] * 17),  # frames of the spin itself have no vote
-        (
-            frames_facing([30.0] * 10 + [150.0] * 8 + [30.0] * 10),
-            [True] * 7 + [False] * 14 + [True] * 7,
-        ),
+        (frames_facing([30.0] * 10 + [150.0] * 8 + [30.0] * 10), [True] * 7 + [False] * 14 + [True] * 7),
         (frames_facing([0.0] * 5 + [*np.linspace(0.0, 180.0, 30)] + [180.0] * 5), [True] * 40),  # a real turn
     ],
 )
@@ -391,7 +379,7 @@ def test_a_track_that_spins_is_tracked_again_outside_its_longest_run_without_spi
     frames, calls = [frame(yaw, posterior=posterior(0.2)) for yaw in degrees], list[tuple[Task, list[int]]]()
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        rows = rows_of(observations)
+        rows = rows_of(observations, OBSERVATIONS)
         calls.append((task, rows))
         for row in rows:
             yield frame(30.0 + 0.1 * row, posterior=posterior(0.2 if rows[-1] else -0.2))
@@ -419,13 +407,11 @@ def test_a_track_that_spins_is_tracked_again_outside_its_longest_run_without_spi
         ([30.0] * 28, None, 1.0, False),  # there is no spin
     ],
 )
-def test_a_track_that_gets_no_better_is_kept(
-    degrees: list[float], again: list[float], cost: float, tried: bool
-) -> None:
+def test_a_track_that_gets_no_better_stays(degrees: list[float], again: list[float], cost: float, tried: bool) -> None:
     calls = list[list[int]]()
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        calls.append(rows_of(observations))
+        calls.append(rows_of(observations, OBSERVATIONS))
         for row in calls[-1]:
             yield frame(again[row], cost)
 
@@ -478,20 +464,12 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
     shown = [*OBSERVATIONS[:5], *(Observation([Silhouette.of(whole)]) for _ in range(5))]  # a full picture is cut
     scene = replace(walk(10), truth=None, observations=shown, count=10)
 
-    class Tracker:
-        def __init__(self, task: Task) -> None:
-            self.task = task
+    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        rows = rows_of(observations, shown)
+        calls.append((task, rows))
+        yield from (frame(float(row), posterior=posterior(0.1)) for row in rows)
 
-        def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-            rows = [next(k for k, other in enumerate(shown) if other is one) for one in observations]
-            calls.append((self.task, rows))
-            yield from (frame(float(row), posterior=posterior(0.1)) for row in rows)
-
-    method: Any = SimpleNamespace(
-        looks_ahead=True,
-        relocalise_gap=0,
-        follow=lambda task, observations, rng: Tracker(task).track(observations, rng),
-    )
+    method: Any = SimpleNamespace(looks_ahead=True, relocalise_gap=0, follow=follow)
     frames = track_hypotheses(scene, SPIN_TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())[0].frames
     (back, behind), (onward, ahead), (again, _), _ = calls
     assert (behind, ahead) == ([5, 4, 3, 2, 1, 0], [5, 6, 7, 8, 9])

@@ -15,6 +15,7 @@ from posefit.errors import InputError
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from tests.cases import each
+from tests.files import arrays
 
 QUICK: dict[str, Any] = {"method": "random@loose", "evaluations": 40, "restarts": 1, "body_frames": 0, "smooth": False}
 MOTION = built_in.motion("walk", frames=3)
@@ -28,21 +29,14 @@ def track() -> posefit.Track:
     return posefit.track(MASKS, camera=CAMERA, fps=25, **QUICK)
 
 
-@each("kind", ["npy", "images", "list", "bytes", "folder"])
-def test_the_same_masks_give_the_same_track(kind: str, track: posefit.Track, tmp_path: Path) -> None:
+def test_the_same_masks_give_the_same_track(track: posefit.Track, tmp_path: Path) -> None:
     np.save(tmp_path / "masks.npy", MASKS)
-    paths = [tmp_path / f"{k}.png" for k in range(len(MASKS))]
-    for path, mask in zip(paths, MASKS, strict=True):
+    images = [tmp_path / f"{k}.png" for k in range(len(MASKS))]
+    for path, mask in zip(images, MASKS, strict=True):
         cv2.imwrite(str(path), 255 * mask.astype(np.uint8))
-    sources: dict[str, Any] = {
-        "npy": tmp_path / "masks.npy",
-        "images": paths,
-        "list": list(MASKS),
-        "bytes": 255 * MASKS.astype(np.uint8),
-        "folder": tmp_path,
-    }
-    again = posefit.track(sources[kind], camera=CAMERA, fps=25, **QUICK)
-    np.testing.assert_array_equal(again.joints, track.joints)
+    for source in (tmp_path / "masks.npy", images, list(MASKS), 255 * MASKS.astype(np.uint8), tmp_path):
+        again = posefit.track(source, camera=CAMERA, fps=25, **QUICK)
+        np.testing.assert_array_equal(again.joints, track.joints, err_msg=f"{type(source)}")
 
 
 @each(
@@ -99,12 +93,9 @@ def test_a_frame_is_a_fit_with_a_picture(track: posefit.Track) -> None:
 def test_a_mask_is_fitted() -> None:
     fit = posefit.fit(MASKS[0], camera=CAMERA, **QUICK)
     assert fit.pose.shape == (66,)
-    assert "history" not in fit.summary
 
 
-def test_files_and_the_page_come_afterwards_too(
-    track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_and_a_page_come_later_too(track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "strftime", lambda _: "1 July 2026")  # no midnight between the two
     track.save(tmp_path / "out")
     opened: list[str] = []
@@ -119,8 +110,7 @@ def test_the_files_of_a_track_have_the_build_that_was_fitted(tmp_path: Path) -> 
     masks = [project(BODY, CAMERA, *pose) for pose in zip(motion.poses, motion.translations, strict=True)]
     track = posefit.track(masks, camera=CAMERA, fps=25, out=tmp_path / "out", **{**QUICK, "body_frames": 6})
     assert track.log.build is not None
-    with np.load(tmp_path / "out" / "poses.npz") as stored:
-        np.testing.assert_array_equal(stored["radii"], track.scene.body.radii)
+    np.testing.assert_array_equal(arrays(tmp_path / "out" / "poses.npz")["radii"], track.scene.body.radii)
 
 
 def test_methods_are_compared(tmp_path: Path) -> None:

@@ -96,10 +96,9 @@ def test_angles_that_one_camera_sees_are_filtered_over_a_thirtieth_of_a_second()
     poses[10, 5] = poses[30, 5] = 1.0
     poses[:, 0] = [np.pi - 0.01, 0.01 - np.pi] * 20  # to either side of half a turn
     viewpoints[:20] = VIEWPOINT
+    seen = Visibility(viewpoints[:, 0] > 1, viewpoints)
     for fps in (30.0, 60.0):
-        steady = steadied(
-            Motion("", motion.skeleton, poses, np.zeros((40, 3)), fps), Visibility(viewpoints[:, 0] > 1, viewpoints)
-        )
+        steady = steadied(Motion("", motion.skeleton, poses, np.zeros((40, 3)), fps), seen)
         weights = np.exp(-0.5 * (np.arange(-9, 10) * 30.0 / fps) ** 2)
         np.testing.assert_allclose(steady.poses[8:13, 5], (weights / weights.sum())[7:12], atol=2e-4)
         np.testing.assert_array_equal(steady.poses[20:], poses[20:])  # several cameras see it

@@ -143,10 +143,7 @@ def test_three_doubtful_signs_together_are_as_bad_as_a_useless_one() -> None:
 
 
 def trusted(
-    scene: Scene,
-    tracked: list[Frame] | None = None,
-    reported: float = 0.0,
-    training: Sequence[Motion] = (),
+    scene: Scene, tracked: list[Frame] | None = None, reported: float = 0.0, training: Sequence[Motion] = ()
 ) -> Trust:
     """Return the trust in the true track of a scene that a tracker estimated as `tracked`."""
     frames = exact_frames(scene)

@@ -32,10 +32,16 @@ STILL = np.zeros(ANGLES)
 TOE = JOINTS.index("ltoes")
 
 
-def yawed(degrees: list[float], weights: list[float], recalibration: Recalibration | None = None) -> Posterior:
-    poses = np.zeros((len(degrees), ANGLES))
-    poses[:, 0] = np.radians(degrees)
-    return Posterior(poses, np.zeros((len(degrees), 3)), np.array(weights), recalibration=recalibration)
+def turned(degrees: float) -> np.ndarray:
+    return np.radians(degrees) * np.eye(ANGLES)[0]
+
+
+def yawed(
+    degrees: list[float], weights: list[float], recalibration: Recalibration | None = None, coherent: bool = False
+) -> Posterior:
+    """Return a weighted pose of rest for each yaw, each in a place of its own."""
+    places = np.arange(3.0 * len(degrees)).reshape(-1, 3)
+    return Posterior(np.array([*map(turned, degrees)]), places, np.array(weights), coherent, recalibration)
 
 
 def test_a_ball_holds_its_share_of_the_weight() -> None:
@@ -117,17 +123,6 @@ def test_wrong_corrections_are_refused(make: Callable[[], Any], message: str) ->
         make()
 
 
-def turned(degrees: float) -> np.ndarray:
-    pose = STILL.copy()
-    pose[0] = np.radians(degrees)
-    return pose
-
-
-def weighted(poses: list[np.ndarray], weights: list[float], coherent: bool = False) -> Posterior:
-    places = np.arange(3.0 * len(poses)).reshape(-1, 3)
-    return Posterior(np.array(poses), places, np.array(weights), coherent)
-
-
 def test_a_wrong_posterior_is_refused() -> None:
     nan = np.where(np.arange(ANGLES) == 3, np.nan, 0.0)
     for poses, places, weights, message in (
@@ -142,8 +137,7 @@ def test_a_wrong_posterior_is_refused() -> None:
 
 def test_similar_poses_are_one_mode_and_a_turned_one_is_another() -> None:
     # at rest the feet, knees and arms are beside the body: turned around they are where the others were
-    poses = [turned(0), turned(180), turned(1), turned(-1), turned(90)]
-    modes = modes_of(SKELETON, weighted(poses, [0.4, 0.6, 0.5, 0.5, 0.0]))
+    modes = modes_of(SKELETON, yawed([0, 180, 1, -1, 90], [0.4, 0.6, 0.5, 0.5, 0.0]))
     assert [mode.weight for mode in modes] == pytest.approx([0.7, 0.3])
     # of 0, 1 and -1 degrees the one in the middle is nearest to the others: 0.25 + 0.25 against 0.2 + 0.5
     np.testing.assert_array_equal(modes[0].pose, turned(0))
@@ -173,16 +167,13 @@ def test_the_likeliest_mode_is_right_where_the_truth_is_near_and_no_other_is_nea
 
 def test_tracks_are_compared_by_the_mean_over_frames() -> None:
     # the second of three tracks is turned around in one frame of four, the third in all
-    frames = [
-        weighted([turned(0), turned(180 if k == 0 else 0), turned(180)], [0.5, 0.3, 0.2], coherent=True)
-        for k in range(4)
-    ]
+    frames = [yawed([0, second, 180], [0.5, 0.3, 0.2], coherent=True) for second in (180, 0, 0, 0)]
     off = float(np.linalg.norm(SKELETON.joints(turned(0)) - SKELETON.joints(turned(180)), axis=1).mean())
     modes = track_modes(SKELETON, frames, apart=0.3 * off)  # a quarter of it is less
     assert [mode.weight for mode in modes] == pytest.approx([0.8, 0.2])
     np.testing.assert_array_equal(modes[1].poses, np.tile(turned(180), (4, 1)))
     assert modes[0].translations.shape == (4, 3)
-    assert track_modes(SKELETON, [*frames, weighted([STILL], [1.0])]) == track_modes(SKELETON, [None]) == []
+    assert track_modes(SKELETON, [*frames, yawed([0], [1.0])]) == track_modes(SKELETON, [None]) == []
 
 
 def test_weights_of_modes_are_recalibrated() -> None:
