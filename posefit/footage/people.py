@@ -280,16 +280,21 @@ def rows_of(
 def shown_persons(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     """Return which of some people the mask of each frame shows, by index; where nobody, whom one before it shows.
 
-    None where a mask is empty, shows more than half as much of another, or where none shows anybody.
+    None where a mask is empty or shows more than half as much of another, and everywhere if masks show nobody, or if
+    most show several at once, who are parts of one then.
     """
-    nobody, result = -1, list[int | None]()
+    nobody, result, at_once = -1, list[int | None](), list[bool]()
     for k, mask in enumerate(masks):
         shown = [part_at(parts, k) for parts in persons]
-        shares = [0 if part is None else _common(part.detections[k][0], mask) for part in shown]
+        areas, shares = np.array([(0, 0) if part is None else _common(part.detections[k][0], mask) for part in shown]).T
         *_, second, most = sorted(shares)
         clear = mask.any() and most >= CLEARER * second
-        result.append((shares.index(most) if most else nobody) if clear else None)
+        result.append((int(shares.argmax()) if most else nobody) if clear else None)
+        if mask.any() and (areas > 0).sum() > 1:
+            at_once.append((2 * shares > areas).sum() > 1)
     latest = next((number for number in result if number not in (None, nobody)), None)
+    if latest is None or (at_once and np.mean(at_once) > 0.5):
+        return [None] * len(result)
     for k, number in enumerate(result):
         if number == nobody:
             result[k] = latest
@@ -298,11 +303,12 @@ def shown_persons(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     return result
 
 
-def _common(cut: Cut, mask: Mask) -> int:
-    """Return how many pixels a mask has in common with one that has been cut out."""
+def _common(cut: Cut, mask: Mask) -> tuple[int, int]:
+    """Return how many pixels a mask has that has been cut out, and how many of them are another's, too."""
     box, bits = cut
     part = mask[box]
-    return int((part & np.unpackbits(bits, count=part.size).reshape(part.shape).view(np.bool_)).sum())
+    own = np.unpackbits(bits, count=part.size).reshape(part.shape).view(np.bool_)
+    return int(own.sum()), int((part & own).sum())
 
 
 def replace_detection(parts: Sequence[Tracklet], frame: int, mask: Mask, row: dict[str, Any]) -> None:

@@ -105,6 +105,7 @@ def test_whom_a_mask_shows_is_who_is_there_or_else_whom_the_one_before_shows() -
     masks = [nobody, left, nobody, right, left | right, nobody, np.zeros_like(left), right | nobody]
     assert shown_persons(people.persons(), masks) == [0, 0, 0, 1, None, 1, None, 1]
     assert shown_persons(people.persons(), [nobody] * 2) == [None] * 2
+    assert shown_persons(people.persons(), [left, left | right, left | right]) == [None] * 3  # they are parts of one
 
 
 def test_parts_that_take_turns_are_no_time_apart() -> None:
