@@ -21,6 +21,7 @@ MAX_GAP_SECONDS = 1.0  # without a detection, after which a person is another on
 MEMORY = 0.8  # of the last step, size and colours that is kept with each frame
 COVERED = 0.3  # of where a person is expected: a blob that covers so much shows them, too
 SLACK = 0.04  # of the height: so far around where they are expected people may be
+AROUND = 0.3  # of the height: so far around where they are a network looks for a person
 LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
 CLEARER = 2.0  # times as many pixels of a person as of any other show whose a mask is
 MIN_DETECTIONS = 8  # frames of a person alone; what shows in fewer may be noise
@@ -280,8 +281,8 @@ def rows_of(
 def shown_persons(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     """Return which of some people the mask of each frame shows, by index; where nobody, whom one before it shows.
 
-    None where a mask is empty or shows more than half as much of another, and everywhere if masks show nobody, or if
-    most show several at once, who are parts of one then.
+    None where a mask is empty or shows more than half as much of another, or nobody where the one before is elsewhere;
+    and everywhere if masks show nobody, or if most show several at once, who are parts of one then.
     """
     nobody, result, at_once = -1, list[int | None](), list[bool]()
     for k, mask in enumerate(masks):
@@ -297,7 +298,7 @@ def shown_persons(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
         return [None] * len(result)
     for k, number in enumerate(result):
         if number == nobody:
-            result[k] = latest
+            result[k] = None if part_at(persons[latest], k) else latest
         elif number is not None:
             latest = number
     return result
@@ -316,6 +317,25 @@ def replace_detection(parts: Sequence[Tracklet], frame: int, mask: Mask, row: di
     part = part_at(parts, frame) or parts[0]
     _, hidden = part.detections.get(frame, (None, None))
     part.detections[frame], part.rows[frame] = (cut_out(mask), hidden), row
+
+
+def elsewhere(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, size: tuple[int, int]) -> Mask:
+    """Return where one of several people surely is not in a frame of a size: where the others are, and far away."""
+    mask, own = (np.zeros(size[::-1], dtype=bool) for _ in range(2))
+    for other in others:
+        if frame in other.detections:
+            paste(other.detections[frame][0], mask)
+    width = 2 * round(SLACK * max((other.height for other in others), default=0.0)) + 1
+    mask = cv2.dilate(mask.astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
+    if (part := part_at(parts, frame)) is not None:
+        for cut in part.detections[frame]:
+            if cut is not None:
+                paste(cut, own)
+        mask &= ~own
+        near = np.zeros_like(mask)
+        near[padded_box(own, round(AROUND * part.height))] = True
+        mask |= ~near
+    return mask
 
 
 def planes_of(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, known: Mask) -> tuple[Mask, Mask]:

@@ -23,6 +23,7 @@ from posefit.footage.people import (
     Chooser,
     People,
     Tracklet,
+    elsewhere,
     planes_of,
     replace_detection,
     rows_of,
@@ -47,6 +48,7 @@ WIDTH = 640  # pixels; larger videos are scaled down to it
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 MISSING = 0.02  # the share of a file's frames that may be missing without a warning
 CROSSING = 0.35  # of the longer side: a person who goes as far across the picture within `STAYING` is not on the spot
+REDIRECTED = 0.5  # of the frames with a person: a network that shows them in so many of these sees them
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
@@ -189,6 +191,13 @@ class PersonSegmenter:
         result = people(*self._segmented(image), self._roi, self._ignored)
         return SegmentedFrame(result, float(getattr(self._segmenter, "facing", math.nan)), self._landmarks())
 
+    def without(self, image: Image, mask: Mask) -> Image:
+        """Return a frame of the working size with the background where a mask is."""
+        (x, y, wide, tall), result = self._film.part, image.copy()
+        part, covered = result[y : y + tall, x : x + wide], self._film.cut(mask)
+        part[covered] = getattr(self._segmenter, "background", part)[covered]
+        return result
+
     def quality(self) -> FrameQuality:
         """Return what compares the masks of a person with the pictures, from the first frame on."""
         background = getattr(self._segmenter, "background", None)
@@ -269,7 +278,7 @@ class Segmentation:
         """
         video, scan = self.video, self._scan(progress)
         if self._among is not None:
-            scan = self._among.told_apart(scan, progress)
+            scan = self._among.told_apart(self, scan, progress)
         count, learned = len(scan.blanks), self._segmenter.learned
         several, rows, apart = self._follow_person(scan if choose is None else scan._replace(choice=choose))
         missing, damage = max(0, video.claimed - video.count()), ""
@@ -308,8 +317,11 @@ class Segmentation:
             scan.camera_moves,
         )
 
-    def _scan(self, progress: Progress | None) -> _Scan:
-        """Return what each frame shows: the largest blob, and the people with the quality of their masks."""
+    def _scan(self, progress: Progress | None, changed: Callable[[int, Image], Image] | None = None) -> _Scan:
+        """Return what each frame shows: the largest blob, and the people with the quality of their masks.
+
+        The segmenter gets the pictures as `changed` returns them.
+        """
         segmenter, room = self._segmenter, self.stop - self.start
         people, camera = People(self.video.fps), CameraMotion(self.size)
         facings, landmarks = list[float](), list[Array]()
@@ -319,7 +331,7 @@ class Segmentation:
         images = self.video.frames(self.start, self.stop, self.size)
         for k, image in enumerate(progress(images, room) if progress else images):
             camera.add(k, image)
-            blobs, facing, points = segmenter.frame(image)
+            blobs, facing, points = segmenter.frame(image if changed is None else changed(k, image))
             facings.append(facing)
             landmarks.append(points)
             known = blobs[0].valid
@@ -336,11 +348,12 @@ class Segmentation:
         shown = masks[:count], valid[:count], people, largest, blanks, facings, np.array(landmarks)
         return _Scan(*shown, camera.moves, self.how.person)
 
-    def told_apart(self, alone: _Scan, progress: Progress | None) -> _Scan:
+    def told_apart(self, single: "Segmentation", alone: _Scan, progress: Progress | None) -> _Scan:
         """Return a scan that shows one person only where this one shows who of several that is, and the others.
 
-        Nothing changes where this one shows one person only, or shows all of them badly. Who is in most frames of the
-        other is followed, unless a person is chosen; where it shows somebody else, this one shows them.
+        Nothing changes where this one shows one person only, or shows all of them badly. For the person who is followed
+        `single` is asked again, with the background in place of the others; where it still shows somebody else, this
+        one shows the person. Without a choice that is the first, or, where it does not show them, whom `alone` shows.
         """
         scan = self._scan(progress)
         persons, learned = scan.people.persons(), self._segmenter.learned
@@ -350,14 +363,29 @@ class Segmentation:
         numbers = shown_persons(persons, (unpacked(plane, self.size) for plane in alone.masks))
         if not any(number is not None for number in numbers):
             return alone
-        most = max(range(len(persons)), key=numbers.count)
-        parts, _ = scan.people.chosen(self.how.person or 1 + most, str, 1.0 / self._segmenter.scale)
+        most, chosen = max(range(len(persons)), key=numbers.count), self.how.person
+        for choice in dict.fromkeys((1, 1 + most)) if chosen is None else [chosen]:
+            parts, _ = scan.people.chosen(choice, str, 1.0 / self._segmenter.scale)
+            alone = self._asked_again(single, parts, scan.people.others(parts), progress)
+            numbers = shown_persons(persons, (unpacked(plane, self.size) for plane in alone.masks))
+            shown = [k for k, number in enumerate(numbers) if number is not None and persons[number] == parts]
+            if len(shown) >= REDIRECTED * len({frame for part in parts for frame in part.detections}):
+                break
         landmarks, facings = np.zeros_like(alone.landmarks), [math.nan] * len(numbers)
-        for k, number in enumerate(numbers):
-            if number is not None and persons[number] == parts:
-                replace_detection(parts, k, unpacked(alone.masks[k], self.size), alone.largest[k])
-                scan.valid[k], landmarks[k], facings[k] = alone.valid[k], alone.landmarks[k], alone.facings[k]
-        return scan._replace(landmarks=landmarks, facings=facings, choice=self.how.person or 1 + most)
+        for k in shown:
+            replace_detection(parts, k, unpacked(alone.masks[k], self.size), alone.largest[k])
+            scan.valid[k], landmarks[k], facings[k] = alone.valid[k], alone.landmarks[k], alone.facings[k]
+        return scan._replace(landmarks=landmarks, facings=facings, choice=choice)
+
+    def _asked_again(
+        self, single: "Segmentation", parts: Sequence[Tracklet], others: Sequence[Tracklet], progress: Progress | None
+    ) -> _Scan:
+        """Return what another pass shows of pictures with the background where a person is not."""
+
+        def without_others(k: int, image: Image) -> Image:
+            return self._segmenter.without(image, elsewhere(parts, others, k, self.size))
+
+        return Segmentation(single.video, single.how, (single.start, single.stop))._scan(progress, without_others)
 
     def _follow_person(self, scan: _Scan) -> tuple[str, list[dict[str, Any]], list[dict[str, Any]]]:
         """Return what there is to say of several people, and the rows of the one who is followed, as `rows_of`.

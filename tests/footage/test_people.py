@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 import posefit
 from posefit.footage.cleaning import people_in
@@ -67,43 +68,65 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     assert np.mean(shares, axis=0)[1 - which] < 0.05
 
 
-@each(("person", "followed"), [(None, 1), (1, 0), (2, 1)])
-def test_a_segmenter_that_goes_over_to_another_person_is_used_where_it_shows_the_one(
-    tmp_path: Path, segmenter: Callable[..., None], person: int | None, followed: int
+PAIRS = [[NOBODY] * 2] * EMPTY + [shown for _, shown, _ in crossing(0)]
+
+
+class GoesOver:
+    """Shows the first of `PAIRS`, from a frame on the second, whatever is in the picture."""
+
+    over = EMPTY + 20
+
+    def __init__(self, footage: object) -> None:
+        self.pairs, self.landmarks, self.facing = enumerate(PAIRS), np.ones((len(JOINTS), 3)), 0.5
+
+    def segment(self, image: Any) -> tuple[Any, Any]:
+        k, pair = next(self.pairs)
+        return pair[k >= self.over], NOBODY
+
+
+class Prefers(GoesOver):
+    """Shows who wears green, wherever they are in the picture, and else who wears red."""
+
+    over = 0
+
+    def segment(self, image: Any) -> tuple[Any, Any]:
+        _, green, red = np.moveaxis(image.astype(int), -1, 0)
+        dark = image.max(axis=2) < 140
+        worn = [dark & (red > green + 40), dark & (green > red + 40)]
+        return worn[int(worn[1].sum() > 50)], NOBODY
+
+
+@each("factory", [GoesOver, Prefers])
+@pytest.mark.parametrize(("person", "followed"), [(1, 0), (2, 1), (None, None)])
+def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followed(
+    tmp_path: Path, segmenter: Callable[..., None], factory: Any, person: int | None, followed: int | None
 ) -> None:
-    pairs = [[NOBODY] * 2] * EMPTY + [shown for _, shown, _ in crossing(0)]
-    path, over = film(tmp_path / "two.avi", *zip(*pairs, strict=True)), EMPTY + 20
-
-    class GoesOver:
-        """Shows the first person, from a frame on the second."""
-
-        def __init__(self, film: object) -> None:
-            self.pairs, self.landmarks, self.facing = enumerate(pairs), np.ones((len(JOINTS), 3)), 0.5
-
-        def segment(self, image: Any) -> tuple[Any, Any]:
-            k, pair = next(self.pairs)
-            return pair[k >= over], NOBODY
-
-    segmenter("one", GoesOver, still_background=False)
+    if followed is None:  # the first, unless the segmenter shows mostly the second
+        followed = int(factory is GoesOver)
+    video, frames = Video.of(film(tmp_path / "two.avi", *zip(*PAIRS, strict=True))), np.arange(len(PAIRS))
+    segmenter("one", factory, still_background=False)
     alone, among = Extraction("one", person=person), Extraction(background=f"0:{EMPTY}", person=person)
-    masks = Segmentation(Video.of(path), alone, (None, None), among).read().masks
+    masks = Segmentation(video, alone, (None, None), among).read().masks
+    shares = np.array([[iou(masks.silhouette(k).mask, each) for each in pair] for k, pair in enumerate(PAIRS)])
+    assert (shares[masks.usable, followed] < shares[masks.usable, 1 - followed]).mean() <= 0.02
     assert masks.landmarks is not None
-    shares = np.array([[iou(masks.silhouette(k).mask, each) for each in pair] for k, pair in enumerate(pairs)])
-    given, right = masks.landmarks[:, 0, 2] > 0.0, (np.arange(len(pairs)) >= over) == followed
-    assert (shares[:, followed] < shares[:, 1 - followed]).mean() <= 0.02
+    given, right = masks.landmarks[:, 0, 2] > 0.0, frames >= EMPTY
+    if factory is GoesOver:
+        right &= (frames >= GoesOver.over) == followed
     assert not given[~right].any()
-    assert given[right & (np.arange(len(pairs)) >= EMPTY)].mean() > 0.7  # but for the meeting
-    assert np.median(shares[given, followed]) > 0.9
+    assert given[right].mean() > 0.6  # but for the meeting
+    assert np.median(shares[given, followed]) > 0.8
 
 
 def test_whom_a_mask_shows_is_who_is_there_or_else_whom_the_one_before_shows() -> None:
     people, sides = People(30.0), np.zeros((3, *SIZE[::-1]), dtype=bool)
     sides[0, 20:100, 20:50] = sides[1, 30:100, 115:145] = sides[2, 20:100, 70:90] = True
-    for _ in range(12):
-        people.add([sides[0], sides[1]])
     left, right, nobody = sides
-    masks = [nobody, left, nobody, right, left | right, nobody, np.zeros_like(left), right | nobody]
-    assert shown_persons(people.persons(), masks) == [0, 0, 0, 1, None, 1, None, 1]
+    for k in range(12):
+        people.add([right] if k in (0, 2) else [left] if k == 5 else [left, right])
+    masks = [nobody, left, nobody, right, left | right, nobody, np.zeros_like(left), right | nobody, nobody]
+    # the last one shows somebody else: the one before is elsewhere
+    assert shown_persons(people.persons(), masks) == [0, 0, 0, 1, None, 1, None, 1, None]
     assert shown_persons(people.persons(), [nobody] * 2) == [None] * 2
     assert shown_persons(people.persons(), [left, left | right, left | right]) == [None] * 3  # they are parts of one
 
