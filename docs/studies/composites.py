@@ -74,7 +74,7 @@ def legs_exchanged(scene: Scene, actor: Motion, seen: NDArray[np.bool_]) -> floa
     return float(np.mean(exchanged)) if exchanged else None
 
 
-def other_person(scene: Scene, masks: NDArray[np.bool_]) -> float | None:
+def other_person_share(scene: Scene, masks: NDArray[np.bool_]) -> float | None:
     """Return the share of the usable pictures that show more of another actor than of the first; None for one actor.
 
     `masks` (actors, views, T, height, width) are the true ones.
@@ -90,8 +90,8 @@ def other_person(scene: Scene, masks: NDArray[np.bool_]) -> float | None:
     return float(np.mean(others))
 
 
-def entered(masks: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the column and row about which an actor (T, height, width) is seen first."""
+def entry_point(masks: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the column and row about which an actor (T, height, width) is visible first."""
     first = int(masks.any(axis=(1, 2)).argmax())
     row, column = np.argwhere(masks[first]).mean(axis=0)
     return float(column), float(row)
@@ -137,7 +137,7 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
                 extraction=None if shot.extraction == DEFAULT else Extraction(shot.extraction),
                 height=scene.actors[0].body.stature,
                 # who gives a height knows whose it is
-                person=entered(masks[0, 0]) if len(masks) > 1 else None,
+                person=entry_point(masks[0, 0]) if len(masks) > 1 else None,
                 train=[recorded.leaving_out(recorded.LIBRARY, scene.people)],
                 progress=QUIET,
             )
@@ -145,7 +145,7 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
             return row | {"refused": str(error).replace(f"{folder}/", "")}
         assert result.trust is not None
         exchanged = legs_exchanged(result.scene, scene.actors[0].motion, uncut(masks[0]))
-        row |= track_figures(result, scene, masks[0]) | {"other_person": other_person(result.scene, masks)}
+        row |= track_figures(result, scene, masks[0]) | {"other_person": other_person_share(result.scene, masks)}
         return row | {"legs_exchanged": exchanged, "trust": result.trust.grade}
 
 

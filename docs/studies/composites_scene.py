@@ -541,7 +541,7 @@ def _lasting(actor: Actor, count: int) -> Actor:
 def film(
     situation: Situation, plates: Sequence[Plate], seed: int, folder: Path
 ) -> tuple[list[Path], NDArray[np.bool_]]:
-    """Return the videos that are written to a folder, one a camera, and what is seen of each actor.
+    """Return the videos that are written to a folder, one a camera, and the visible part of each actor.
 
     That is a mask for each camera and frame, (actors, views, T, height, width). `plates` are the empty pictures of each
     camera.
@@ -551,18 +551,18 @@ def film(
     fps = situation.actors[0].motion.fps
     for number, (camera, behind) in enumerate(zip(situation.cameras, plates, strict=True)):
         path = folder / f"camera-{number + 1}.mp4"
-        seen: list[list[Mask]] = []
+        visible: list[list[Mask]] = []
         with VideoWriter(path, fps, (camera.width, camera.height)) as writer:
-            for k, (people, shown) in enumerate(_frames(situation, camera, behind)):
+            for k, (people, each) in enumerate(_frames(situation, camera, behind)):
                 writer.write(sensed(composited(behind.frame(k), camera, people), k, rng))
-                seen.append(shown)
+                visible.append(each)
         videos.append(path)
-        masks.append(np.stack(seen, axis=1))
+        masks.append(np.stack(visible, axis=1))
     return videos, np.stack(masks, axis=1)
 
 
 def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tuple[list[Posed], list[Mask]]]:
-    """Yield who is there in each frame, and what is seen of each actor."""
+    """Yield who is there in each frame, and the visible part of each actor."""
     clothes = [outfit(actor.outfit, behind.still.astype(np.uint8)) for actor in situation.actors]
     for k in range(len(situation)):
         people = [
@@ -570,5 +570,5 @@ def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tup
             for actor, worn in zip(situation.actors, clothes, strict=True)
             if actor.present[k]
         ]
-        seen, nothing = iter(true_masks(camera, people)), np.zeros((camera.height, camera.width), dtype=bool)
-        yield people, [next(seen) if actor.present[k] else nothing for actor in situation.actors]
+        visible, nothing = iter(true_masks(camera, people)), np.zeros((camera.height, camera.width), dtype=bool)
+        yield people, [next(visible) if actor.present[k] else nothing for actor in situation.actors]

@@ -146,16 +146,16 @@ def same_person(
     ]
     differences = list[float]()
     for person in persons:
-        seen = list[tuple[float, Array]]()
+        pairs = list[tuple[float, Array]]()  # by how much rays miss each other, and the heights in both views
         for k in np.flatnonzero(first.masks.usable).tolist():
             part = part_at(person, k)
             if part is not None and part.detections[k][1] is None:
                 paste(part.detections[k][0], mask := blank.copy())
-                pair = first.masks.silhouette(k), Silhouette.of(mask)
-                seen.append(apparent_size(cameras, [*map(_extent, fitted, pair)]))
-        heights = np.array([np.maximum(tall, 1e-9) for _, tall in seen])
-        misses = [miss / float(np.median(heights)) for miss, _ in seen]
-        differences.append(float(np.median(misses) + np.std(np.log(heights))) if seen else np.inf)
+                views = first.masks.silhouette(k), Silhouette.of(mask)
+                pairs.append(apparent_size(cameras, [*map(_extent, fitted, views)]))
+        heights = np.array([np.maximum(tall, 1e-9) for _, tall in pairs])
+        misses = [miss / float(np.median(heights)) for miss, _ in pairs]
+        differences.append(float(np.median(misses) + np.std(np.log(heights))) if pairs else np.inf)
     return 1 + int(np.argmin(differences))
 
 

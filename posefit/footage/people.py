@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.footage.masks import unpacked
 from posefit.silhouette.foreground import RIVAL_AREA, Image
 from posefit.silhouette.mask import Mask, padded_box
 
@@ -46,7 +47,7 @@ def paste(cut: Cut, mask: Mask) -> None:
     """Set the pixels in a mask that have been cut out of another."""
     box, bits = cut
     part = mask[box]
-    part |= np.unpackbits(bits, count=part.size).reshape(part.shape).view(np.bool_)
+    part |= unpacked(bits, part.shape[::-1])
 
 
 class _Blob:
@@ -278,29 +279,30 @@ def rows_of(
     return rows, apart
 
 
-def shown_persons(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
-    """Return which of some people the mask of each frame shows, by index; where nobody, whom one before it shows.
+def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
+    """Return the index of the person in the mask of each frame; for a mask beside everyone, that of the mask before.
 
-    None where a mask is empty or shows more than half as much of another, or nobody where the one before is elsewhere;
-    and everywhere if masks show nobody, or if most show several at once, who are parts of one then.
+    None where a mask is empty, covers more than half as much of another, or is beside everyone while the person before
+    is elsewhere; and everywhere if all masks are, or if most cover several people, who are parts of one then.
     """
-    nobody, result, at_once = -1, list[int | None](), list[bool]()
+    beside, result, several = -1, list[int | None](), list[bool]()
     for k, mask in enumerate(masks):
-        shown = [part_at(parts, k) for parts in persons]
-        areas, shares = np.array([(0, 0) if part is None else _common(part.detections[k][0], mask) for part in shown]).T
+        present = [part_at(parts, k) for parts in persons]
+        pixels = [(0, 0) if part is None else _common(part.detections[k][0], mask) for part in present]
+        areas, shares = np.array(pixels).T
         *_, second, most = sorted(shares)
         clear = mask.any() and most >= CLEARER * second
-        result.append((int(shares.argmax()) if most else nobody) if clear else None)
+        result.append((int(shares.argmax()) if most else beside) if clear else None)
         if mask.any() and (areas > 0).sum() > 1:
-            at_once.append((2 * shares > areas).sum() > 1)
-    latest = next((number for number in result if number not in (None, nobody)), None)
-    if latest is None or (at_once and np.mean(at_once) > 0.5):
+            several.append((2 * shares > areas).sum() > 1)
+    latest = next((index for index in result if index not in (None, beside)), None)
+    if latest is None or (several and np.mean(several) > 0.5):
         return [None] * len(result)
-    for k, number in enumerate(result):
-        if number == nobody:
+    for k, index in enumerate(result):
+        if index == beside:
             result[k] = None if part_at(persons[latest], k) else latest
-        elif number is not None:
-            latest = number
+        elif index is not None:
+            latest = index
     return result
 
 
@@ -308,7 +310,7 @@ def _common(cut: Cut, mask: Mask) -> tuple[int, int]:
     """Return how many pixels a mask has that has been cut out, and how many of them are another's, too."""
     box, bits = cut
     part = mask[box]
-    own = np.unpackbits(bits, count=part.size).reshape(part.shape).view(np.bool_)
+    own = unpacked(bits, part.shape[::-1])
     return int(own.sum()), int((part & own).sum())
 
 
@@ -319,7 +321,7 @@ def replace_detection(parts: Sequence[Tracklet], frame: int, mask: Mask, row: di
     part.detections[frame], part.rows[frame] = (cut_out(mask), hidden), row
 
 
-def elsewhere(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, size: tuple[int, int]) -> Mask:
+def excluded_mask(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, size: tuple[int, int]) -> Mask:
     """Return where one of several people surely is not in a frame of a size: where the others are, and far away."""
     mask, own = (np.zeros(size[::-1], dtype=bool) for _ in range(2))
     for other in others:

@@ -23,11 +23,11 @@ from posefit.footage.people import (
     Chooser,
     People,
     Tracklet,
-    elsewhere,
+    excluded_mask,
+    person_indices,
     planes_of,
     replace_detection,
     rows_of,
-    shown_persons,
 )
 from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
@@ -48,7 +48,7 @@ WIDTH = 640  # pixels; larger videos are scaled down to it
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 MISSING = 0.02  # the share of a file's frames that may be missing without a warning
 CROSSING = 0.35  # of the longer side: a person who goes as far across the picture within `STAYING` is not on the spot
-REDIRECTED = 0.5  # of the frames with a person: a network that shows them in so many of these sees them
+REDIRECTED = 0.5  # of the frames with a person: in so many a network has to find them to be used
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
@@ -264,7 +264,7 @@ class Segmentation:
     """A pass through a video. Raises InputError where the extraction or the frames do not fit it."""
 
     def __init__(self, video: Video, how: Extraction, frames: Range, among: Extraction | None = None) -> None:
-        """Where `how` shows one person only, `among` tells which of several it is."""
+        """Where the segmenter of `how` reports one person only, that of `among` identifies which of several it is."""
         self.start, self.stop = span(frames, video.count())
         self.video, self.how, self._segmenter = video, how, PersonSegmenter(video, how)
         self.size = self._segmenter.size
@@ -278,7 +278,7 @@ class Segmentation:
         """
         video, scan = self.video, self._scan(progress)
         if self._among is not None:
-            scan = self._among.told_apart(self, scan, progress)
+            scan = self._among.with_identities(self, scan, progress)
         count, learned = len(scan.blanks), self._segmenter.learned
         several, rows, apart = self._follow_person(scan if choose is None else scan._replace(choice=choose))
         missing, damage = max(0, video.claimed - video.count()), ""
@@ -345,47 +345,47 @@ class Segmentation:
             blanks.append(self._row(blank_quality, image, empty, k))
             largest.append(self._row(largest_quality, image, blobs[0], k))
         count = len(blanks)  # the file may break off
-        shown = masks[:count], valid[:count], people, largest, blanks, facings, np.array(landmarks)
-        return _Scan(*shown, camera.moves, self.how.person)
+        frames = masks[:count], valid[:count], people, largest, blanks, facings, np.array(landmarks)
+        return _Scan(*frames, camera.moves, self.how.person)
 
-    def told_apart(self, single: "Segmentation", alone: _Scan, progress: Progress | None) -> _Scan:
-        """Return a scan that shows one person only where this one shows who of several that is, and the others.
+    def with_identities(self, single: "Segmentation", scan: _Scan, progress: Progress | None) -> _Scan:
+        """Return the scan of a segmenter that reports one person only, with the people of this still background.
 
-        Nothing changes where this one shows one person only, or shows all of them badly. For the person who is followed
-        `single` is asked again, with the background in place of the others; where it still shows somebody else, this
-        one shows the person. Without a choice that is the first, or, where it does not show them, whom `alone` shows.
+        Nothing changes where this one has one person only, or poor masks of all. For the person who is followed
+        `single` runs again, with the background in place of the others; where its mask is still that of another, this
+        one's is used. Without a choice that is the first, or, if `single` does not find them, its most frequent one.
         """
-        scan = self._scan(progress)
-        persons, learned = scan.people.persons(), self._segmenter.learned
-        doubted = [verdict(rows_of(person, scan.blanks)[1], self.how.name, learned=learned) for person in persons]
-        if len(persons) < 2 or scan.camera_moves or all(doubted):
-            return alone
-        numbers = shown_persons(persons, (unpacked(plane, self.size) for plane in alone.masks))
-        if not any(number is not None for number in numbers):
-            return alone
-        most, chosen = max(range(len(persons)), key=numbers.count), self.how.person
+        own = self._scan(progress)
+        persons, learned = own.people.persons(), self._segmenter.learned
+        doubts = [verdict(rows_of(person, own.blanks)[1], self.how.name, learned=learned) for person in persons]
+        if len(persons) < 2 or own.camera_moves or all(doubts):
+            return scan
+        indices = person_indices(persons, (unpacked(plane, self.size) for plane in scan.masks))
+        if not any(index is not None for index in indices):
+            return scan
+        most, chosen = max(range(len(persons)), key=indices.count), self.how.person
         for choice in dict.fromkeys((1, 1 + most)) if chosen is None else [chosen]:
-            parts, _ = scan.people.chosen(choice, str, 1.0 / self._segmenter.scale)
-            alone = self._asked_again(single, parts, scan.people.others(parts), progress)
-            numbers = shown_persons(persons, (unpacked(plane, self.size) for plane in alone.masks))
-            shown = [k for k, number in enumerate(numbers) if number is not None and persons[number] == parts]
-            if len(shown) >= REDIRECTED * len({frame for part in parts for frame in part.detections}):
+            parts, _ = own.people.chosen(choice, str, 1.0 / self._segmenter.scale)
+            scan = self._without_others(single, parts, own.people.others(parts), progress)
+            indices = person_indices(persons, (unpacked(plane, self.size) for plane in scan.masks))
+            frames = [k for k, index in enumerate(indices) if index is not None and persons[index] == parts]
+            if len(frames) >= REDIRECTED * len({frame for part in parts for frame in part.detections}):
                 break
-        landmarks, facings = np.zeros_like(alone.landmarks), [math.nan] * len(numbers)
-        for k in shown:
-            replace_detection(parts, k, unpacked(alone.masks[k], self.size), alone.largest[k])
-            scan.valid[k], landmarks[k], facings[k] = alone.valid[k], alone.landmarks[k], alone.facings[k]
-        return scan._replace(landmarks=landmarks, facings=facings, choice=choice)
+        landmarks, facings = np.zeros_like(scan.landmarks), [math.nan] * len(indices)
+        for k in frames:
+            replace_detection(parts, k, unpacked(scan.masks[k], self.size), scan.largest[k])
+            own.valid[k], landmarks[k], facings[k] = scan.valid[k], scan.landmarks[k], scan.facings[k]
+        return own._replace(landmarks=landmarks, facings=facings, choice=choice)
 
-    def _asked_again(
+    def _without_others(
         self, single: "Segmentation", parts: Sequence[Tracklet], others: Sequence[Tracklet], progress: Progress | None
     ) -> _Scan:
-        """Return what another pass shows of pictures with the background where a person is not."""
+        """Return another pass of a segmentation, through pictures with the background where a person is not."""
 
-        def without_others(k: int, image: Image) -> Image:
-            return self._segmenter.without(image, elsewhere(parts, others, k, self.size))
+        def changed(k: int, image: Image) -> Image:
+            return self._segmenter.without(image, excluded_mask(parts, others, k, self.size))
 
-        return Segmentation(single.video, single.how, (single.start, single.stop))._scan(progress, without_others)
+        return Segmentation(single.video, single.how, (single.start, single.stop))._scan(progress, changed)
 
     def _follow_person(self, scan: _Scan) -> tuple[str, list[dict[str, Any]], list[dict[str, Any]]]:
         """Return what there is to say of several people, and the rows of the one who is followed, as `rows_of`.

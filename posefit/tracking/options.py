@@ -168,9 +168,11 @@ def text_label(text: str) -> int:
 
 def text_person(text: str) -> "Choice":
     """Return the number of a person, for a text N, or their place, for X,Y. Raises InputError for any other text."""
-    parts = text.split(",")
     try:
-        return int(text) if len(parts) == 1 else (float(parts[0]), float(parts[1]))
+        if "," not in text:
+            return int(text)
+        across, down = map(float, text.split(","))
+        return across, down
     except ValueError:
         raise InputError(f"expected a number such as 2, or X,Y in pixels, got {quoted(text)}") from None
 

@@ -257,7 +257,9 @@ def test_nobody_of_a_number_is_one_line(tmp_path: Path) -> None:
     error = error_of("track", path, "--person", "3", *QUICK)
     assert "person must be 1 to 2, as many people as there are, got 3" in error
     assert "person must be given for footage only" in error_of("track", "walk", "--person", "2")
-    assert "expected a number such as 2, or X,Y in pixels, got 'left'" in error_of("track", path, "--person", "left")
+    for text in ("left", "1,2,3"):
+        words = f"expected a number such as 2, or X,Y in pixels, got '{text}'"
+        assert words in error_of("track", path, "--person", text)
 
 
 def test_a_person_in_pieces_is_one_and_specks_are_none(tmp_path: Path) -> None:

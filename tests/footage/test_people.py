@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 
 import posefit
 from posefit.footage.cleaning import people_in
-from posefit.footage.people import People, planes_of, shown_persons
+from posefit.footage.people import People, person_indices, planes_of
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
@@ -68,16 +69,19 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     assert np.mean(shares, axis=0)[1 - which] < 0.05
 
 
-PAIRS = [[NOBODY] * 2] * EMPTY + [shown for _, shown, _ in crossing(0)]
+@cache
+def pairs() -> list[list[Any]]:
+    """Return what is visible of each of two people in every frame of a film, which is empty first."""
+    return [[NOBODY] * 2] * EMPTY + [pair for _, pair, _ in crossing(0)]
 
 
 class GoesOver:
-    """Shows the first of `PAIRS`, from a frame on the second, whatever is in the picture."""
+    """Shows the first of `pairs`, from a frame on the second, whatever is in the picture."""
 
     over = EMPTY + 20
 
     def __init__(self, footage: object) -> None:
-        self.pairs, self.landmarks, self.facing = enumerate(PAIRS), np.ones((len(JOINTS), 3)), 0.5
+        self.pairs, self.landmarks, self.facing = enumerate(pairs()), np.ones((len(JOINTS), 3)), 0.5
 
     def segment(self, image: Any) -> tuple[Any, Any]:
         k, pair = next(self.pairs)
@@ -103,11 +107,11 @@ def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followe
 ) -> None:
     if followed is None:  # the first, unless the segmenter shows mostly the second
         followed = int(factory is GoesOver)
-    video, frames = Video.of(film(tmp_path / "two.avi", *zip(*PAIRS, strict=True))), np.arange(len(PAIRS))
+    video, frames = Video.of(film(tmp_path / "two.avi", *zip(*pairs(), strict=True))), np.arange(len(pairs()))
     segmenter("one", factory, still_background=False)
     alone, among = Extraction("one", person=person), Extraction(background=f"0:{EMPTY}", person=person)
     masks = Segmentation(video, alone, (None, None), among).read().masks
-    shares = np.array([[iou(masks.silhouette(k).mask, each) for each in pair] for k, pair in enumerate(PAIRS)])
+    shares = np.array([[iou(masks.silhouette(k).mask, each) for each in pair] for k, pair in enumerate(pairs())])
     assert (shares[masks.usable, followed] < shares[masks.usable, 1 - followed]).mean() <= 0.02
     assert masks.landmarks is not None
     given, right = masks.landmarks[:, 0, 2] > 0.0, frames >= EMPTY
@@ -118,17 +122,17 @@ def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followe
     assert np.median(shares[given, followed]) > 0.8
 
 
-def test_whom_a_mask_shows_is_who_is_there_or_else_whom_the_one_before_shows() -> None:
+def test_the_person_of_a_mask_is_whom_it_covers_or_else_that_of_the_mask_before() -> None:
     people, sides = People(30.0), np.zeros((3, *SIZE[::-1]), dtype=bool)
     sides[0, 20:100, 20:50] = sides[1, 30:100, 115:145] = sides[2, 20:100, 70:90] = True
-    left, right, nobody = sides
+    left, right, beside = sides
     for k in range(12):
         people.add([right] if k in (0, 2) else [left] if k == 5 else [left, right])
-    masks = [nobody, left, nobody, right, left | right, nobody, np.zeros_like(left), right | nobody, nobody]
+    masks = [beside, left, beside, right, left | right, beside, np.zeros_like(left), right | beside, beside]
     # the last one shows somebody else: the one before is elsewhere
-    assert shown_persons(people.persons(), masks) == [0, 0, 0, 1, None, 1, None, 1, None]
-    assert shown_persons(people.persons(), [nobody] * 2) == [None] * 2
-    assert shown_persons(people.persons(), [left, left | right, left | right]) == [None] * 3  # they are parts of one
+    assert person_indices(people.persons(), masks) == [0, 0, 0, 1, None, 1, None, 1, None]
+    assert person_indices(people.persons(), [beside] * 2) == [None] * 2
+    assert person_indices(people.persons(), [left, left | right, left | right]) == [None] * 3  # they are parts of one
 
 
 def test_parts_that_take_turns_are_no_time_apart() -> None:
