@@ -18,13 +18,15 @@ project_copyright = "The posefit developers"
 release = version = posefit.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
-exclude_patterns = ["_build", "contributions", "generated/*.md"]  # the last are parts of pages
+# the last are parts of pages
+exclude_patterns = ["_build", "contributions", "generated/*.md"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
-toc_object_entries = False  # thousands, and every page would look through them for its navigation
+# thousands, and every page would look through them for its navigation
+toc_object_entries = False
 # what `Problem.ioh` builds upon
 autodoc_mock_imports = ["ioh"]
 autodoc_typehints_format = "short"
@@ -45,7 +47,9 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-signature", _shorten)
 
 
-def _restructure(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+def _restructure(
+    _app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]
+) -> None:
     lines[:] = restructured(lines)
 
 

@@ -21,11 +21,14 @@ from numpy.typing import NDArray
 from posefit.errors import InputError
 from posefit.reading import check_size, cut, quoted
 
-DIRECTORY = 100_000  # bytes of an archive's directory, which has about a hundred for each array
+# bytes of an archive's directory, which has about a hundred for each array
+DIRECTORY = 100_000
 HEADER = 10_000  # characters before an array, as NumPy has it
-TURNED = 500_000_000  # bytes of an array that is stored column by column, which has to be unpacked whole
+# bytes of an array that is stored column by column, which has to be unpacked whole
+TURNED = 500_000_000
 KINDS = "biufUS"  # booleans, numbers and text: nothing that has to be unpickled
-_PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # as NumPy writes; others unpack a thousand times slower
+# as NumPy writes; others unpack a thousand times slower
+_PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 class _RefusedError(InputError):
@@ -60,19 +63,26 @@ class Stored:
     def __iter__(self) -> Iterator[NDArray[Any]]:
         if self.fortran:
             if self.nbytes > TURNED:
-                raise InputError(f"{self._path}: expected {self.name} row by row, got it column by column")
+                raise InputError(
+                    f"{self._path}: expected {self.name} row by row, got it column by column"
+                )
             yield from np.asarray(self)
             return
         size = math.prod(self.shape[1:]) * self.dtype.itemsize
         with self._opened() as member:
             for _ in range(self.shape[0]):
-                yield np.frombuffer(_exactly(member, size), self.dtype).reshape(self.shape[1:])
+                yield np.frombuffer(_exactly(member, size), self.dtype).reshape(
+                    self.shape[1:]
+                )
             _exactly(member, 0)
 
     @contextmanager
     def _opened(self) -> Iterator[IO[bytes]]:
         expected = f"{self._path}: expected an .npz file with {self._what}"
-        with _as_input_error(expected), self._archive.open(f"{self.name}.npy") as member:
+        with (
+            _as_input_error(expected),
+            self._archive.open(f"{self.name}.npy") as member,
+        ):
             _exactly(member, self._start)
             yield member
 
@@ -104,9 +114,19 @@ def archived(
             archive = stack.enter_context(zipfile.ZipFile(file))
             file.longest = packed
             members = set(archive.namelist())
-            arrays = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in members}
-            if single and len(members) == 1 and (only := members.pop()).endswith(".npy"):
-                arrays = {names[0]: _stored(path, what, archive, only.removesuffix(".npy"))}
+            arrays = {
+                name: _stored(path, what, archive, name)
+                for name in names
+                if f"{name}.npy" in members
+            }
+            if (
+                single
+                and len(members) == 1
+                and (only := members.pop()).endswith(".npy")
+            ):
+                arrays = {
+                    names[0]: _stored(path, what, archive, only.removesuffix(".npy"))
+                }
         yield arrays
 
 
@@ -118,7 +138,9 @@ class _ArchiveFile(io.FileIO):
     def read(self, size: int | None = -1) -> bytes:
         """Return the next bytes."""
         if size is not None and size > self.longest:
-            raise _RefusedError(f"one whose directory is longer than {DIRECTORY:,} bytes")
+            raise _RefusedError(
+                f"one whose directory is longer than {DIRECTORY:,} bytes"
+            )
         return super().read(size)
 
 
@@ -127,9 +149,12 @@ def _as_input_error(expected: str) -> Iterator[None]:
     """Raise whatever a damaged archive or array raises as an InputError, which begins with what was expected."""
     try:
         yield
-    except Exception as error:  # whatever zipfile and NumPy trip over, the file is to blame
+    # whatever zipfile and NumPy trip over, the file is to blame
+    except Exception as error:
         text = " ".join(str(error).split()) or type(error).__name__
-        came = text if isinstance(error, _RefusedError) else f"a damaged one: {cut(text)}"
+        came = (
+            text if isinstance(error, _RefusedError) else f"a damaged one: {cut(text)}"
+        )
         raise InputError(f"{expected}, got {came}") from None
 
 
@@ -142,10 +167,13 @@ def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Store
     return Stored(name, shape, dtype, fortran, path, what, archive, start)
 
 
-def _header(file: IO[bytes], name: str, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
+def _header(
+    file: IO[bytes], name: str, size: int
+) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
     """Return shape, order and type of the array in a file of `size` bytes, and where its values begin."""
     version = np.lib.format.read_magic(file)
-    if version != (1, 0):  # the others are for records of very many fields, and their headers of any length
+    # the others are for records of very many fields, and their headers of any length
+    if version != (1, 0):
         raise _RefusedError(f"{name} in NumPy's format {version}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about headers as Python 2 wrote them
@@ -153,7 +181,10 @@ def _header(file: IO[bytes], name: str, size: int) -> tuple[tuple[int, ...], boo
     start = file.tell()
     if dtype.kind not in KINDS or not dtype.itemsize:
         raise _RefusedError(f"{name} of {cut(str(dtype))}")
-    if any(side < 0 for side in shape) or math.prod(shape) * dtype.itemsize != size - start:
+    if (
+        any(side < 0 for side in shape)
+        or math.prod(shape) * dtype.itemsize != size - start
+    ):
         raise _RefusedError(f"{name} of {size - start} bytes for shape {quoted(shape)}")
     return shape, fortran, dtype, start
 
@@ -162,5 +193,9 @@ def _exactly(member: IO[bytes], count: int) -> bytes:
     """Return the next bytes; for none, see that it is the end, where the checksum is compared."""
     content = member.read(count or 1)
     if len(content) != count:
-        raise EOFError("an array that ends too early" if count else "an array that is longer than it says")
+        raise EOFError(
+            "an array that ends too early"
+            if count
+            else "an array that is longer than it says"
+        )
     return content

@@ -13,7 +13,10 @@ def printable(text: str) -> str:
     text = _LONG.sub(lambda word: f"{word[0][:38]}...{word[0][-39:]}", text)
     if text.isprintable():
         return text
-    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+    return "".join(
+        sign if sign.isprintable() else sign.encode("unicode_escape").decode()
+        for sign in text
+    )
 
 
 class InputError(ValueError):

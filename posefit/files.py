@@ -22,7 +22,8 @@ from posefit.reading import cut, parsed_json, read_text
 
 MARK = "unfinished.json"  # in a folder that is being written
 MAX_MARK_BYTES = 10_000_000
-_TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # errors of a rename to a name that is no longer free
+# errors of a rename to a name that is no longer free
+_TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
 
 
 def check_new(path: str | Path) -> None:
@@ -35,7 +36,9 @@ def check_place(path: str | Path) -> None:
     """Raise InputError where `path` is in no folder, or in one that cannot be written to."""
     parent = Path(path).resolve().parent
     if not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise InputError(f"{path}: expected a place to write to, got one in {parent}, which is none")
+        raise InputError(
+            f"{path}: expected a place to write to, got one in {parent}, which is none"
+        )
 
 
 def check_free(path: str | Path | None) -> None:
@@ -54,7 +57,9 @@ def opencv_name(path: str | Path) -> str:
     try:
         name.encode()
     except UnicodeEncodeError:
-        raise InputError(f"{path}: expected a name in UTF-8, got one that is not") from None
+        raise InputError(
+            f"{path}: expected a name in UTF-8, got one that is not"
+        ) from None
     return name
 
 
@@ -83,14 +88,19 @@ def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]
 
     def check(target: Path) -> None:
         if not replaceable(target, mark):
-            raise InputError(f"{target}: expected a new name or an earlier file of this kind, got something else")
+            raise InputError(
+                f"{target}: expected a new name or an earlier file of this kind, got something else"
+            )
 
     return _built(Path(path), check, _created, Path.replace)
 
 
 @contextmanager
 def _built(
-    target: Path, check: Callable[[Path], None], make: Callable[[Path], Path], name: Callable[[Path, Path], Any]
+    target: Path,
+    check: Callable[[Path], None],
+    make: Callable[[Path], Path],
+    name: Callable[[Path, Path], Any],
 ) -> Iterator[Path]:
     """Yield what `make` creates beside a target, and give it its name; whatever fails, nothing of it is left."""
     try:
@@ -103,7 +113,9 @@ def _built(
             except OSError as error:  # another writer's has come meanwhile
                 raise _exists(target) if error.errno in _TAKEN else error from None
     except OSError as error:
-        raise InputError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
+        raise InputError(
+            f"{target}: expected a place to write to, got {error.strerror or error}"
+        ) from error
 
 
 def replaceable(path: str | Path, mark: bytes) -> bool:
@@ -124,9 +136,13 @@ class Unfinished:
     locks, it seems not to be.
     """
 
-    def __init__(self, target: Path, path: Path, file: int, info: Mapping[str, Any]) -> None:
-        self.path, self.info = path, info
-        self._target, self._file = target, file
+    def __init__(
+        self, target: Path, path: Path, file: int, info: Mapping[str, Any]
+    ) -> None:
+        self.path = path
+        self.info = info
+        self._target = target
+        self._file = file
 
     @classmethod
     def begin(cls, target: Path, info: Mapping[str, Any]) -> Self:
@@ -136,7 +152,9 @@ class Unfinished:
         with _undone(path):
             file = os.open(path / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
             lock(file)
-            (path / MARK).write_text(json.dumps({"target": target.name, "info": info}), encoding="utf-8")
+            (path / MARK).write_text(
+                json.dumps({"target": target.name, "info": info}), encoding="utf-8"
+            )
         return cls(target, path, file, info)
 
     @classmethod
@@ -149,12 +167,24 @@ class Unfinished:
             with suppress(OSError, ValueError, KeyError, TypeError):
                 modified = entry.stat().st_mtime
                 file = os.open(entry, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
-                mark = parsed_json(read_text(entry, MAX_MARK_BYTES)) if lock(file) else None
-                if mark is not None and mark["target"] == target.name and isinstance(mark["info"], dict):
-                    folders.append((modified, cls(target, entry.parent, file, mark["info"])))
+                mark = (
+                    parsed_json(read_text(entry, MAX_MARK_BYTES))
+                    if lock(file)
+                    else None
+                )
+                if (
+                    mark is not None
+                    and mark["target"] == target.name
+                    and isinstance(mark["info"], dict)
+                ):
+                    folders.append(
+                        (modified, cls(target, entry.parent, file, mark["info"]))
+                    )
                 else:
                     os.close(file)
-        return [folder for _, folder in sorted(folders, key=itemgetter(0), reverse=True)]
+        return [
+            folder for _, folder in sorted(folders, key=itemgetter(0), reverse=True)
+        ]
 
     def close(self) -> None:
         """Release the folder, so that it can be continued; a second call does nothing."""
@@ -197,7 +227,9 @@ def other_entries(folder: Path, names: Iterable[str]) -> list[str]:
     """Return the entries of a folder that are no plain files of these names, sorted."""
     known = {*names, MARK}
     return sorted(
-        entry.name for entry in folder.iterdir() if entry.name not in known or entry.is_symlink() or not entry.is_file()
+        entry.name
+        for entry in folder.iterdir()
+        if entry.name not in known or entry.is_symlink() or not entry.is_file()
     )
 
 

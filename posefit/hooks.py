@@ -34,7 +34,12 @@ class RegisterOptimiser(Protocol):
     """Registers an optimiser: its name, its factory, what becomes of it in the next frame, and what it needs."""
 
     def __call__(
-        self, name: str, factory: "OptimiserFactory", *, next_frame: "NextFrame" = "start", needs: Needs | None = None
+        self,
+        name: str,
+        factory: "OptimiserFactory",
+        *,
+        next_frame: "NextFrame" = "start",
+        needs: Needs | None = None,
     ) -> None:
         """Register an optimiser."""
 
@@ -46,7 +51,12 @@ class RegisterTracker(Protocol):
     """
 
     def __call__(
-        self, name: str, factory: "TrackerFactory", *, looks_ahead: bool = False, needs: Needs | None = None
+        self,
+        name: str,
+        factory: "TrackerFactory",
+        *,
+        looks_ahead: bool = False,
+        needs: Needs | None = None,
     ) -> None:
         """Register a tracker."""
 
@@ -54,14 +64,18 @@ class RegisterTracker(Protocol):
 class RegisterPrior(Protocol):
     """Registers a prior: its name, its factory and what it needs."""
 
-    def __call__(self, name: str, factory: "PriorFactory", *, needs: Needs | None = None) -> None:
+    def __call__(
+        self, name: str, factory: "PriorFactory", *, needs: Needs | None = None
+    ) -> None:
         """Register a prior."""
 
 
 class RegisterStart(Protocol):
     """Registers what guesses first poses: its name, its factory and what it needs."""
 
-    def __call__(self, name: str, factory: "InitialiserFactory", *, needs: Needs | None = None) -> None:
+    def __call__(
+        self, name: str, factory: "InitialiserFactory", *, needs: Needs | None = None
+    ) -> None:
         """Register a start."""
 
 
@@ -72,7 +86,12 @@ class RegisterSegmenter(Protocol):
     """
 
     def __call__(
-        self, name: str, factory: "SegmenterFactory", *, still_background: bool = True, needs: Needs | None = None
+        self,
+        name: str,
+        factory: "SegmenterFactory",
+        *,
+        still_background: bool = True,
+        needs: Needs | None = None,
     ) -> None:
         """Register a segmenter."""
 

@@ -10,15 +10,24 @@ from typing import Any
 _IMPORT = re.compile(r"^from (posefit\.\S+) import (\w+)", re.MULTILINE)
 
 
-def names_of_stub(module: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+def names_of_stub(
+    module: str, file: str
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Return `__getattr__`, `__dir__` and the names of a module in a file, beside which its stub stands."""
-    homes = {name: home for home, name in _IMPORT.findall(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))}
+    homes = {
+        name: home
+        for home, name in _IMPORT.findall(
+            Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
+        )
+    }
 
     def value_of(name: str) -> Any:
         if name not in homes:
             from posefit.reading import suggestion
 
-            raise AttributeError(f"module {module!r} has no attribute {name!r}{suggestion(name, homes)}")
+            raise AttributeError(
+                f"module {module!r} has no attribute {name!r}{suggestion(name, homes)}"
+            )
         value = getattr(import_module(homes[name]), name)
         setattr(sys.modules[module], name, value)
         return value

@@ -20,10 +20,16 @@ RATES = 1e-3, 1e6  # frames a second
 HEIGHTS = 0.3, 2.8  # metres that a person may stand
 AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
 PARENT_POLL_SECONDS = 0.5
-SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off
-DECODED, DECODED_GIGABYTES = "POSEFIT_DECODED_GIGABYTES", 4.0  # the variable of `check_decoded`, and its default
+# seconds, for a timer that should have ended meanwhile; 0 would switch it off
+SOON = 1e-6
+# the variable of `check_decoded`, and its default
+DECODED = "POSEFIT_DECODED_GIGABYTES"
+DECODED_GIGABYTES = 4.0
 # of Linux: the memory that a container may have, in control groups of version 2 and 1
-_CONTAINER = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
+_CONTAINER = (
+    Path("/sys/fs/cgroup/memory.max"),
+    Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"),
+)
 
 
 class _OvertimeError(BaseException):
@@ -38,7 +44,11 @@ def timed(limit: float | None) -> Iterator[None]:
     call of compiled code that does not return, there is no limit. An earlier limit of a caller's holds as well, and
     goes on afterwards.
     """
-    if limit is None or not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+    if (
+        limit is None
+        or not hasattr(signal, "setitimer")
+        or threading.current_thread() is not threading.main_thread()
+    ):
         yield
         return
     callers = signal.getitimer(signal.ITIMER_REAL)[0]
@@ -60,7 +70,9 @@ def timed(limit: float | None) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
         if callers:
-            signal.setitimer(signal.ITIMER_REAL, max(callers - (time.monotonic() - began), SOON))
+            signal.setitimer(
+                signal.ITIMER_REAL, max(callers - (time.monotonic() - began), SOON)
+            )
 
 
 def end_with_parent(parent: int) -> None:
@@ -105,7 +117,9 @@ def check_decoded(name: str, size: int) -> None:
         raise InputError(f"{DECODED} must be a number, got {quoted(text)}") from None
     if not size <= most * 1e9:
         came = f"{size / 1e9:.3g} GB; {DECODED} raises the limit"
-        raise InputError(f"{name}: expected masks that unpack to at most {most:g} GB, got {came}")
+        raise InputError(
+            f"{name}: expected masks that unpack to at most {most:g} GB, got {came}"
+        )
 
 
 def allowed_bytes() -> int:
@@ -114,7 +128,10 @@ def allowed_bytes() -> int:
     with suppress(ImportError):
         import resource
 
-        soft = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_DATA, resource.RLIMIT_AS))
+        soft = (
+            resource.getrlimit(kind)[0]
+            for kind in (resource.RLIMIT_DATA, resource.RLIMIT_AS)
+        )
         limits = [limit for limit in soft if limit != resource.RLIM_INFINITY]
     return min([_machine_bytes(), *limits])
 

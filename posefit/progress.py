@@ -21,7 +21,8 @@ class Progress:
 
     log: Callable[[str], None] = lambda _message: None
     steps: Callable[[Iterator[Any], int], Iterator[Any]] = lambda steps, _count: steps
-    phases: dict[str, float] = field(default_factory=dict, compare=False)  # the seconds that each took
+    # the seconds that each took
+    phases: dict[str, float] = field(default_factory=dict, compare=False)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
@@ -40,7 +41,9 @@ QUIET = Progress()
 
 def bars_shown() -> bool:
     """Return whether anybody watches: stderr is a terminal, or this is a notebook."""
-    return (sys.stderr is not None and sys.stderr.isatty()) or "ipykernel" in sys.modules
+    return (
+        sys.stderr is not None and sys.stderr.isatty()
+    ) or "ipykernel" in sys.modules
 
 
 def interactive() -> Progress:
@@ -57,4 +60,9 @@ def interactive() -> Progress:
     def log(message: str) -> None:
         tqdm.write(printable(message), file=sys.stderr)
 
-    return Progress(log, lambda steps, count: iter(tqdm(steps, total=count, unit="frame", dynamic_ncols=True)))
+    return Progress(
+        log,
+        lambda steps, count: iter(
+            tqdm(steps, total=count, unit="frame", dynamic_ncols=True)
+        ),
+    )

@@ -34,7 +34,8 @@ def quoted(value: object) -> str:
         value = value[: SHOWN + 1]  # the rest would not be shown, however long it is
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # a number of more digits than Python writes, or endless nesting
+    # a number of more digits than Python writes, or endless nesting
+    except (ValueError, RecursionError):
         text = f"one {type(value).__name__} that is too long to write"
     return cut(text)
 
@@ -77,7 +78,9 @@ def check_size(path: Path, most: int) -> None:
     size = state.st_size
     if size > most:
         allowed = f"{most / 1e6:g} MB" if most < 1_000_000_000 else f"{most / 1e9:g} GB"
-        came = f"{size / 1e6:.1f} MB" if most < 1_000_000_000 else f"{size / 1e9:.1f} GB"
+        came = (
+            f"{size / 1e6:.1f} MB" if most < 1_000_000_000 else f"{size / 1e9:.1f} GB"
+        )
         raise InputError(f"{path}: expected at most {allowed}, got {came}")
 
 
@@ -95,9 +98,13 @@ def read_text(path: str | Path, most: int, what: str = "text") -> str:
     except FileNotFoundError:
         raise
     except OSError as error:
-        raise InputError(f"{path}: expected a file that can be read, got {error.strerror or error}") from None
+        raise InputError(
+            f"{path}: expected a file that can be read, got {error.strerror or error}"
+        ) from None
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: expected {what} in UTF-8, got byte 0x{content[error.start]:02x}") from None
+        raise InputError(
+            f"{path}: expected {what} in UTF-8, got byte 0x{content[error.start]:02x}"
+        ) from None
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
@@ -107,11 +114,15 @@ def parsed_toml(text: str) -> dict[str, Any]:
         dots = _DECIMAL.sub("", line).count(".") if line.count(".") > 1 else 0
         weight += dots * dots
         if dots > DOTS or weight > NESTING:
-            raise InputError(f"expected keys that are not nested so deeply, got {dots} dots in line {number}")
+            raise InputError(
+                f"expected keys that are not nested so deeply, got {dots} dots in line {number}"
+            )
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise InputError("expected values that are not nested so deeply, got too many brackets") from None
+        raise InputError(
+            "expected values that are not nested so deeply, got too many brackets"
+        ) from None
 
 
 def parsed_json(text: str | bytes) -> Any:
@@ -122,4 +133,6 @@ def parsed_json(text: str | bytes) -> Any:
     try:
         return json.loads(text)
     except RecursionError:
-        raise InputError("expected values that are not nested so deeply, got too many brackets") from None
+        raise InputError(
+            "expected values that are not nested so deeply, got too many brackets"
+        ) from None

@@ -36,7 +36,8 @@ BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
 Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-OWN = "this process"  # instead of the distribution of an optimiser that no plugin registered
+# instead of the distribution of an optimiser that no plugin registered
+OWN = "this process"
 COMMAND: Literal["command"] = "command"  # what a plugin may register besides
 Registrable: TypeAlias = Kind | Literal["command"]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
@@ -59,7 +60,9 @@ class Offer:
     @property
     def label(self) -> str:
         """How an error names it."""
-        return f"{self.kind} {self.name!r} of {self.distribution} {self.version}".rstrip()
+        return (
+            f"{self.kind} {self.name!r} of {self.distribution} {self.version}".rstrip()
+        )
 
     @property
     def origin(self) -> str:
@@ -70,10 +73,16 @@ class Offer:
         """
         if self.distribution == OWN:
             return f"{self.name} {self.version}".rstrip()
-        module = (self.factory.func if isinstance(self.factory, partial) else self.factory).__module__
+        module = (
+            self.factory.func if isinstance(self.factory, partial) else self.factory
+        ).__module__
         if self.distribution == PROJECT and module.partition(".")[0] == PROJECT:
             return posefit_build()
-        name = module.partition(".")[0] if self.distribution == PROJECT else f"{self.distribution} {self.version}"
+        name = (
+            module.partition(".")[0]
+            if self.distribution == PROJECT
+            else f"{self.distribution} {self.version}"
+        )
         library = ""
         if self.needs is not None:
             with suppress(PackageNotFoundError):
@@ -93,7 +102,11 @@ class Offer:
     @property
     def missing(self) -> str | None:
         """What to install before it can be used, if anything."""
-        return None if self.needs is None or find_spec(self.needs[0]) is not None else self.needs[1]
+        return (
+            None
+            if self.needs is None or find_spec(self.needs[0]) is not None
+            else self.needs[1]
+        )
 
 
 class Plugin(NamedTuple):
@@ -117,13 +130,20 @@ class Registry:
 
     def rivals(self, offer: Offer) -> list[Plugin]:
         """Return the plugins that are left out because they register the name of an offer, too."""
-        return [plugin for plugin in self.plugins if _taken(f"{offer.kind} {offer.name!r}") in plugin.cause]
+        return [
+            plugin
+            for plugin in self.plugins
+            if _taken(f"{offer.kind} {offer.name!r}") in plugin.cause
+        ]
 
     @property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
         """The offers of all plugins that were loaded."""
         offers = [offer for plugin in self.plugins for offer in plugin.offers]
-        return {kind: {offer.name: offer for offer in offers if offer.kind == kind} for kind in KINDS}
+        return {
+            kind: {offer.name: offer for offer in offers if offer.kind == kind}
+            for kind in KINDS
+        }
 
     def optimiser(self, name: str) -> "OptimiserFactory":
         """Return the optimiser factory of a name. Raises ValueError listing the known names."""
@@ -142,7 +162,9 @@ class Registry:
         family, colon, variant = name.partition(":")
         if family not in known:
             listed = ", ".join(sorted(known)) or "none"
-            raise InputError(f"{kind} must be one of {listed}, got {quoted(name)}{self.hint(family, known)}")
+            raise InputError(
+                f"{kind} must be one of {listed}, got {quoted(name)}{self.hint(family, known)}"
+            )
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs
@@ -152,7 +174,9 @@ class Registry:
         if not colon:
             return offer
         if all(setting.name != "variant" for setting in offer.settings):
-            raise InputError(f"{kind} must be {family}, which has no variants, got {quoted(name)}")
+            raise InputError(
+                f"{kind} must be {family}, which has no variants, got {quoted(name)}"
+            )
         factory = partial(offer.factory, variant=variant)
         factory.__doc__ = offer.factory.__doc__
         return replace(offer, name=name, factory=factory)
@@ -163,11 +187,18 @@ class Registry:
         if kinds:
             return f"; its kind is {kinds[0]}"
         broken = [plugin.name for plugin in self.plugins if plugin.state == "broken"]
-        doctor = f"posefit plugins doctor says why {', '.join(broken)} failed to load" if broken else ""
+        doctor = (
+            f"posefit plugins doctor says why {', '.join(broken)} failed to load"
+            if broken
+            else ""
+        )
         near = suggestion(name, known)
         if near and doctor:
             return f"{near} {doctor}"
-        return near or f"; {doctor or 'posefit plugins doctor lists what is installed, and what failed to load'}"
+        return (
+            near
+            or f"; {doctor or 'posefit plugins doctor lists what is installed, and what failed to load'}"
+        )
 
 
 @lru_cache(maxsize=1)
@@ -186,21 +217,44 @@ def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
     """
     for name, (factory, digest) in factories.items():
         if not _NAME.fullmatch(name):
-            raise InputError(f"a factory must have a name of letters, digits, _, + and -, got {quoted(name)}")
-        if name not in _own and name in {**registry().offers["optimiser"], **registry().offers["tracker"]}:
-            raise InputError(f"a factory must have a name of its own, got {name}, which a plugin has registered")
-        _own[name] = Plugin(name, OWN, digest, "loaded", offers=(Offer("optimiser", name, factory, OWN, digest),))
+            raise InputError(
+                f"a factory must have a name of letters, digits, _, + and -, got {quoted(name)}"
+            )
+        if name not in _own and name in {
+            **registry().offers["optimiser"],
+            **registry().offers["tracker"],
+        }:
+            raise InputError(
+                f"a factory must have a name of its own, got {name}, which a plugin has registered"
+            )
+        _own[name] = Plugin(
+            name,
+            OWN,
+            digest,
+            "loaded",
+            offers=(Offer("optimiser", name, factory, OWN, digest),),
+        )
         registry.cache_clear()
 
 
 @lru_cache
-def plugins_of(kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()) -> tuple[Plugin, ...]:
+def plugins_of(
+    kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()
+) -> tuple[Plugin, ...]:
     """Return all installed plugins with what they offer of some kinds; see `load`.
 
     One whose group only begins with posefit's name, however that is written, is among them, and broken.
     """
-    groups = [group for group in entry_points().groups if re.sub("[-_. ]", "", group.lower()).startswith(PROJECT)]
-    return load([point for group in groups for point in entry_points(group=group)], kinds, taken=taken)
+    groups = [
+        group
+        for group in entry_points().groups
+        if re.sub("[-_. ]", "", group.lower()).startswith(PROJECT)
+    ]
+    return load(
+        [point for group in groups for point in entry_points(group=group)],
+        kinds,
+        taken=taken,
+    )
 
 
 def version_of(origins: Iterable[str]) -> str:
@@ -232,31 +286,59 @@ def load(
     owners = {f"command {name!r}": PROJECT for name in taken}
     blocked = {word.strip().lower() for word in variables.get(BLOCK, "").split(",")}
     plugins: list[Plugin] = []
-    owned = [(*((point.dist.name, point.dist.version) if point.dist else ("unknown", "")), point) for point in points]
-    for owner, release, point in sorted(owned, key=lambda entry: (entry[0] != PROJECT, entry[2].name)):
+    owned = [
+        (
+            *((point.dist.name, point.dist.version) if point.dist else ("unknown", "")),
+            point,
+        )
+        for point in points
+    ]
+    for owner, release, point in sorted(
+        owned, key=lambda entry: (entry[0] != PROJECT, entry[2].name)
+    ):
         plugin = Plugin(point.name, owner, release, "left out", f"{BLOCK} names it")
         if not blocked & {point.name.lower(), owner.lower()}:
             try:
                 offers = _offers(point, kinds, owner, release, owners)
                 owners |= dict.fromkeys(offers, owner)
-                methods = tuple(offer for offer in offers.values() if isinstance(offer, Offer))
-                commands = tuple(offer for offer in offers.values() if not isinstance(offer, Offer))
-                plugin = plugin._replace(state="loaded", cause="", offers=methods, commands=commands)
-            except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
+                methods = tuple(
+                    offer for offer in offers.values() if isinstance(offer, Offer)
+                )
+                commands = tuple(
+                    offer for offer in offers.values() if not isinstance(offer, Offer)
+                )
+                plugin = plugin._replace(
+                    state="loaded", cause="", offers=methods, commands=commands
+                )
+            # whatever a plugin does, the others must work
+            except (Exception, SystemExit) as error:
                 trace = "".join(traceback.format_exception(error))
-                plugin = plugin._replace(state="broken", cause=f"{type(error).__name__}: {error}", traceback=trace)
+                plugin = plugin._replace(
+                    state="broken",
+                    cause=f"{type(error).__name__}: {error}",
+                    traceback=trace,
+                )
         plugins.append(plugin)
         if plugin.state == "broken":
-            warnings.warn(f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}", stacklevel=2)
+            warnings.warn(
+                f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}",
+                stacklevel=2,
+            )
     return tuple(plugins)
 
 
 def _offers(
-    point: EntryPoint, kinds: Iterable[Registrable], owner: str, release: str, owners: Mapping[str, str]
+    point: EntryPoint,
+    kinds: Iterable[Registrable],
+    owner: str,
+    release: str,
+    owners: Mapping[str, str],
 ) -> "dict[str, Offer | click.Command]":
     """Return what a plugin offers, by how an error names it. Raises whatever goes wrong."""
     if point.group != PROJECT:
-        raise InputError(f"its entry point must be in the group {PROJECT!r}, got {point.group!r}")
+        raise InputError(
+            f"its entry point must be in the group {PROJECT!r}, got {point.group!r}"
+        )
     manager = pluggy.PluginManager(PROJECT)
     manager.add_hookspecs(hooks)
     module = point.load()
@@ -265,8 +347,14 @@ def _offers(
         manager.check_pending()
     except pluggy.PluginValidationError as error:
         known = [name for name in vars(hooks) if name.startswith("posefit_register_")]
-        unknown = [name for name in vars(module) if name.startswith("posefit_") and name not in known]
-        raise InputError(f"{error}{suggestion(unknown[0], known) if unknown else ''}") from None
+        unknown = [
+            name
+            for name in vars(module)
+            if name.startswith("posefit_") and name not in known
+        ]
+        raise InputError(
+            f"{error}{suggestion(unknown[0], known) if unknown else ''}"
+        ) from None
     offers: dict[str, Offer | click.Command] = {}
 
     def add(name: str, offer: "Offer | click.Command") -> None:
@@ -278,18 +366,26 @@ def _offers(
         import click
 
         if not isinstance(offer, click.Command) or not offer.name:
-            raise TypeError(f"a command must be a click.Command with a name, got {offer!r}")
+            raise TypeError(
+                f"a command must be a click.Command with a name, got {offer!r}"
+            )
         add(f"command {offer.name!r}", offer)
 
     def method(kind: Kind, name: str, factory: Callable[..., Any], **more: Any) -> None:
         from posefit.fitting.optimiser import NextFrame
 
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise InputError(f"a name must be letters, digits, _, + and -, got {name!r}")
+            raise InputError(
+                f"a name must be letters, digits, _, + and -, got {name!r}"
+            )
         if not callable(factory):
-            raise TypeError(f"{kind} {name!r} must be a factory that can be called, got {factory!r}")
+            raise TypeError(
+                f"{kind} {name!r} must be a factory that can be called, got {factory!r}"
+            )
         if more.get("next_frame", "start") not in get_args(NextFrame):
-            raise InputError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
+            raise InputError(
+                f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}"
+            )
         add(f"{kind} {name!r}", Offer(kind, name, factory, owner, release, **more))
 
     for kind in kinds:

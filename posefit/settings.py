@@ -13,7 +13,9 @@ from posefit.reading import quoted, suggestion
 
 # a docstring's list of settings: an indented line for each, which may go on in lines that are indented more
 _LIST = re.compile(r"^( *)Settings:\n((?:\1 +.*(?:\n|$)|\s*\n)*)", re.MULTILINE)
-_ENTRY = re.compile(r"^([A-Za-z_]\w*)(?: \(([^()]*)\))?: (.*(?:\n[ \n].*)*)", re.MULTILINE)
+_ENTRY = re.compile(
+    r"^([A-Za-z_]\w*)(?: \(([^()]*)\))?: (.*(?:\n[ \n].*)*)", re.MULTILINE
+)
 POPULATION_SIZE = 40  # where none is chosen: N of the SAPSO paper, section 5.2
 
 
@@ -35,7 +37,8 @@ def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     """Return the settings that a factory takes, in the order of its signature."""
     try:
         signature = inspect.signature(factory, eval_str=True)
-    except (NameError, TypeError, ValueError):  # an annotation that cannot be resolved is no annotation
+    # an annotation that cannot be resolved is no annotation
+    except (NameError, TypeError, ValueError):
         signature = inspect.signature(factory)
     return tuple(
         Setting(parameter.name, parameter.annotation, parameter.default)
@@ -52,7 +55,9 @@ def settings_in(text: str) -> dict[str, tuple[str, str]]:
     """
     listed = _LIST.search(text)
     entries = _ENTRY.findall(textwrap.dedent(listed[2])) if listed else []
-    return {name: (symbol, " ".join(meaning.split())) for name, symbol, meaning in entries}
+    return {
+        name: (symbol, " ".join(meaning.split())) for name, symbol, meaning in entries
+    }
 
 
 def without_settings(text: str) -> str:
@@ -65,7 +70,9 @@ def names(factory: Callable[..., Any]) -> list[str]:
     return [setting.name for setting in settings_of(factory)]
 
 
-def check(plugin: str, factory: Callable[..., Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
+def check(
+    plugin: str, factory: Callable[..., Any], chosen: Mapping[str, Any]
+) -> dict[str, Any]:
     """Return settings, numbers of NumPy as Python's own.
 
     Raises ValueError where one is unknown, listing the known, or its type is wrong.
@@ -73,14 +80,19 @@ def check(plugin: str, factory: Callable[..., Any], chosen: Mapping[str, Any]) -
     known = {setting.name: setting for setting in settings_of(factory)}
     values = {}
     for name, value in chosen.items():
-        setting, plain = _known(plugin, name, known), _plain(value)
+        setting = _known(plugin, name, known)
+        plain = _plain(value)
         if not accepts(setting.annotation, plain):
-            raise InputError(f"{plugin}.{name} must be {setting.type}, got {quoted(value)}")
+            raise InputError(
+                f"{plugin}.{name} must be {setting.type}, got {quoted(value)}"
+            )
         values[name] = plain
     return values
 
 
-def planned(factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int) -> dict[str, Any]:
+def planned(
+    factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int
+) -> dict[str, Any]:
     """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
 
     These are `evaluations` itself, and `iterations`, the populations after the first. What is given stays as it is.
@@ -90,20 +102,28 @@ def planned(factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations:
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:
-        size = filled.get("population_size", known.get("population_size", POPULATION_SIZE))
+        size = filled.get(
+            "population_size", known.get("population_size", POPULATION_SIZE)
+        )
         if isinstance(size, int) and size > 0:
             filled.setdefault("iterations", max(1, evaluations // size - 1))
     return filled
 
 
-def population(factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int) -> int:
+def population(
+    factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int
+) -> int:
     """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
     known = {setting.name: setting.default for setting in settings_of(factory)}
-    size = planned(factory, chosen, evaluations).get("population_size", known.get("population_size", 1))
+    size = planned(factory, chosen, evaluations).get(
+        "population_size", known.get("population_size", 1)
+    )
     return size if isinstance(size, int) and size > 0 else 1
 
 
-def parse(plugin: str, factory: Callable[..., Any], chosen: Mapping[str, str]) -> dict[str, Any]:
+def parse(
+    plugin: str, factory: Callable[..., Any], chosen: Mapping[str, str]
+) -> dict[str, Any]:
     """Return settings that were given as text, as the values their types ask for.
 
     Raises ValueError where one is unknown or its text does not fit its type.
@@ -112,14 +132,20 @@ def parse(plugin: str, factory: Callable[..., Any], chosen: Mapping[str, str]) -
     values = {}
     for name, text in chosen.items():
         setting = _known(plugin, name, known)
-        readings = [value for value in _readings(text) if accepts(setting.annotation, value)]
+        readings = [
+            value for value in _readings(text) if accepts(setting.annotation, value)
+        ]
         if not readings:
-            raise InputError(f"{plugin}.{name} must be {setting.type}, got {quoted(text)}")
+            raise InputError(
+                f"{plugin}.{name} must be {setting.type}, got {quoted(text)}"
+            )
         values[name] = readings[0]
     return values
 
 
-def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) -> dict[str, Any]:
+def parse_texts(
+    plugin: str, factory: Callable[..., Any], texts: Sequence[str]
+) -> dict[str, Any]:
     """Return settings that texts such as `population_size=20` give; the plugin's name and a dot may stand before.
 
     Raises ValueError where a text has another form, or `parse` does.
@@ -128,7 +154,9 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
-            raise InputError(f"a setting must be SETTING=VALUE such as population_size=20, got {quoted(text)}")
+            raise InputError(
+                f"a setting must be SETTING=VALUE such as population_size=20, got {quoted(text)}"
+            )
         if (name := setting.rpartition(".")[2]) in chosen:
             raise InputError(f"a setting must be given once, got {quoted(name)} twice")
         chosen[name] = value
@@ -158,7 +186,11 @@ def accepts(annotation: Any, value: Any) -> bool:
         return any(accepts(member, value) for member in get_args(annotation))
     if origin is tuple:
         parts: tuple[Any, ...] = get_args(annotation)
-        return isinstance(value, tuple) and len(value) == len(parts) and all(map(accepts, parts, value))
+        return (
+            isinstance(value, tuple)
+            and len(value) == len(parts)
+            and all(map(accepts, parts, value))
+        )
     if annotation in (None, type(None)):
         return value is None
     if annotation is float:
@@ -172,13 +204,19 @@ def _plain(value: Any) -> Any:
     """Return a number of NumPy as Python's own, in a tuple too; anything else as it is."""
     if isinstance(value, tuple):
         return tuple(map(_plain, value))
-    return value.item() if type(value).__module__ == "numpy" and not getattr(value, "shape", (0,)) else value
+    return (
+        value.item()
+        if type(value).__module__ == "numpy" and not getattr(value, "shape", (0,))
+        else value
+    )
 
 
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
     if name not in known:
         listed = f"one of {', '.join(known)}" if known else "none, it takes none"
-        raise InputError(f"a setting of {plugin} must be {listed}, got {quoted(name)}{suggestion(name, known)}")
+        raise InputError(
+            f"a setting of {plugin} must be {listed}, got {quoted(name)}{suggestion(name, known)}"
+        )
     return known[name]
 
 
@@ -198,7 +236,11 @@ def _readings(text: str) -> list[Any]:
 
 def _shown(annotation: Any, default: Any) -> str:
     if annotation is inspect.Parameter.empty:
-        return "any" if default in (None, inspect.Parameter.empty) else type(default).__name__
+        return (
+            "any"
+            if default in (None, inspect.Parameter.empty)
+            else type(default).__name__
+        )
     origin = get_origin(annotation)
     if origin is Literal:
         return " | ".join(map(str, get_args(annotation)))

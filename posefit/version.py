@@ -28,7 +28,9 @@ def source_digest(module: str, without: tuple[str, ...] = ()) -> str:
         return ""
     path = Path(named)
     digest = hashlib.sha256()
-    for file in sorted(path.parent.rglob("*")) if path.name == "__init__.py" else [path]:
+    for file in (
+        sorted(path.parent.rglob("*")) if path.name == "__init__.py" else [path]
+    ):
         place = file.relative_to(path.parent)
         if file.suffix in SUFFIXES and place.parts[0] not in without:
             digest.update(f"{place.as_posix()}\0".encode() + file.read_bytes() + b"\0")

@@ -6,14 +6,24 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 
-def each(names: str | tuple[str, ...], cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def each(
+    names: str | tuple[str, ...], cases: Iterable[Any]
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator like `pytest.mark.parametrize` whose cases are one test; each has a `tmp_path` of its own."""
-    arguments = tuple(name.strip() for name in names.split(",")) if isinstance(names, str) else names
+    arguments = (
+        tuple(name.strip() for name in names.split(","))
+        if isinstance(names, str)
+        else names
+    )
     table = list(cases)
 
     def decorate(test: Callable[..., None]) -> Callable[..., None]:
         signature = inspect.signature(test)
-        fixtures = [parameter for name, parameter in signature.parameters.items() if name not in arguments]
+        fixtures = [
+            parameter
+            for name, parameter in signature.parameters.items()
+            if name not in arguments
+        ]
 
         @functools.wraps(test)
         def run(**given: Any) -> None:

@@ -25,5 +25,7 @@ def error_of(*words: object) -> str:
     assert (result.exit_code, result.stdout) == (2, ""), result.output
     assert "Usage:" not in result.stderr
     assert "Traceback" not in result.stderr
-    (line,) = (line for line in result.stderr.splitlines() if line.startswith("posefit:"))
+    (line,) = (
+        line for line in result.stderr.splitlines() if line.startswith("posefit:")
+    )
     return line

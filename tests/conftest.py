@@ -10,24 +10,35 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-settings.register_profile("posefit", deadline=None)  # how long an example takes says nothing of it
+# how long an example takes says nothing of it
+settings.register_profile("posefit", deadline=None)
 settings.load_profile("posefit")
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a run in the background ignores it, and so do its children
+# a run in the background ignores it, and so do its children
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--all", action="store_true", help="run the slow tests too")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
     if not config.getoption("--all"):
         for item in items:
             if item.get_closest_marker("slow"):
                 item.add_marker(pytest.mark.skip(reason="slow: --all runs it"))
-    if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and shutil.which("nvidia-smi") is None:
+    if (
+        os.environ.get("NUMBA_ENABLE_CUDASIM") != "1"
+        and shutil.which("nvidia-smi") is None
+    ):
         for item in items:
             if item.get_closest_marker("device"):
-                item.add_marker(pytest.mark.skip(reason="no GPU: NUMBA_ENABLE_CUDASIM=1 and -m device simulate one"))
+                item.add_marker(
+                    pytest.mark.skip(
+                        reason="no GPU: NUMBA_ENABLE_CUDASIM=1 and -m device simulate one"
+                    )
+                )
 
 
 @pytest.fixture(scope="session")
@@ -42,7 +53,9 @@ def cmu() -> Path:
     beside = Path(__file__).parents[2] / "shared" / "data" / "cmu"
     folder = Path(os.environ.get("POSEFIT_CMU", beside))
     if not (folder / "manifest.tsv").is_file():
-        pytest.skip(f"no CMU clips in {folder}: name their folder in the environment variable POSEFIT_CMU")
+        pytest.skip(
+            f"no CMU clips in {folder}: name their folder in the environment variable POSEFIT_CMU"
+        )
     return folder
 
 

@@ -17,13 +17,16 @@ class Effort:
 
 def read_so_far() -> int:
     """Return how many bytes this process has read, from files or elsewhere."""
-    status = dict(line.split(": ") for line in Path("/proc/self/io").read_text().splitlines())
+    status = dict(
+        line.split(": ") for line in Path("/proc/self/io").read_text().splitlines()
+    )
     return int(status["rchar"])
 
 
 def effort(call: Callable[[], object]) -> Effort:
     """Return what a call takes; only what it does a second time and later is always the same."""
-    profile, before = Profile(), read_so_far()
+    profile = Profile()
+    before = read_so_far()
     profile.runcall(call)
     read = read_so_far() - before
     return Effort(Stats(profile).total_calls, read)  # type: ignore[attr-defined]

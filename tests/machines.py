@@ -29,7 +29,8 @@ class Machine:
     blas: str  # a core type of OpenBLAS
     compiler: str  # a processor of LLVM
     level: int  # of the x86-64 microarchitecture: 2 has SSE 4.2, 3 AVX2, 4 AVX-512
-    needs: str  # a feature, in NumPy's words, without which the processor at hand cannot run it
+    # a feature, in NumPy's words, without which the processor at hand cannot run it
+    needs: str
 
 
 MACHINES = (
@@ -47,8 +48,14 @@ def cpu() -> Any:
 
 def environment(machine: Machine, seed: int, cache: Path) -> dict[str, str]:
     """Return the environment in which tests run on a machine."""
-    above = {2: r"AVX|FMA|F16C|XOP|X86_V[34]", 3: r"AVX512|X86_V4", 4: r"(?!)"}[machine.level]
-    features = [name for name in cpu().__cpu_dispatch__ if cpu().__cpu_features__[name] and re.match(above, name)]
+    above = {2: r"AVX|FMA|F16C|XOP|X86_V[34]", 3: r"AVX512|X86_V4", 4: r"(?!)"}[
+        machine.level
+    ]
+    features = [
+        name
+        for name in cpu().__cpu_dispatch__
+        if cpu().__cpu_features__[name] and re.match(above, name)
+    ]
     return os.environ | {
         "OPENBLAS_CORETYPE": machine.blas,
         "NPY_DISABLE_CPU_FEATURES": " ".join(features),
@@ -61,8 +68,22 @@ def environment(machine: Machine, seed: int, cache: Path) -> dict[str, str]:
 
 def run(machine: Machine, seed: int, arguments: list[str], cache: Path) -> bool:
     """Run the tests on a machine, print how it went, and return whether all passed."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
-    done = subprocess.run(command, cwd=ROOT, env=environment(machine, seed, cache), capture_output=True, text=True)
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        *arguments,
+    ]
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env=environment(machine, seed, cache),
+        capture_output=True,
+        text=True,
+    )
     lines = (done.stdout + done.stderr).strip().splitlines() or ["no output"]
     print(f"{machine.name}, seed {seed}: {lines[-1].strip('= ')}", flush=True)
     if done.returncode:
@@ -72,15 +93,29 @@ def run(machine: Machine, seed: int, arguments: list[str], cache: Path) -> bool:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=1, help="offsets of the fixture `seed`: 0, 1, ...")
-    parser.add_argument("--only", action="append", choices=[one.name for one in MACHINES], help="this machine alone")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--seeds", type=int, default=1, help="offsets of the fixture `seed`: 0, 1, ..."
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        choices=[one.name for one in MACHINES],
+        help="this machine alone",
+    )
     options, arguments = parser.parse_known_args()
     passed = []
     with tempfile.TemporaryDirectory() as cache:
-        for machine in (one for one in MACHINES if not options.only or one.name in options.only):
+        for machine in (
+            one for one in MACHINES if not options.only or one.name in options.only
+        ):
             if cpu().__cpu_features__.get(machine.needs):
-                passed += [run(machine, seed, arguments, Path(cache)) for seed in range(options.seeds)]
+                passed += [
+                    run(machine, seed, arguments, Path(cache))
+                    for seed in range(options.seeds)
+                ]
             else:
                 print(f"{machine.name}: left out, the processor has no {machine.needs}")
     return 0 if passed and all(passed) else 1

@@ -20,8 +20,28 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 COPIED = ("posefit", "plugins", "envs", "tests", "docs", "pyproject.toml")
-OPERATORS = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">=", ">": "<=", "<=": ">", ">=": "<", "&": "|", "|": "&"}
-NAMES = {"Add": "+", "Sub": "-", "Mult": "*", "Div": "/", "Lt": "<", "Gt": ">", "LtE": "<=", "GtE": ">="}
+OPERATORS = {
+    "+": "-",
+    "-": "+",
+    "*": "/",
+    "/": "*",
+    "<": ">=",
+    ">": "<=",
+    "<=": ">",
+    ">=": "<",
+    "&": "|",
+    "|": "&",
+}
+NAMES = {
+    "Add": "+",
+    "Sub": "-",
+    "Mult": "*",
+    "Div": "/",
+    "Lt": "<",
+    "Gt": ">",
+    "LtE": "<=",
+    "GtE": ">=",
+}
 NAMES |= {"BitAnd": "&", "BitOr": "|"}
 KERNEL_TESTS = {  # which tests notice a change of a package's kernels
     "posefit/silhouette": ["tests/silhouette"],
@@ -53,27 +73,44 @@ def mutants() -> Iterator[Mutant]:
     for path in sorted(ROOT.glob("p*/**/*kernels.py")):
         name = path.relative_to(ROOT).as_posix()
         folder = path.parent.relative_to(ROOT).as_posix()
-        yield from _of_lines(name, None, tuple(KERNEL_TESTS.get(folder, ["tests/sources"])))
+        yield from _of_lines(
+            name, None, tuple(KERNEL_TESTS.get(folder, ["tests/sources"]))
+        )
 
 
-def _of_lines(path: str, lines: set[int] | None, tests: tuple[str, ...]) -> Iterator[Mutant]:
+def _of_lines(
+    path: str, lines: set[int] | None, tests: tuple[str, ...]
+) -> Iterator[Mutant]:
     """Yield the mutants of some lines of a file, or of all."""
     text = (ROOT / path).read_text("utf-8")
     source = text.splitlines()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.BinOp):
-            start, stop, kind = node.left, node.right, type(node.op).__name__
+            start = node.left
+            stop = node.right
+            kind = type(node.op).__name__
         elif isinstance(node, ast.Compare) and len(node.ops) == 1:
-            start, stop, kind = node.left, node.comparators[0], type(node.ops[0]).__name__
+            start = node.left
+            stop = node.comparators[0]
+            kind = type(node.ops[0]).__name__
         else:
             continue
-        number, left, right = start.end_lineno or 0, start.end_col_offset or 0, stop.col_offset
-        if kind not in NAMES or number != stop.lineno or (lines is not None and number not in lines):
+        number = start.end_lineno or 0
+        left = start.end_col_offset or 0
+        right = stop.col_offset
+        if (
+            kind not in NAMES
+            or number != stop.lineno
+            or (lines is not None and number not in lines)
+        ):
             continue
-        line, sign = source[number - 1], NAMES[kind]
+        line = source[number - 1]
+        sign = NAMES[kind]
         between = line[left:right]
         if line.isascii() and between.count(sign) == 1:
-            changed = line[:left] + between.replace(sign, OPERATORS[sign]) + line[right:]
+            changed = (
+                line[:left] + between.replace(sign, OPERATORS[sign]) + line[right:]
+            )
             yield Mutant(path, number, line.strip(), changed, tests)
 
 
@@ -85,11 +122,31 @@ def survives(mutant: Mutant, copy: Path) -> bool:
     lines[mutant.line - 1] = mutant.after + "\n"
     file.write_text("".join(lines), "utf-8")
     paths = os.pathsep.join(str(copy / name) for name in (".", "plugins", "envs"))
-    words = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", *mutant.tests]
+    words = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-x",
+        "-n",
+        "0",
+        "-p",
+        "no:cacheprovider",
+        *mutant.tests,
+    ]
     try:
-        ran = subprocess.run(words, cwd=copy, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, timeout=900)
-        if ran.returncode > 1:  # below 0 a signal ended it: a kernel that writes beyond its arrays
-            raise RuntimeError(f"tests must pass or fail, got\n{ran.stdout.decode()}{ran.stderr.decode()}")
+        ran = subprocess.run(
+            words,
+            cwd=copy,
+            env={**os.environ, "PYTHONPATH": paths},
+            capture_output=True,
+            timeout=900,
+        )
+        # below 0 a signal ended it: a kernel that writes beyond its arrays
+        if ran.returncode > 1:
+            raise RuntimeError(
+                f"tests must pass or fail, got\n{ran.stdout.decode()}{ran.stderr.decode()}"
+            )
         return ran.returncode == 0
     except subprocess.TimeoutExpired:
         return False
@@ -109,13 +166,18 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "copy"
         for name in COPIED:
-            (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, copy / name)
+            (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(
+                ROOT / name, copy / name
+            )
         killed = 0
         for mutant in drawn:
             if not survives(mutant, copy):
                 killed += 1
             else:
-                print(f"LIVES {mutant.path}:{mutant.line}\n  {mutant.before}\n  {mutant.after.strip()}", flush=True)
+                print(
+                    f"LIVES {mutant.path}:{mutant.line}\n  {mutant.before}\n  {mutant.after.strip()}",
+                    flush=True,
+                )
     print(f"{killed} of {len(drawn)} mutants killed, of {len(every)} that there are")
     return int(killed < asked.least * len(drawn))
 

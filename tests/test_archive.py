@@ -19,7 +19,9 @@ def read(path, most=1_000_000):
 
 @pytest.fixture
 def path(tmp_path):
-    np.savez_compressed(tmp_path / "a.npz", a=np.arange(5000.0), b=np.array(["x", "y"]), c=np.zeros(3))
+    np.savez_compressed(
+        tmp_path / "a.npz", a=np.arange(5000.0), b=np.array(["x", "y"]), c=np.zeros(3)
+    )
     return tmp_path / "a.npz"
 
 
@@ -43,11 +45,20 @@ def test_objects_and_foreign_packing_and_other_sizes_are_refused(tmp_path):
     buffer = io.BytesIO()
     np.lib.format.write_array(buffer, np.arange(9.0))
     for packing, content, message in (
-        (zipfile.ZIP_BZIP2, buffer.getvalue(), "a packed in a way that NumPy does not write"),
+        (
+            zipfile.ZIP_BZIP2,
+            buffer.getvalue(),
+            "a packed in a way that NumPy does not write",
+        ),
         (zipfile.ZIP_STORED, buffer.getvalue()[:-8], r"a of 64 bytes for shape \(9,\)"),
-        (zipfile.ZIP_STORED, buffer.getvalue() + b"x", r"a of 73 bytes for shape \(9,\)"),
+        (
+            zipfile.ZIP_STORED,
+            buffer.getvalue() + b"x",
+            r"a of 73 bytes for shape \(9,\)",
+        ),
         (zipfile.ZIP_STORED, b"", "a damaged one"),
-        (zipfile.ZIP_STORED, b"\x93NUMPY\2\0\0\0\0\xb0", "a in NumPy's format"),  # whose header has 3 GB
+        # whose header has 3 GB
+        (zipfile.ZIP_STORED, b"\x93NUMPY\2\0\0\0\0\xb0", "a in NumPy's format"),
     ):
         with zipfile.ZipFile(path, "w", packing) as made:
             made.writestr("a.npy", content)
@@ -64,13 +75,20 @@ def test_a_directory_of_very_many_entries_is_not_read(tmp_path):
     end = content.rindex(b"PK\5\6")
     count, size, start = struct.unpack("<10xHLL2x", content[end:])
     # the same behind a comment so long that the 64-bit record, the one that counts, is far before the end
-    record = struct.pack("<4sQHHLLQQQQ", b"PK\6\6", 44, 45, 45, 0, 0, count, count, size, start)
+    record = struct.pack(
+        "<4sQHHLLQQQQ", b"PK\6\6", 44, 45, 45, 0, 0, count, count, size, start
+    )
     place = struct.pack("<4sLQL", b"PK\6\7", 0, end, 1)
     last = struct.pack("<4sHHHHLLH", b"PK\5\6", 0, 0, 1, 1, 46, 2**32 - 1, 65_535)
     for damaged in (content, content[:end] + record + place + last + bytes(65_535)):
         path.write_bytes(damaged)
-        with pytest.raises(ValueError, match=REFUSED + "one whose directory is longer than 100,000 bytes"):
+        with pytest.raises(
+            ValueError,
+            match=REFUSED + "one whose directory is longer than 100,000 bytes",
+        ):
             read(path)
     path.write_bytes(b"no archive")
-    with pytest.raises(ValueError, match=REFUSED + "a damaged one: File is not a zip file"):
+    with pytest.raises(
+        ValueError, match=REFUSED + "a damaged one: File is not a zip file"
+    ):
         read(path)

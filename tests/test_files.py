@@ -42,7 +42,11 @@ def test_a_failure_leaves_nothing(tmp_path, opened):
     for error, raised, message in (
         (RuntimeError("no"), RuntimeError, "no"),
         (KeyboardInterrupt("stop"), KeyboardInterrupt, "stop"),
-        (FULL, ValueError, "out: expected a place to write to, got No space left on device"),
+        (
+            FULL,
+            ValueError,
+            "out: expected a place to write to, got No space left on device",
+        ),
     ):
         with pytest.raises(raised, match=message):
             fail(opened(tmp_path / "out"), error)
@@ -54,7 +58,10 @@ def test_a_name_that_is_taken_or_has_no_place_is_refused(tmp_path, opened):
     (tmp_path / "file").write_text("mine")
     for path, message in (
         ("file", "file: expected a new name to write to, got one that exists"),
-        ("none/out", "out: expected a place to write to, got No such file or directory"),
+        (
+            "none/out",
+            "out: expected a place to write to, got No such file or directory",
+        ),
         ("file/out", "out: expected a place to write to, got Not a directory"),
     ):
         with pytest.raises(ValueError, match=message), opened(tmp_path / path):
@@ -62,13 +69,18 @@ def test_a_name_that_is_taken_or_has_no_place_is_refused(tmp_path, opened):
     assert (tmp_path / "file").read_text() == "mine"
 
 
-@pytest.mark.parametrize("opened", [new_folder, new_file, lambda path: replaced_file(path, MARK)])
+@pytest.mark.parametrize(
+    "opened", [new_folder, new_file, lambda path: replaced_file(path, MARK)]
+)
 def test_a_link_at_the_name_counts_as_existing_and_is_not_followed(tmp_path, opened):
     (tmp_path / "theirs").write_bytes(MARK)
     (tmp_path / "out").symlink_to(tmp_path / "theirs")
     (tmp_path / "dangling").symlink_to(tmp_path / "nothing")
     for name in ("out", "dangling"):
-        with pytest.raises(ValueError, match="expected a new name"), opened(tmp_path / name):
+        with (
+            pytest.raises(ValueError, match="expected a new name"),
+            opened(tmp_path / name),
+        ):
             pass
     assert (tmp_path / "theirs").read_bytes() == MARK
     assert {path.name for path in tmp_path.iterdir()} == {"theirs", "out", "dangling"}
@@ -76,13 +88,17 @@ def test_a_link_at_the_name_counts_as_existing_and_is_not_followed(tmp_path, ope
 
 @NEW
 @pytest.mark.parametrize("links", [True, False])
-def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypatch, opened, links):
+def test_of_two_writers_at_once_the_first_to_end_has_the_name(
+    tmp_path, monkeypatch, opened, links
+):
     def refuse(*_):  # as a file system without hard links
         raise OSError(errno.EPERM, os.strerror(errno.EPERM))
 
     if not links:
         monkeypatch.setattr(os, "link", refuse)
-    taken = pytest.raises(ValueError, match="out: expected a new name to write to, got one that exists")
+    taken = pytest.raises(
+        ValueError, match="out: expected a new name to write to, got one that exists"
+    )
     with taken, opened(tmp_path / "out") as late:
         content_of(late).write_text("late")
         with opened(tmp_path / "out") as early:
@@ -97,10 +113,14 @@ def test_a_failure_leaves_an_earlier_file_as_it_was(tmp_path):
     path.write_bytes(MARK + b"one")
     with pytest.raises(ValueError, match="got No space left on device"):
         fail(replaced_file(path, MARK), FULL)
-    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("out.html", MARK + b"one")]
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [
+        ("out.html", MARK + b"one")
+    ]
 
 
-def test_only_marked_folders_of_this_target_that_are_not_in_use_count_as_interrupted(tmp_path):
+def test_only_marked_folders_of_this_target_that_are_not_in_use_count_as_interrupted(
+    tmp_path,
+):
     target = tmp_path / "out"
     in_use = Unfinished.begin(target, {"seed": 0})
     ended = Unfinished.begin(target, {"seed": 1})
@@ -110,7 +130,9 @@ def test_only_marked_folders_of_this_target_that_are_not_in_use_count_as_interru
         (tmp_path / f".out.{k}").mkdir()
         (tmp_path / f".out.{k}" / UNFINISHED).write_text(mark)
     (tmp_path / ".out.4").symlink_to(ended.path)
-    assert [(folder.path, folder.info) for folder in Unfinished.interrupted(target)] == [(ended.path, {"seed": 1})]
+    assert [
+        (folder.path, folder.info) for folder in Unfinished.interrupted(target)
+    ] == [(ended.path, {"seed": 1})]
     assert Unfinished.interrupted(target) == []  # it is in use now
     in_use.close()
     assert [folder.path for folder in Unfinished.interrupted(target)] == [in_use.path]
@@ -133,7 +155,9 @@ def test_a_finished_folder_replaces_an_earlier_one_but_no_other_files(tmp_path):
         (place.path / "ours").write_text(text)
         place.finish(["ours"], replace=True)
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-    assert [(path.name, path.read_text()) for path in target.iterdir()] == [("ours", "two")]
+    assert [(path.name, path.read_text()) for path in target.iterdir()] == [
+        ("ours", "two")
+    ]
     place = Unfinished.begin(target, {})
     (target / "theirs").write_text("theirs")
     with pytest.raises(OSError, match="theirs"):
@@ -168,5 +192,7 @@ def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():
         "observed = Silhouette.of(project(body, camera, pose[0], np.zeros(3)))\n"
         "print(PoseProblem.__name__, pose_costs(body, [camera], [observed], pose, np.zeros((1, 3)))[0][0])\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
     assert done.stdout == "PoseProblem 0.0\n", done.stderr

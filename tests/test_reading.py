@@ -14,12 +14,19 @@ def test_what_a_message_quotes_is_cut_at_80_characters():
     assert len(quoted("n" * 10_000)) == SHOWN == 80
     assert quoted("n" * 10_000).endswith("...")
     assert cut("\0" * 80) == r"\x00" * 19 + r"\..."
-    assert quoted(16**5000) == "one int that is too long to write"  # Python writes 4,300 digits at most
+    # Python writes 4,300 digits at most
+    assert quoted(16**5000) == "one int that is too long to write"
 
 
 def test_a_message_is_one_line_that_leaves_the_terminal_alone():
-    assert str(InputError("a" * 200 + "b" * 200 + ": bad")) == "a" * 38 + "..." + "b" * 38 + ":" + " bad"
-    assert str(InputError("a\nb\x1b[31m\x9b\u202ec é 人: bad")) == r"a\nb\x1b[31m\x9b\u202ec é 人: bad"
+    assert (
+        str(InputError("a" * 200 + "b" * 200 + ": bad"))
+        == "a" * 38 + "..." + "b" * 38 + ":" + " bad"
+    )
+    assert (
+        str(InputError("a\nb\x1b[31m\x9b\u202ec é 人: bad"))
+        == r"a\nb\x1b[31m\x9b\u202ec é 人: bad"
+    )
 
 
 def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):
@@ -29,7 +36,8 @@ def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):
 
 
 def test_a_text_that_is_too_large_or_no_utf_8_is_named(tmp_path):
-    path, pipe = tmp_path / "a.toml", tmp_path / "pipe"
+    path = tmp_path / "a.toml"
+    pipe = tmp_path / "pipe"
     path.write_bytes(b"a = \xff")
     os.mkfifo(pipe)
     for place, most, message in (
@@ -45,8 +53,12 @@ def test_a_text_that_is_too_large_or_no_utf_8_is_named(tmp_path):
 @each(
     ("parse", "text"),
     [
-        (parsed_toml, ".".join("a" * 100_000) + " = 1"),  # tomllib takes memory as the square of the parts
-        (parsed_toml, "\n".join(f"k{k}." + ".".join("a" * 900) + " = 1" for k in range(1000))),
+        # tomllib takes memory as the square of the parts
+        (parsed_toml, ".".join("a" * 100_000) + " = 1"),
+        (
+            parsed_toml,
+            "\n".join(f"k{k}." + ".".join("a" * 900) + " = 1" for k in range(1000)),
+        ),
         (parsed_toml, "a = " + "[" * 100_000),
         (parsed_json, "[" * 1_000_000),
     ],

@@ -17,14 +17,20 @@ def blocks(language: str) -> list[str]:
 def test_it_is_short_and_its_commands_are_those_of_ci() -> None:
     assert len(TEXT.splitlines()) < 100
     first, second = blocks("sh")
-    assert first.startswith("python -m pip install -e . && posefit track walk --out walk && posefit sweep default ")
+    assert first.startswith(
+        "python -m pip install -e . && posefit track walk --out walk && posefit sweep default "
+    )
     assert second == "python -m pip install -e '.[test]' && python -m pytest\n"
 
 
 def test_what_it_links_to_is_there() -> None:
     links = re.findall(r"\]\(([^)#]+)[^)]*\)", TEXT)
     assert len(links) > 10
-    assert [link for link in links if not link.startswith("http") and not (README.parent / link).exists()] == []
+    assert [
+        link
+        for link in links
+        if not link.startswith("http") and not (README.parent / link).exists()
+    ] == []
 
 
 def test_its_optimiser_keeps_every_rule() -> None:

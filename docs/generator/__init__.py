@@ -10,7 +10,16 @@ import re
 import shutil
 from pathlib import Path
 
-from generator import angles, commands, environments, equations, figures, joints, python, settings
+from generator import (
+    angles,
+    commands,
+    environments,
+    equations,
+    figures,
+    joints,
+    python,
+    settings,
+)
 
 DOCS = Path(__file__).parents[1]
 PARTS = {
@@ -24,7 +33,10 @@ _PART = re.compile(r"(<!-- from the code: \w+ -->\n).*?(<!-- end -->)", re.DOTAL
 
 def pages() -> dict[str, str]:
     """Return the text of every page in the repository of which a part is made from the code."""
-    return {name: _with_part((DOCS / name).read_text("utf-8"), make()) for name, make in PARTS.items()}
+    return {
+        name: _with_part((DOCS / name).read_text("utf-8"), make())
+        for name, make in PARTS.items()
+    }
 
 
 def write() -> None:
@@ -35,8 +47,14 @@ def write() -> None:
         "generated/commands.md": commands.page(),
         "generated/figures.md": figures.page(),
         "generated/settings.md": settings.page(),
-        **{f"generated/python/{name}.rst": text for name, text in python.pages().items()},
-        **{f"generated/environments/{name}.md": text for name, text in environments.pages().items()},
+        **{
+            f"generated/python/{name}.rst": text
+            for name, text in python.pages().items()
+        },
+        **{
+            f"generated/environments/{name}.md": text
+            for name, text in environments.pages().items()
+        },
     }.items():
         path = DOCS / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -6,7 +6,10 @@ from posefit.measuring.segments import SIDES
 
 def page() -> str:
     """Return the table, as Markdown."""
-    lines = ["| column, after `left_` or `right_` | of | a positive number |", "|---|---|---|"]
+    lines = [
+        "| column, after `left_` or `right_` | of | a positive number |",
+        "|---|---|---|",
+    ]
     lines += [
         f"| `{joint}_{angle}` | {' and '.join(reversed(BETWEEN[joint])).replace('_', ' ')} | {meaning} |"
         for joint, angles in MEANINGS.items()

@@ -11,13 +11,23 @@ WIDTH = 78  # columns: what click takes of a terminal of 80 or more
 
 def page() -> str:
     """Return every command with its help, as Markdown."""
-    return "\n\n".join(f"## `{name}`\n\n```text\n{text}\n```" for name, text in helps().items()) + "\n"
+    return (
+        "\n\n".join(
+            f"## `{name}`\n\n```text\n{text}\n```" for name, text in helps().items()
+        )
+        + "\n"
+    )
 
 
 def helps() -> dict[str, str]:
     """Return what `--help` prints of every command, a group before what it holds."""
-    context = click.Context(main, info_name="posefit", terminal_width=WIDTH, **main.context_settings)
-    return {inner.command_path: inner.command.get_help(inner) for inner in _contexts(context)}
+    context = click.Context(
+        main, info_name="posefit", terminal_width=WIDTH, **main.context_settings
+    )
+    return {
+        inner.command_path: inner.command.get_help(inner)
+        for inner in _contexts(context)
+    }
 
 
 def _contexts(context: click.Context) -> Iterator[click.Context]:

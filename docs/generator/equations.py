@@ -37,9 +37,13 @@ SOURCES = {
     "WHITTLE2007": "Whittle, Gait analysis: an introduction, 2007",
     "ALEXANDER1989": "Alexander, Optimization and gaits in the locomotion of vertebrates, 1989",
 }
-_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Interpretation S\d+)?$")
+_TAG = re.compile(
+    r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Interpretation S\d+)?$"
+)
 _WORDS = re.compile(r"[^a-z0-9]+")
-_TEST = re.compile(r"^def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<tag>.*))?$", re.MULTILINE)
+_TEST = re.compile(
+    r"^def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<tag>.*))?$", re.MULTILINE
+)
 
 
 class Tag(NamedTuple):
@@ -75,9 +79,16 @@ def tags() -> Iterator[Tag]:
                 match = _TAG.search(line)
                 if match is None:
                     continue
-                at = number if line[: match.start()].strip() else number + 1  # a tag on its own is of the next line
+                # a tag on its own is of the next line
+                at = number if line[: match.start()].strip() else number + 1
                 code = lines[at - 1].partition("  # ")[0].strip()
-                yield Tag(match["source"], match["step"], str(path.relative_to(ROOT)), at, code)
+                yield Tag(
+                    match["source"],
+                    match["step"],
+                    str(path.relative_to(ROOT)),
+                    at,
+                    code,
+                )
 
 
 def tests_of(tag: Tag) -> list[str]:
@@ -86,7 +97,10 @@ def tests_of(tag: Tag) -> list[str]:
     for path in sorted((ROOT / "tests" / "sources").glob("test_*.py")):
         for one in _TEST.finditer(path.read_text("utf-8")):
             carries = one["tag"] == f"{tag.source} {tag.step}"
-            if carries or (path.name == f"test_{tag.source.lower()}.py" and _is_named_after(one["name"], tag.step)):
+            if carries or (
+                path.name == f"test_{tag.source.lower()}.py"
+                and _is_named_after(one["name"], tag.step)
+            ):
                 names.append(f"{path.name}::{one['name']}")
     return names
 
@@ -98,10 +112,14 @@ def _is_named_after(test: str, step: str) -> bool:
     number, _, word = step.lower().partition(" ")
     number = f"eq{number}" if step.startswith("(") else number
     place = f"_{_WORDS.sub('_', number).strip('_')}_"
-    stem = word[:6] if word.isalpha() else word.replace(" ", "_")  # of velocity, also velocities
+    # of velocity, also velocities
+    stem = word[:6] if word.isalpha() else word.replace(" ", "_")
     return place in f"{test}_" and stem in test
 
 
 def _key(step: str) -> list[tuple[int, int, str]]:
     """Return what sorts steps as a reader counts: (2) before (10)."""
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.findall(r"\d+|[^\d]+", step)]
+    return [
+        (0, int(part), "") if part.isdigit() else (1, 0, part)
+        for part in re.findall(r"\d+|[^\d]+", step)
+    ]

@@ -28,7 +28,10 @@ REQUEST = {
     "camera": ("", "calibrated, guessed, or placed around a known motion"),
     "size_pixels": ("pixels", "of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
-    "dimensions": ("", "coordinates of a proposal; null of a tracker that searches no box"),
+    "dimensions": (
+        "",
+        "coordinates of a proposal; null of a tracker that searches no box",
+    ),
     "settings": ("", "what was set, or follows from the budget"),
 }
 
@@ -39,9 +42,15 @@ ROW = {
     "status": ("", "`done` or `quarantined`, after three failed attempts"),
     "reason": ("", "why a quarantined cell failed"),
     "kind": ("", "`track` or `search`"),
-    "evaluations_used": ("", "`evaluations` of summary.json; here `evaluations` is the budget of a frame"),
+    "evaluations_used": (
+        "",
+        "`evaluations` of summary.json; here `evaluations` is the budget of a frame",
+    ),
     "seconds": ("s", "wall time of the whole cell"),
-    "joint_errors_mm.JOINT": ("mm", "mean distance of one joint from the true one, both roots at one point"),
+    "joint_errors_mm.JOINT": (
+        "mm",
+        "mean distance of one joint from the true one, both roots at one point",
+    ),
 }
 SPENT = ("evaluations_used", "seconds", "joint_errors_mm.JOINT")
 RESULT = {
@@ -49,22 +58,43 @@ RESULT = {
         "",
         "of each [hypothesis](../howto/hypotheses.md): `beginning`, `cost`, `motion` term, and `kept`",
     ),
-    "build": ("m", "what was fitted: `stature_m`, `factors` on the average and their `spread`; or null"),
-    "trace": ("", "of a single frame: evaluations so far and best cost, after each population"),
+    "build": (
+        "m",
+        "what was fitted: `stature_m`, `factors` on the average and their `spread`; or null",
+    ),
+    "trace": (
+        "",
+        "of a single frame: evaluations so far and best cost, after each population",
+    ),
     "warnings": ("", "what to look at before the result is trusted"),
     "guesses": ("", "what posefit assumed, such as the camera, the rate or a height"),
-    "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first"),
+    "modes": (
+        "",
+        "weights of the tracks that the whole motion may be, the likeliest first",
+    ),
     "none_of_modes": ("", "mean probability that no mode of a frame is right"),
     "unknown_sides": ("", "frames whose left and right are called unknown"),
     "lost_frames": ("", "frames that are called lost"),
-    "relocalised": ("", "frames from which the person was searched for all around again"),
+    "relocalised": (
+        "",
+        "frames from which the person was searched for all around again",
+    ),
     "retracked_outside": (
         "",
         "first and last frame of what [was not tracked again](../howto/smoothing.md#a-body-that-spins)",
     ),
-    "backwards_share": ("", "share of frames in which the root faces away from its path, faster than 0.3 m/s"),
-    "trust": ("", "of footage, whether the track [can be trusted](../howto/trust.md), and why"),
-    "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
+    "backwards_share": (
+        "",
+        "share of frames in which the root faces away from its path, faster than 0.3 m/s",
+    ),
+    "trust": (
+        "",
+        "of footage, whether the track [can be trusted](../howto/trust.md), and why",
+    ),
+    "gait": (
+        "",
+        "[figures of the walk](../howto/measuring.md), or `why` there are none",
+    ),
 }
 HEAD = "| {0} | meaning |\n|---|---|"
 
@@ -85,13 +115,24 @@ def page() -> str:
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known. "
         f"{_shared()} are as above, of one frame. Then there are",
-        _table("column", [*_measured(_frame_only()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())]),
+        _table(
+            "column",
+            [*_measured(_frame_only()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())],
+        ),
         "## Columns of a sweep's CSV",
         "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
         "What the cell is: the fields [of a plan](../howto/plan.md#the-fields-of-a-cell), and",
-        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason", "kind")})),
+        _table(
+            "column",
+            _described(
+                {
+                    name: ROW[name]
+                    for name in ("key", "version", "status", "reason", "kind")
+                }
+            ),
+        ),
         "What it measured: the results of [`summary.json`](#keys-of-summary-json) but `evaluations_per_second`, and",
         _table("column", _described({name: ROW[name] for name in SPENT})),
     ]
@@ -99,7 +140,10 @@ def page() -> str:
 
 
 def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:
-    return [(one.name, one.unit if one.factor == 1.0 else RAW[one.unit], one.meaning) for one in measures]
+    return [
+        (one.name, one.unit if one.factor == 1.0 else RAW[one.unit], one.meaning)
+        for one in measures
+    ]
 
 
 def _described(values: Descriptions) -> list[tuple[str, str, str]]:
@@ -123,5 +167,8 @@ def _baselines() -> str:
 
 
 def _table(head: str, rows: Iterable[tuple[str, str, str]]) -> str:
-    lines = (f"| `{name}` | {f'{unit}: ' if unit else ''}{meaning} |" for name, unit, meaning in rows)
+    lines = (
+        f"| `{name}` | {f'{unit}: ' if unit else ''}{meaning} |"
+        for name, unit, meaning in rows
+    )
     return "\n".join([HEAD.format(head), *lines])

@@ -11,7 +11,9 @@ def page() -> str:
         "|---:|---|---|---|",
     ]
     for number, name in enumerate(JOINTS):
-        lines.append(f"| {number} | `{name}` | `{PLACES[number]}` | {_angles(number)} |")
+        lines.append(
+            f"| {number} | `{name}` | `{PLACES[number]}` | {_angles(number)} |"
+        )
     return "\n".join(lines) + "\n"
 
 

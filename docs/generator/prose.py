@@ -23,7 +23,9 @@ def restructured(lines: list[str]) -> list[str]:
 
 def shortened(signature: str) -> str:
     """Return a signature with `Array` for numpy's longer name of it, and without the defaults that have no text."""
-    named = _ARRAY.sub(lambda one: "Array" if one[1] == "float64" else f"Array[{one[1]}]", signature)
+    named = _ARRAY.sub(
+        lambda one: "Array" if one[1] == "float64" else f"Array[{one[1]}]", signature
+    )
     return named.replace("<factory>", "...")
 
 
@@ -45,7 +47,11 @@ def _block(block: list[str]) -> list[str]:
         return _table(block)
     if sum(bool(_COLUMNS.search(line.strip())) for line in block) >= 2:
         return ["::", "", *(f"    {line}" for line in block)]
-    if len(block) > 1 and block[0].rstrip().endswith(":") and block[1].startswith("    "):
+    if (
+        len(block) > 1
+        and block[0].rstrip().endswith(":")
+        and block[1].startswith("    ")
+    ):
         return [*_block(block[:1]), "", *_entries(block[1:])]
     heading = re.fullmatch(r"#+ (.*)", block[0])
     if heading:
@@ -61,7 +67,9 @@ def _entries(lines: list[str]) -> list[str]:
         text = _escaped(line.strip())
         if len(line) - len(line.lstrip()) == base:
             name, colon, rest = text.partition(":")
-            out.append(f"* **{name}**:{rest}" if colon and "`" not in name else f"* {text}")
+            out.append(
+                f"* **{name}**:{rest}" if colon and "`" not in name else f"* {text}"
+            )
         else:
             out.append(f"  {text}")
     return out
@@ -69,8 +77,12 @@ def _entries(lines: list[str]) -> list[str]:
 
 def _table(lines: list[str]) -> list[str]:
     """Return a table of Markdown as a list-table."""
-    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines]
-    rows = [row for row in rows if not all(re.fullmatch(r":?-+:?", cell) for cell in row)]
+    rows = [
+        [cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines
+    ]
+    rows = [
+        row for row in rows if not all(re.fullmatch(r":?-+:?", cell) for cell in row)
+    ]
     out = [".. list-table::", "   :header-rows: 1", ""]
     for row in rows:
         for k, cell in enumerate(row):
@@ -84,7 +96,9 @@ def _escaped(text: str) -> str:
     for k, part in enumerate(parts):
         if k % 2:
             following = parts[k + 1][:1]
-            parts[k] = f"``{part[1:-1].strip()}``" + ("\\ " if following.isalnum() else "")
+            parts[k] = f"``{part[1:-1].strip()}``" + (
+                "\\ " if following.isalnum() else ""
+            )
         else:
             parts[k] = re.sub(r"([*|\\])", r"\\\1", part)
             parts[k] = re.sub(r"(?<=\w)_(?!\w)", r"\\_", parts[k])

@@ -12,7 +12,11 @@ ROOT = Path(__file__).parents[2]
 def pages() -> dict[str, str]:
     """Return a page for each package, by its name, and one that lists them."""
     packages = {name: _modules(name) for name in _packages()}
-    alone = [f"posefit.{one.name}" for one in pkgutil.iter_modules([str(ROOT / "posefit")]) if _alone(one)]
+    alone = [
+        f"posefit.{one.name}"
+        for one in pkgutil.iter_modules([str(ROOT / "posefit")])
+        if _alone(one)
+    ]
     pages = {name: _page(name, modules) for name, modules in packages.items()}
     pages["posefit"] = _page("posefit", alone)
     return pages
@@ -24,14 +28,24 @@ def _alone(module: pkgutil.ModuleInfo) -> bool:
 
 def _packages() -> list[str]:
     """Return the packages of posefit, its plugins and its environments."""
-    inner = [f"posefit.{one.name}" for one in pkgutil.iter_modules([str(ROOT / "posefit")]) if one.ispkg]
-    outer = [path.name for folder in ("plugins", "envs") for path in sorted((ROOT / folder).glob("posefit_*"))]
+    inner = [
+        f"posefit.{one.name}"
+        for one in pkgutil.iter_modules([str(ROOT / "posefit")])
+        if one.ispkg
+    ]
+    outer = [
+        path.name
+        for folder in ("plugins", "envs")
+        for path in sorted((ROOT / folder).glob("posefit_*"))
+    ]
     return [*inner, *outer]
 
 
 def _modules(package: str) -> list[str]:
     path = importlib.import_module(package).__path__
-    modules = sorted(module.name for module in pkgutil.walk_packages(path, f"{package}."))
+    modules = sorted(
+        module.name for module in pkgutil.walk_packages(path, f"{package}.")
+    )
     return [name for name in modules if ast.get_docstring(ast.parse(_source(name)))]
 
 
@@ -45,8 +59,22 @@ def _source(name: str) -> str:
 
 def _page(package: str, modules: list[str]) -> str:
     members = [] if modules else ["   :members:"]
-    lines = [f"``{package}``", "=" * (len(package) + 4), "", f".. automodule:: {package}", *members, ""]
+    lines = [
+        f"``{package}``",
+        "=" * (len(package) + 4),
+        "",
+        f".. automodule:: {package}",
+        *members,
+        "",
+    ]
     for module in modules:
-        lines += [f"``{module}``", "-" * (len(module) + 4), "", f".. automodule:: {module}", "   :members:"]
-        lines += ["   :ignore-module-all:", ""]  # what a module imports has its entry elsewhere
+        lines += [
+            f"``{module}``",
+            "-" * (len(module) + 4),
+            "",
+            f".. automodule:: {module}",
+            "   :members:",
+        ]
+        # what a module imports has its entry elsewhere
+        lines += ["   :ignore-module-all:", ""]
     return "\n".join(lines)

@@ -20,9 +20,16 @@ def page() -> str:
     offers = registry().offers
     parts = []
     for kind in KINDS:
-        mine = [offer for offer in offers[kind].values() if offer.distribution == PROJECT]
-        adapters = [offer for offer in mine if kind == "optimiser" and offer.needs is not None]
-        parts += [f"## {kind.capitalize()}s", *(_method(offer) for offer in mine if offer not in adapters)]
+        mine = [
+            offer for offer in offers[kind].values() if offer.distribution == PROJECT
+        ]
+        adapters = [
+            offer for offer in mine if kind == "optimiser" and offer.needs is not None
+        ]
+        parts += [
+            f"## {kind.capitalize()}s",
+            *(_method(offer) for offer in mine if offer not in adapters),
+        ]
         if adapters:
             names = ", ".join(f"`{offer.name}`" for offer in adapters)
             parts += [
@@ -38,7 +45,11 @@ def tracker() -> str:
 
 
 def _method(offer: Offer) -> str:
-    needs = "" if offer.needs is None else f"\n\nIt needs a library: `python -m pip install '{offer.needs[1]}'`."
+    needs = (
+        ""
+        if offer.needs is None
+        else f"\n\nIt needs a library: `python -m pip install '{offer.needs[1]}'`."
+    )
     return f"### `{offer.name}`\n\n{_described(offer.name, offer.factory, needs)}"
 
 
@@ -48,13 +59,20 @@ def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
     Raises KeyError where the docstring lacks a setting.
     """
     text = inspect.getdoc(factory) or ""
-    said, settings = settings_in(text), settings_of(factory)
+    said = settings_in(text)
+    settings = settings_of(factory)
     if not settings:
         return f"{text}{more}\n\nIt has no settings."
     lines = []
     for setting in settings:
         symbol, meaning = said[setting.name]
-        default = "" if setting.default is inspect.Parameter.empty else f"={setting_text(setting.default)}"
-        lines.append(f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}")
+        default = (
+            ""
+            if setting.default is inspect.Parameter.empty
+            else f"={setting_text(setting.default)}"
+        )
+        lines.append(
+            f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}"
+        )
     summary = without_settings(text).split("\n\n")[0]
     return f"{summary}{more}\n\n" + "\n".join(lines)

@@ -31,7 +31,9 @@ from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
 NAME = "posefit_envs:posefit/FitImage-v0"
 HELD_OUT = 10_000  # the first instance of the test split
-INSTANCES, SEEDS, STEPS = 200, 3, 270_000
+INSTANCES = 200
+SEEDS = 3
+STEPS = 270_000
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
 VARIANTS: dict[str, dict[str, Any]] = {
     "walks": {},
@@ -49,12 +51,20 @@ SEARCHES = ("sapso", "cma")
 CONSTANTS = ("uniform", "the truth, projected")
 LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
 # CMA-ES that starts from the best of PPO's proposals
-STARTED, STARTED_BUDGET, STARTED_SPREAD = "PPO, then cma", 200, 0.1
-ENVIRONMENTS, ROLLOUT, BATCH, EPOCHS = 64, 16, 256, 6
-LEARNING_RATE, LOG_DEVIATION = 1.5e-3, -1.6
+STARTED = "PPO, then cma"
+STARTED_BUDGET = 200
+STARTED_SPREAD = 0.1
+ENVIRONMENTS = 64
+ROLLOUT = 16
+BATCH = 256
+EPOCHS = 6
+LEARNING_RATE = 1.5e-3
+LOG_DEVIATION = -1.6
 SHOWN = (12, 16)  # height and width of the pictures that networks take
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
-CLONING_STEPS, CLONED_LOG_DEVIATION = 30_720, -2.3  # before PPO goes on, from where it draws nearer to the means
+# before PPO goes on, from where it draws nearer to the means
+CLONING_STEPS = 30_720
+CLONED_LOG_DEVIATION = -2.3
 WHITE = (255, 255, 255)
 
 Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
@@ -77,9 +87,13 @@ def check_learners() -> None:
 
 def made(training: Training, count: int, **arguments: Any) -> Any:
     """Return a vector environment of a variant with small pictures; the observed ones are blank for a blank agent."""
-    env = ResizeObservation(gym.make_vec(NAME, count, **VARIANTS[training.variant], **arguments), SHOWN)
+    env = ResizeObservation(
+        gym.make_vec(NAME, count, **VARIANTS[training.variant], **arguments), SHOWN
+    )
     channels = np.arange(env.single_observation_space.shape[-1])
-    mask = (channels % 2 if "blank" in training.agent else np.ones_like(channels)).astype(np.uint8)
+    mask = (
+        channels % 2 if "blank" in training.agent else np.ones_like(channels)
+    ).astype(np.uint8)
     return TransformObservation(env, lambda pictures: pictures * mask)
 
 
@@ -87,7 +101,8 @@ def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array,
     """Return the actions (k, n, d) and costs (k, n) of an episode on each held-out instance."""
     env = made(training, INSTANCES, max_evaluations=proposals)
     pictures, _ = env.reset(seed=0, options={"instance": TESTED})
-    actions, costs = [], []
+    actions = []
+    costs = []
     for _ in range(proposals):
         actions.append(np.clip(policy(pictures), -1.0, 1.0))
         pictures, _, _, _, infos = env.step(actions[-1])
@@ -95,9 +110,12 @@ def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array,
     return np.array(actions), np.array(costs)
 
 
-def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def row_of(
+    training: Training, start: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     """Return a row: the best costs on held-out instances, the proposals, and what the training took."""
-    start_time, row = process_time(), training._asdict()
+    start_time = process_time()
+    row = training._asdict()
     if training.agent in (*SEARCHES, STARTED):
         row["costs"] = searched(training, start)
         return row | {"cpu_seconds": round(process_time() - start_time, 1)}
@@ -108,13 +126,17 @@ def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[s
     actions, costs = episodes(policy, training, count)
     row["costs"] = costs.min(axis=0).tolist()
     if learns:
-        row |= {"proposals": actions.round(4).tolist(), "proposal_costs": costs.round(2).tolist()}
+        row |= {
+            "proposals": actions.round(4).tolist(),
+            "proposal_costs": costs.round(2).tolist(),
+        }
     return row
 
 
 def constant(training: Training) -> Policy:
     """Return the policy of a reference that does not look."""
-    rng, env = np.random.default_rng(training.seed), made(training, INSTANCES)
+    rng = np.random.default_rng(training.seed)
+    env = made(training, INSTANCES)
     if training.agent == "uniform":
         return lambda _: rng.uniform(-1.0, 1.0, env.action_space.shape)
     env.reset(options={"instance": TESTED})
@@ -125,22 +147,34 @@ def constant(training: Training) -> Policy:
 def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
     """Return the costs that an optimiser reaches on the held-out instances, blindly or from a row's proposals."""
     name = "cma" if training.agent == STARTED else training.agent
-    env, costs = made(training, INSTANCES), []
+    env = made(training, INSTANCES)
+    costs = []
     env.reset(options={"instance": TESTED})
     for number, problem in enumerate(env.unwrapped.problems):
         space = problem.space
         if start is not None:
             best = int(np.argmin(np.array(start["proposal_costs"])[:, number]))
             mean = np.array(start["proposals"])[best, number]
-            space = replace(space, start=Start(mean, np.full(len(mean), STARTED_SPREAD), np.zeros(len(mean))))
-        costs.append(minimum(problem, space, name, training.budget, [training.seed, number]).cost)
+            space = replace(
+                space,
+                start=Start(
+                    mean, np.full(len(mean), STARTED_SPREAD), np.zeros(len(mean))
+                ),
+            )
+        costs.append(
+            minimum(problem, space, name, training.budget, [training.seed, number]).cost
+        )
     return costs if start is None else np.minimum(costs, start["costs"]).tolist()
 
 
-def minimum(problem: PoseProblem, space: Space, name: str, budget: int, seed: Sequence[int]) -> Minimum:
+def minimum(
+    problem: PoseProblem, space: Space, name: str, budget: int, seed: Sequence[int]
+) -> Minimum:
     """Return what an optimiser finds in a space of a problem, with one population where the budget holds no more."""
     factory = registry().optimiser(name)
-    settings = planned(factory, {"population_size": budget} if budget < 40 else {}, budget)
+    settings = planned(
+        factory, {"population_size": budget} if budget < 40 else {}, budget
+    )
     optimiser = factory(space, np.random.default_rng(seed), **settings)
     return minimise(problem.evaluate, optimiser, budget, budget_known=True)
 
@@ -151,7 +185,11 @@ def ppo(vector: Any, seed: int) -> Any:
     from stable_baselines3 import PPO
 
     torch.set_num_threads(1)
-    policy_settings = {"log_std_init": LOG_DEVIATION, "net_arch": NETWORKS, "activation_fn": torch.nn.ReLU}
+    policy_settings = {
+        "log_std_init": LOG_DEVIATION,
+        "net_arch": NETWORKS,
+        "activation_fn": torch.nn.ReLU,
+    }
     return PPO(
         "MlpPolicy", vector, seed=seed, device="cpu", gamma=0.0,
         learning_rate=lambda left: LEARNING_RATE * left,
@@ -161,7 +199,9 @@ def ppo(vector: Any, seed: int) -> Any:
 
 def trained(training: Training) -> Policy:
     """Return the policy of a learner, the mean of its distribution."""
-    model = ppo(to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed)
+    model = ppo(
+        to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed
+    )
     learning = training.budget
     if "cloning" in training.agent:
         cloned(model, made(training, ENVIRONMENTS))
@@ -169,7 +209,9 @@ def trained(training: Training) -> Policy:
         learning -= CLONING_STEPS
     if learning:
         model.learn(learning)
-    return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
+    return lambda pictures: np.asarray(
+        model.predict(pictures, deterministic=True)[0], dtype=np.float64
+    )
 
 
 def cloned(model: Any, env: Any) -> None:
@@ -177,18 +219,26 @@ def cloned(model: Any, env: Any) -> None:
     import torch
 
     pictures, infos = env.reset(seed=model.seed)
-    truths, length = infos["truth"].copy(), ROLLOUT * ENVIRONMENTS
+    truths = infos["truth"].copy()
+    length = ROLLOUT * ENVIRONMENTS
     for _ in range(CLONING_STEPS // length):
-        shown, targets = [], []
+        shown = []
+        targets = []
         for _ in range(ROLLOUT):
             shown.append(pictures)
             targets.append(truths.copy())
-            pictures, _, _, _, infos = env.step(np.clip(model.predict(shown[-1])[0], -1.0, 1.0))
+            pictures, _, _, _, infos = env.step(
+                np.clip(model.predict(shown[-1])[0], -1.0, 1.0)
+            )
             if "truth" in infos:
                 truths[infos["_truth"]] = infos["truth"][infos["_truth"]]
         inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
         answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
-        for rows in [part for _ in range(EPOCHS) for part in torch.split(torch.randperm(length), BATCH)]:
+        for rows in [
+            part
+            for _ in range(EPOCHS)
+            for part in torch.split(torch.randperm(length), BATCH)
+        ]:
             means = model.policy.get_distribution(inputs[rows]).distribution.mean
             model.policy.optimizer.zero_grad()
             (means - answers[rows]).square().sum(dim=1).mean().backward()
@@ -201,24 +251,50 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for row in rows:
         groups.setdefault(row["agent"], {}).setdefault(row["budget"], []).append(row)
     blind = {
-        name: {budget: float(np.mean([row["costs"] for row in group])) for budget, group in groups[name].items()}
+        name: {
+            budget: float(np.mean([row["costs"] for row in group]))
+            for budget, group in groups[name].items()
+        }
         for name in SEARCHES
     }
     cells = []
     for agent, budgets in groups.items():
         if agent in SEARCHES:
-            proposals, cost = "; ".join(f"{n:,}" for n in budgets), "; ".join(f"{c:.1f}" for c in blind[agent].values())
+            proposals = "; ".join(f"{n:,}" for n in budgets)
+            cost = "; ".join(f"{c:.1f}" for c in blind[agent].values())
             cells.append([agent, proposals, "", "", "", cost, "", "", ""])
             continue
         ((budget, group),) = budgets.items()
         costs = np.array([row["costs"] for row in group])
-        proposals = {STARTED: f"8 + {budget}", "uniform": "8"}.get(agent, "8" if agent in LEARNERS else "1")
-        steps, cpu = f"{budget:,}", f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
+        proposals = {STARTED: f"8 + {budget}", "uniform": "8"}.get(
+            agent, "8" if agent in LEARNERS else "1"
+        )
+        steps = f"{budget:,}"
+        cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
         training = [steps, cpu, str(len(group))] if agent in LEARNERS else ["", "", ""]
         low, high = quantiles(drawn_means(costs))
         equal = [equivalent(blind[name], float(costs.mean())) for name in SEARCHES]
-        cells.append([agent, proposals, *training, f"{costs.mean():.1f}", f"{low:.1f} to {high:.1f}", *equal])
-    heads = ["", "proposals", "steps", "CPU s", "seeds", "cost", "95 % interval", "as SAPSO", "as CMA-ES"]
+        cells.append(
+            [
+                agent,
+                proposals,
+                *training,
+                f"{costs.mean():.1f}",
+                f"{low:.1f} to {high:.1f}",
+                *equal,
+            ]
+        )
+    heads = [
+        "",
+        "proposals",
+        "steps",
+        "CPU s",
+        "seeds",
+        "cost",
+        "95 % interval",
+        "as SAPSO",
+        "as CMA-ES",
+    ]
     yield from markdown(heads, cells)
 
 
@@ -227,7 +303,8 @@ def equivalent(blind: Mapping[int, float], cost: float) -> str:
 
     The costs of a search are those after so many evaluations, which rise nowhere.
     """
-    budgets, costs = np.array(list(blind)), -np.minimum.accumulate(list(blind.values()))
+    budgets = np.array(list(blind))
+    costs = -np.minimum.accumulate(list(blind.values()))
     if not -costs[-1] <= cost <= -costs[0]:
         return f"< {budgets[0]}" if cost > -costs[0] else f"> {budgets[-1]:,}"
     return f"{np.exp(np.interp(-cost, costs, np.log(budgets))):,.0f}"
@@ -244,17 +321,53 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     for proposals in row["proposals"]:
         info = env.step(np.array(proposals[instance]))[-1]
         panel = np.ascontiguousarray(np.asarray(env.render())[:240, 80:240])
-        cv2.putText(panel, f"{info['cost']:.1f}", (8, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.8, WHITE, 2, cv2.LINE_AA)
+        cv2.putText(
+            panel,
+            f"{info['cost']:.1f}",
+            (8, 28),
+            cv2.FONT_HERSHEY_SIMPLEX,
+            0.8,
+            WHITE,
+            2,
+            cv2.LINE_AA,
+        )
         panels.append(panel)
     cv2.imwrite(path, np.hstack(panels)[..., ::-1])
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--variant", "names", multiple=True, type=click.Choice(list(VARIANTS)), help="By default walks alone.")
-@click.option("--agent", "agents", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
-@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
-@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
-@click.option("--picture", "drawn", metavar="FILE", help="A PNG of the first PPO's eight proposals.")
+@click.option(
+    "--variant",
+    "names",
+    multiple=True,
+    type=click.Choice(list(VARIANTS)),
+    help="By default walks alone.",
+)
+@click.option(
+    "--agent",
+    "agents",
+    multiple=True,
+    type=click.Choice(LEARNERS),
+    help="By default all. Again for more.",
+)
+@click.option(
+    "--seeds",
+    type=click.IntRange(1),
+    default=SEEDS,
+    show_default=True,
+    help="Trainings of each.",
+)
+@click.option(
+    "--rows",
+    metavar="FILE",
+    help="A file for a row a line: the same command continues there.",
+)
+@click.option(
+    "--picture",
+    "drawn",
+    metavar="FILE",
+    help="A PNG of the first PPO's eight proposals.",
+)
 @WORKERS
 def main(
     names: tuple[str, ...],
@@ -270,20 +383,28 @@ def main(
     turns = []
     for variant in names or ("walks",):
         turns += [Training(variant, agent, 0, 0) for agent in CONSTANTS]
-        turns += [Training(variant, agent, budget, 0) for agent in SEARCHES for budget in BUDGETS]
+        turns += [
+            Training(variant, agent, budget, 0)
+            for agent in SEARCHES
+            for budget in BUDGETS
+        ]
         turns += [
             Training(variant, name, CLONING_STEPS if name == "cloning" else STEPS, seed)
             for seed in range(seeds)
             for name in agents or LEARNERS
         ]
-    done = measured({turn: partial(row_of, turn) for turn in turns}, rows, keyed(Training), workers)
+    done = measured(
+        {turn: partial(row_of, turn) for turn in turns}, rows, keyed(Training), workers
+    )
     for turn in turns:
         if turn.agent == "PPO":
             started = Training(turn.variant, STARTED, STARTED_BUDGET, turn.seed)
             done[started] = row_of(started, done[turn])
     for variant in names or ("walks",):
         click.echo(f"\n{variant}, {INSTANCES} held-out instances\n")
-        for line in table([row for turn, row in done.items() if turn.variant == variant]):
+        for line in table(
+            [row for turn, row in done.items() if turn.variant == variant]
+        ):
             click.echo(line)
     if drawn is not None:
         picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)

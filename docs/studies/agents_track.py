@@ -16,7 +16,16 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation
 
-from agents import ENVIRONMENTS, HELD_OUT, SEARCHES, SHOWN, STEPS, check_learners, minimum, ppo
+from agents import (
+    ENVIRONMENTS,
+    HELD_OUT,
+    SEARCHES,
+    SHOWN,
+    STEPS,
+    check_learners,
+    minimum,
+    ppo,
+)
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit_envs import to_sb3_vec_env
@@ -28,9 +37,14 @@ from table import WORKERS, bar, drawn_means, markdown, quantiles
 NAME = "posefit_envs:posefit/Track-v0"
 STACKED = 4  # the latest pictures that the agent sees
 BUDGETS = (8, 40, 100, 200)  # evaluations of a frame, of blind searches
-SEEDS, INSTANCES = 2, 100
+SEEDS = 2
+INSTANCES = 100
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
-SHOWN_FRAMES = {"of first frames": slice(1), "of the fourth to sixth": slice(3, 6), "of last ones": slice(-1, None)}
+SHOWN_FRAMES = {
+    "of first frames": slice(1),
+    "of the fourth to sixth": slice(3, 6),
+    "of last ones": slice(-1, None),
+}
 DIMENSIONS = 9  # of a proposal
 
 
@@ -47,7 +61,8 @@ def committed(act: Callable[[Any], Array]) -> Array:
     """Return the costs (n, frames) that a policy commits in the held-out tracks."""
     vector, env = stacked(INSTANCES)
     vector.set_options({"instance": TESTED})
-    pictures, costs = env.reset(), []
+    pictures = env.reset()
+    costs = []
     for step in range(1, FRAMES * MAX_EVALUATIONS + 1):
         pictures, _, _, infos = env.step(act(pictures))
         if step % MAX_EVALUATIONS == 0:
@@ -84,7 +99,11 @@ def row_of(agent: str, budget: int, seed: int) -> dict[str, Any]:
     if agent in SEARCHES:
         return {"costs": searched(agent, budget), "cpu_seconds": process_time() - start}
     rng = np.random.default_rng(seed)
-    policy = trained(seed) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
+    policy = (
+        trained(seed)
+        if agent == "PPO"
+        else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
+    )
     cpu = process_time() - start
     return {"costs": committed(policy), "cpu_seconds": cpu}
 
@@ -97,12 +116,32 @@ def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]]) -> Iterator[st
     cells = []
     for (agent, budget), group in groups.items():
         cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
-        training = [f"{STEPS:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
+        training = (
+            [f"{STEPS:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
+        )
         costs = np.array([row["costs"] for row in group])  # (seeds, n, frames)
         low, high = quantiles(drawn_means(costs.mean(axis=2)))
         shown = [f"{costs[..., frames].mean():.1f}" for frames in SHOWN_FRAMES.values()]
-        cells.append([agent, f"{budget:,}", *training, f"{costs.mean():.1f}", f"{low:.1f} to {high:.1f}", *shown])
-    heads = ["", "evaluations a frame", "steps", "CPU s", "seeds", "cost", "95 % interval", *SHOWN_FRAMES]
+        cells.append(
+            [
+                agent,
+                f"{budget:,}",
+                *training,
+                f"{costs.mean():.1f}",
+                f"{low:.1f} to {high:.1f}",
+                *shown,
+            ]
+        )
+    heads = [
+        "",
+        "evaluations a frame",
+        "steps",
+        "CPU s",
+        "seeds",
+        "cost",
+        "95 % interval",
+        *SHOWN_FRAMES,
+    ]
     yield from markdown(heads, cells)
 
 

@@ -25,25 +25,40 @@ from table import WORKERS, bar, markdown
 SAGITTAL = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
 
-def angle_errors(true: Motion, angles: Mapping[str, Array], seen: NDArray[np.bool_]) -> dict[str, float]:
+def angle_errors(
+    true: Motion, angles: Mapping[str, Array], seen: NDArray[np.bool_]
+) -> dict[str, float]:
     """Return errors in degrees of angles (T,) of both sides in the frames `seen`, that an estimate has.
 
     The root mean square error of each angle, and under `_varies` the one that is left without the mean difference.
     """
-    truth, found = clinical_angles(true.skeleton, true.poses), {}
+    truth = clinical_angles(true.skeleton, true.poses)
+    found = {}
     for name in SAGITTAL:
-        off = np.array([(angles[f"{side}_{name}"] - truth[f"{side}_{name}"])[seen] for side in ("left", "right")])
+        off = np.array(
+            [
+                (angles[f"{side}_{name}"] - truth[f"{side}_{name}"])[seen]
+                for side in ("left", "right")
+            ]
+        )
         found[name] = float(np.sqrt(np.nanmean(off**2)))
-        found[f"{name}_varies"] = float(np.sqrt(np.nanmean((off - np.nanmean(off, axis=1, keepdims=True)) ** 2)))
+        found[f"{name}_varies"] = float(
+            np.sqrt(np.nanmean((off - np.nanmean(off, axis=1, keepdims=True)) ** 2))
+        )
     return found
 
 
 def walk_errors(cell: TrackCell) -> dict[str, float]:
     """Return the errors of a recorded walk, tracked with its translation aligned."""
     result = track_of(cell, cell_scene(cell), translation="aligned")
-    true, estimate = result.truth, result.motion
+    true = result.truth
+    estimate = result.motion
     assert true is not None
-    return angle_errors(true, clinical_angles(estimate.skeleton, estimate.poses), np.ones(len(true), dtype=bool))
+    return angle_errors(
+        true,
+        clinical_angles(estimate.skeleton, estimate.poses),
+        np.ones(len(true), dtype=bool),
+    )
 
 
 def walk_lines(workers: int | None) -> Iterator[str]:
@@ -59,8 +74,15 @@ def walk_lines(workers: int | None) -> Iterator[str]:
     cells = []
     for views, rows in by_views.items():
         medians = [np.median([row[name] for row in rows]) for name in names]
-        cells.append([" + ".join(f"{view:g}" for view in views), *(f"{median:.1f}" for median in medians)])
-    yield from markdown(["view, degrees", *(name.replace("_", " ") for name in names)], cells)
+        cells.append(
+            [
+                " + ".join(f"{view:g}" for view in views),
+                *(f"{median:.1f}" for median in medians),
+            ]
+        )
+    yield from markdown(
+        ["view, degrees", *(name.replace("_", " ") for name in names)], cells
+    )
 
 
 @click.command(cls=Command, help=__doc__)

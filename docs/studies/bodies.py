@@ -48,8 +48,18 @@ from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.shape import COVARIANCE, LENGTHS, NAMES, shaped
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_root_angles
-from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, angle_index, joint_distances, kind
+from posefit.geometry.rotation import (
+    joint_angles_from_rotation,
+    rotation_from_root_angles,
+)
+from posefit.geometry.skeleton import (
+    BONES,
+    JOINTS,
+    PARENTS,
+    angle_index,
+    joint_distances,
+    kind,
+)
 from posefit.measuring.gait import Gait, gait_of
 from posefit.measuring.segments import SIDES
 from posefit.motion import built_in, recorded
@@ -81,28 +91,52 @@ OFFSETS: Mapping[str, tuple[float, float, float]] = {
     "humerus": (0.005, 0.007, 0.007),
     "radius": (0.005, 0.007, 0.007),
 }
-CALIBRATION_OFF = (np.radians(0.2), 0.01, 0.005)  # deviations of rotation, place in metres, and focal length
-RIM, ROUGH = 0.5, 0.7  # pixels: deviations of a film's border, and of the border along the outline
+# deviations of rotation, place in metres, and focal length
+CALIBRATION_OFF = (np.radians(0.2), 0.01, 0.005)
+# pixels: deviations of a film's border, and of the border along the outline
+RIM = 0.5
+ROUGH = 0.7
 DAMAGE = {"holes": 0.1, "blobs": 0.1}
 SHADOW = 0.15
 LANDMARK_OFF = 0.02  # metres, of a film and again of each frame
-EXCHANGED = (0.03, 0.15, 0.4)  # shares of the frames in which a film's landmarks exchange legs, or arms
+# shares of the frames in which a film's landmarks exchange legs, or arms
+EXCHANGED = (0.03, 0.15, 0.4)
 EXCHANGE_FRAMES = 6.0  # that such an exchange lasts on average
 LONGEST = 60  # frames of those who stay
 WALK_METRES = 2.6
 BODIES = 10
-SEVERAL, SEEDS = 10, 5  # films, and seeds that each of them is tracked with
+# films, and seeds that each of them is tracked with
+SEVERAL = 10
+SEEDS = 5
 SOONER = 60  # films before the other seeds
-GRID = 1e-3 * np.array([0, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70, 80, 100, 120, 150])  # metres of shared error
+# metres of shared error
+GRID = 1e-3 * np.array(
+    [0, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70, 80, 100, 120, 150]
+)
 STRIDE = 2  # frames of which the first is counted
-JOINTS_OF = {part: [j for j, joint in enumerate(JOINTS) if kind(joint) in names] for part, names in PARTS.items()}
+JOINTS_OF = {
+    part: [j for j, joint in enumerate(JOINTS) if kind(joint) in names]
+    for part, names in PARTS.items()
+}
 SEGMENTS = {
     name: BONES.index(f"l{bone}")
-    for name, bone in {"thigh": "femur", "shank": "tibia", "upper arm": "humerus", "forearm": "radius"}.items()
+    for name, bone in {
+        "thigh": "femur",
+        "shank": "tibia",
+        "upper arm": "humerus",
+        "forearm": "radius",
+    }.items()
 }
-LEGS = [j for j, joint in enumerate(JOINTS) if kind(joint) in ("femur", "tibia", "foot")]  # knees, ankles, balls
-RIGHT_MM, WRONG_MM = 65.0, 75.0  # MPJPE of a track: at most, at least
-LIMP_DEGREES, LIMP_WARP = 7.0, 0.15  # of one thigh, and of the time: the share by which a cycle runs faster and slower
+# knees, ankles, balls
+LEGS = [
+    j for j, joint in enumerate(JOINTS) if kind(joint) in ("femur", "tibia", "foot")
+]
+# MPJPE of a track: at most, at least
+RIGHT_MM = 65.0
+WRONG_MM = 75.0
+# of one thigh, and of the time: the share by which a cycle runs faster and slower
+LIMP_DEGREES = 7.0
+LIMP_WARP = 0.15
 
 
 class Act(NamedTuple):
@@ -115,15 +149,28 @@ class Act(NamedTuple):
 
 
 ACTS: Mapping[str, Sequence[Act]] = {
-    "through": [Act(clip, 90.0, True) for clip in ("02_01", "05_01", "09_12", "16_16", "16_22", "29_01", "49_01")],
+    "through": [
+        Act(clip, 90.0, True)
+        for clip in ("02_01", "05_01", "09_12", "16_16", "16_22", "29_01", "49_01")
+    ],
     "towards": [Act(clip, 15.0, True) for clip in ("02_01", "16_16", "49_01")],
     "away": [Act(clip, 180.0, True) for clip in ("05_01", "16_22", "29_01")],
     "aslant": [Act(clip, 45.0, True) for clip in ("16_16", "09_12", "49_01")],
-    "waves": [Act("29_05", 20.0, start=60), Act("14_05", 0.0, start=40), Act("02_06", 30.0)],
+    "waves": [
+        Act("29_05", 20.0, start=60),
+        Act("14_05", 0.0, start=40),
+        Act("02_06", 30.0),
+    ],
     "squats": [Act("02_06", 40.0, start=180), Act("14_06", 60.0), Act("14_20", 20.0)],
-    "turns": [Act("29_01", 60.0, start=100), Act("09_12", 30.0, start=200), Act("17_03", 80.0)],
+    "turns": [
+        Act("29_01", 60.0, start=100),
+        Act("09_12", 30.0, start=200),
+        Act("17_03", 80.0),
+    ],
 }
-LIMPS = [Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "16_22", "49_01")]
+LIMPS = [
+    Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "16_22", "49_01")
+]
 
 
 class Shot(NamedTuple):
@@ -146,14 +193,24 @@ class Shot(NamedTuple):
 
 def shots() -> list[Shot]:
     """Return all films, whose bodies take turns; those by several cameras have no landmarks, as is the default."""
-    listed, body = [], 0
+    listed = []
+    body = 0
     for again in range(2):
         for situation, acts in [*ACTS.items(), *([] if again else [("limp", LIMPS)])]:
             for number in range(len(acts)):
                 for views in (1, 2) if situation == "limp" else PLACES:
-                    listed.append(Shot(situation, number, views, (body + again) % BODIES, views == 1 and again == 0))
+                    listed.append(
+                        Shot(
+                            situation,
+                            number,
+                            views,
+                            (body + again) % BODIES,
+                            views == 1 and again == 0,
+                        )
+                    )
                 body += 1
-    order = np.random.default_rng(62).permutation(len(listed))  # so that a part of them is of all kinds
+    # so that a part of them is of all kinds
+    order = np.random.default_rng(62).permutation(len(listed))
     listed = [listed[k] for k in order]
     first = [shot for shot in listed if shot.situation != "limp"][:SEVERAL]
     return [
@@ -180,32 +237,48 @@ class Person:
     def mask(self, camera: Camera, k: int) -> Any:
         """Return the true mask of a frame."""
         pose = self.motion.poses[k]
-        place = self.motion.translations[k] + rotation_from_root_angles(pose[:3]) @ self.root_off
+        place = (
+            self.motion.translations[k]
+            + rotation_from_root_angles(pose[:3]) @ self.root_off
+        )
         return project(self.flesh, camera, pose, place)
 
 
 def body_of(number: int) -> tuple[Body, Body, Array]:
     """Return a body, its flesh as a body of its own, and how far the flesh's root is off (3,)."""
-    rng, average = np.random.default_rng([62, number]), Body.of(built_in.average_skeleton())
-    logs, lengths = np.zeros(len(NAMES)), slice(1, 1 + len(LENGTHS))
+    rng = np.random.default_rng([62, number])
+    average = Body.of(built_in.average_skeleton())
+    logs = np.zeros(len(NAMES))
+    lengths = slice(1, 1 + len(LENGTHS))
     logs[0] = STATURE * rng.standard_normal()
-    logs[lengths] = rng.multivariate_normal(np.zeros(len(LENGTHS)), COVARIANCE[lengths, lengths])
+    logs[lengths] = rng.multivariate_normal(
+        np.zeros(len(LENGTHS)), COVARIANCE[lengths, lengths]
+    )
     girths = 1.0 + rng.uniform(-GIRTH, GIRTH, len(BONES))
     height = average.stature * np.exp(logs[0])
-    body = shaped(average, np.exp(logs), height).scaled(1.0, 0.5 * (girths + girths[MIRRORED]))
+    body = shaped(average, np.exp(logs), height).scaled(
+        1.0, 0.5 * (girths + girths[MIRRORED])
+    )
     off = np.zeros((len(JOINTS), 3))
     for name, spread in OFFSETS.items():
         right = rng.standard_normal(3) * spread
-        for prefix, sign in (("", 1.0),) if name in JOINTS else (("l", 1.0), ("r", -1.0)):
+        for prefix, sign in (
+            (("", 1.0),) if name in JOINTS else (("l", 1.0), ("r", -1.0))
+        ):
             off[JOINTS.index(prefix + name)] = right * [sign, 1.0, 1.0]
     bones = np.vstack([np.zeros(3), body.skeleton.offsets])
-    ends = [[j, *(k for k, parent in enumerate(PARENTS) if parent == j)] for j in range(len(JOINTS))]
-    for joint in range(len(JOINTS)):  # flesh turns about the joints: it is moved across the longest bone, not along it
+    ends = [
+        [j, *(k for k, parent in enumerate(PARENTS) if parent == j)]
+        for j in range(len(JOINTS))
+    ]
+    # flesh turns about the joints: it is moved across the longest bone, not along it
+    for joint in range(len(JOINTS)):
         longest = max((bones[k] for k in ends[joint]), key=np.linalg.norm)
         along = longest / np.linalg.norm(longest)
         off[joint] -= (off[joint] @ along) * along
     for joint, parent in enumerate(PARENTS):
-        if joint and not off[joint].any():  # hands, toes and the head go with what they hang on
+        # hands, toes and the head go with what they hang on
+        if joint and not off[joint].any():
             off[joint] = off[parent]
     flesh = body.skeleton.offsets + off[1:] - off[np.array(PARENTS[1:])]
     return body, replace(body, skeleton=replace(body.skeleton, offsets=flesh)), off[0]
@@ -224,39 +297,68 @@ def person(shot: Shot) -> Person:
     scale = body.skeleton.lengths[leg].sum() / motion.skeleton.lengths[leg].sum()
     motion = replace(motion.about_axes_of(body.skeleton), skeleton=body.skeleton)
     motion = replace(motion, translations=scale * motion.translations)
-    turn = np.radians(act.degrees) - (heading(motion) if act.walks else motion.poses[0, 0])
-    motion = on_ground(facing_elsewhere(motion.frames(0, min(len(motion), 3 * LONGEST)), turn), body)
+    turn = np.radians(act.degrees) - (
+        heading(motion) if act.walks else motion.poses[0, 0]
+    )
+    motion = on_ground(
+        facing_elsewhere(motion.frames(0, min(len(motion), 3 * LONGEST)), turn), body
+    )
     return Person(moved(motion, -middle_of(motion)), body, flesh, root_off)
 
 
 def limping(motion: Motion, number: int) -> Motion:
     """Return a walk whose one thigh is turned back, so that its steps are shorter, and whose time runs unevenly."""
     short = SIDES[number % 2]
-    strikes = [motion.fps * step.strike_seconds for step in gait_of(motion).steps if step.foot == short]
-    joint, poses = JOINTS.index(f"{short[0]}femur"), motion.poses.copy()
-    axes, start = motion.skeleton.axes[joint - 1], angle_index(joint)
+    strikes = [
+        motion.fps * step.strike_seconds
+        for step in gait_of(motion).steps
+        if step.foot == short
+    ]
+    joint = JOINTS.index(f"{short[0]}femur")
+    poses = motion.poses.copy()
+    axes = motion.skeleton.axes[joint - 1]
+    start = angle_index(joint)
     back = cv2.Rodrigues(np.radians([LIMP_DEGREES, 0.0, 0.0]))[0]
     turned = axes.T @ back @ motion.skeleton.turns(poses)[joint] @ axes
     poses[:, start : start + 3] = joint_angles_from_rotation(turned)
-    turns, times = 2.0 * np.pi / float(np.diff(strikes).mean()), np.arange(len(motion))
-    uneven = np.clip(times + LIMP_WARP / turns * np.cos(turns * (times - strikes[0])), 0.0, len(motion) - 1.0)
+    turns = 2.0 * np.pi / float(np.diff(strikes).mean())
+    times = np.arange(len(motion))
+    uneven = np.clip(
+        times + LIMP_WARP / turns * np.cos(turns * (times - strikes[0])),
+        0.0,
+        len(motion) - 1.0,
+    )
     places = at_frames(motion.translations, uneven)
-    return replace(motion, poses=at_frames(np.unwrap(poses, axis=0), uneven), translations=places)
+    return replace(
+        motion, poses=at_frames(np.unwrap(poses, axis=0), uneven), translations=places
+    )
 
 
-def cameras_of(shot: Shot, rng: np.random.Generator) -> tuple[list[Camera], list[Camera]]:
+def cameras_of(
+    shot: Shot, rng: np.random.Generator
+) -> tuple[list[Camera], list[Camera]]:
     """Return the cameras, and what their calibrations say."""
-    target, turned = np.array([0.0, HEIGHT, 0.0]), rng.uniform(-15.0, 15.0)
+    target = np.array([0.0, HEIGHT, 0.0])
+    turned = rng.uniform(-15.0, 15.0)
     true = [
-        Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS) for degrees in PLACES[shot.views]
+        Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS)
+        for degrees in PLACES[shot.views]
     ]
     rotation_off, place_off, focal_off = CALIBRATION_OFF
     calibrated = []
     for camera in true:
-        centre = -camera.rotation.T @ camera.translation + place_off * rng.standard_normal(3)
-        rotation = cv2.Rodrigues(rotation_off * rng.standard_normal(3))[0] @ camera.rotation
+        centre = (
+            -camera.rotation.T @ camera.translation + place_off * rng.standard_normal(3)
+        )
+        rotation = (
+            cv2.Rodrigues(rotation_off * rng.standard_normal(3))[0] @ camera.rotation
+        )
         focal = camera.focal * (1.0 + focal_off * rng.standard_normal())
-        calibrated.append(replace(camera, focal=focal, rotation=rotation, translation=-rotation @ centre))
+        calibrated.append(
+            replace(
+                camera, focal=focal, rotation=rotation, translation=-rotation @ centre
+            )
+        )
     return true, calibrated
 
 
@@ -271,39 +373,70 @@ def damaged(mask: Any, shadow: int | None, rim: float, rng: np.random.Generator)
 
 def landmarks_of(motion: Motion, camera: Camera, rng: np.random.Generator) -> Array:
     """Return landmarks (T, 27, 3) whose left and right are exchanged at times."""
-    off = LANDMARK_OFF * (rng.standard_normal((len(JOINTS), 3)) + rng.standard_normal((len(motion), len(JOINTS), 3)))
+    off = LANDMARK_OFF * (
+        rng.standard_normal((len(JOINTS), 3))
+        + rng.standard_normal((len(motion), len(JOINTS), 3))
+    )
     joints = motion.joints + off
     share = EXCHANGED[rng.integers(len(EXCHANGED))]
     for group in GROUPS[:2]:
-        exchanged, now = np.zeros(len(motion), dtype=bool), False
+        exchanged = np.zeros(len(motion), dtype=bool)
+        now = False
         for k in range(len(motion)):
             leave = 1.0 / EXCHANGE_FRAMES
-            now = rng.random() >= leave if now else rng.random() < leave * share / (1.0 - share)
+            now = (
+                rng.random() >= leave
+                if now
+                else rng.random() < leave * share / (1.0 - share)
+            )
             exchanged[k] = now
         joints[np.ix_(exchanged, group)] = joints[np.ix_(exchanged, OTHER_SIDE[group])]
     known = np.isin(np.arange(len(JOINTS)), np.concatenate(GROUPS))
     pixels = np.stack([camera.project(each)[0] for each in joints])
-    return np.concatenate([pixels, np.tile(0.9 * known[None, :, None], (len(motion), 1, 1))], axis=2)
+    return np.concatenate(
+        [pixels, np.tile(0.9 * known[None, :, None], (len(motion), 1, 1))], axis=2
+    )
 
 
 def measured(folder: Path, shot: Shot) -> dict[str, Any]:
     """Return the row of a film, which is made, tracked, and kept in a folder."""
-    who, rng = person(shot), np.random.default_rng([shot.body, shot.views, shot.number, *shot.situation.encode()])
+    who = person(shot)
+    rng = np.random.default_rng(
+        [shot.body, shot.views, shot.number, *shot.situation.encode()]
+    )
     true, calibrated = cameras_of(shot, rng)
     paths = []
     for number, camera in enumerate(true):
-        rim, shadow = RIM * rng.standard_normal(), int(rng.integers(1000)) if rng.random() < 0.5 else None
-        masks = [damaged(who.mask(camera, k), shadow, rim, rng) for k in range(len(who.motion))]
-        marks: dict[str, Any] = {"landmarks": landmarks_of(who.motion, camera, rng)} if shot.landmarks else {}
+        rim = RIM * rng.standard_normal()
+        shadow = int(rng.integers(1000)) if rng.random() < 0.5 else None
+        masks = [
+            damaged(who.mask(camera, k), shadow, rim, rng)
+            for k in range(len(who.motion))
+        ]
+        marks: dict[str, Any] = (
+            {"landmarks": landmarks_of(who.motion, camera, rng)}
+            if shot.landmarks
+            else {}
+        )
         paths.append(folder / f"{shot.name}-{number}.npz")
-        np.savez_compressed(paths[-1], masks=np.array(masks), fps=np.array(who.motion.fps), **marks)
-    row: dict[str, Any] = {**shot._asdict(), "name": shot.name, "frames": len(who.motion)}
+        np.savez_compressed(
+            paths[-1], masks=np.array(masks), fps=np.array(who.motion.fps), **marks
+        )
+    row: dict[str, Any] = {
+        **shot._asdict(),
+        "name": shot.name,
+        "frames": len(who.motion),
+    }
     try:
         result = track(
             paths if len(paths) > 1 else paths[0],
             camera=calibrated,
             height=who.body.stature,
-            train=[recorded.leaving_out(recorded.LIBRARY, [who.motion.name.partition("_")[0]])],
+            train=[
+                recorded.leaving_out(
+                    recorded.LIBRARY, [who.motion.name.partition("_")[0]]
+                )
+            ],
             seed=shot.seed,
             progress=QUIET,
         )
@@ -320,8 +453,10 @@ def measured(folder: Path, shot: Shot) -> dict[str, Any]:
 
 def figures(result: Track, who: Person) -> dict[str, Any]:
     """Return what a track is worth."""
-    true, joints = who.motion.joints, result.motion.joints
-    mpjpe, swapped = metrics.mpjpe_mm(true, joints), legs_exchanged(true, joints)
+    true = who.motion.joints
+    joints = result.motion.joints
+    mpjpe = metrics.mpjpe_mm(true, joints)
+    swapped = legs_exchanged(true, joints)
     known = result.table["unknown_sides"] == 0.0
     lengths = [motion.skeleton.lengths for motion in (who.motion, result.motion)]
     angles = clinical_angles(result.motion.skeleton, result.motion.poses)
@@ -334,19 +469,30 @@ def figures(result: Track, who: Person) -> dict[str, Any]:
         "unknown": float(1.0 - known.mean()),
         "known_exchanged": float((swapped & known).mean()),
         "iou": result.measures.iou,
-        "lengths": {name: float(lengths[1][bone] / lengths[0][bone] - 1.0) for name, bone in SEGMENTS.items()},
+        "lengths": {
+            name: float(lengths[1][bone] / lengths[0][bone] - 1.0)
+            for name, bone in SEGMENTS.items()
+        },
         "build": result.log.build,
         "degrees": angle_errors(who.motion, angles, np.ones(len(true), dtype=bool)),
-        "trust": {name: value for name, value in vars(result.trust).items() if name != "unknown_signs"},
+        "trust": {
+            name: value
+            for name, value in vars(result.trust).items()
+            if name != "unknown_signs"
+        },
         "gait": [steps_of(gait_of(who.motion)), steps_of(result.gait)],
     }
 
 
 def legs_exchanged(true: Array, joints: Array) -> Array:
     """Return in which frames (T,) the legs of joints (T, 27, 3) are nearer to the other ones of the truth."""
-    here, there = joints - joints[:, :1], true - true[:, :1]
+    here = joints - joints[:, :1]
+    there = true - true[:, :1]
     other = np.array(OTHER_SIDE)[LEGS]
-    off, exchanged = (np.linalg.norm(there[:, LEGS] - here[:, legs], axis=2).mean(axis=1) for legs in (LEGS, other))
+    off, exchanged = (
+        np.linalg.norm(there[:, LEGS] - here[:, legs], axis=2).mean(axis=1)
+        for legs in (LEGS, other)
+    )
     return np.asarray(exchanged < off)
 
 
@@ -354,16 +500,28 @@ def steps_of(gait: Gait) -> dict[str, float | None]:
     """Return the steps' lengths and times, left and right."""
     feet = {"left": gait.left, "right": gait.right}
     names = ("step_length", "step_seconds")
-    return {f"{side} {name}": getattr(foot, name) for side, foot in feet.items() for name in names}
+    return {
+        f"{side} {name}": getattr(foot, name)
+        for side, foot in feet.items()
+        for name in names
+    }
 
 
 def keep(path: Path, result: Track, who: Person) -> None:
     """Write what intervals are learned from."""
-    motion, posteriors = result.motion, [frame.posterior for frame in result.frames if frame.posterior is not None]
-    samples = motion.skeleton.joints(np.array([posterior.poses for posterior in posteriors]))
+    motion = result.motion
+    posteriors = [
+        frame.posterior for frame in result.frames if frame.posterior is not None
+    ]
+    samples = motion.skeleton.joints(
+        np.array([posterior.poses for posterior in posteriors])
+    )
     models = [posterior.recalibration or Recalibration() for posterior in posteriors]
-    spreads = np.array([model.joint_spreads for model in models])  # with what this study learned
-    spreads = np.sqrt(np.maximum(spreads**2 - shared_spreads(len(result.scene.cameras)) ** 2, 0.0))
+    # with what this study learned
+    spreads = np.array([model.joint_spreads for model in models])
+    spreads = np.sqrt(
+        np.maximum(spreads**2 - shared_spreads(len(result.scene.cameras)) ** 2, 0.0)
+    )
     np.savez_compressed(
         path,
         true=who.motion.joints.astype(np.float32),
@@ -390,45 +548,83 @@ def film_of(folder: Path, row: Mapping[str, Any]) -> Film:
     """Return how often the intervals of a kept track hold, with each shared error of the grid."""
     with np.load(folder / f"{row['name']}.npz") as stored:
         kept = {name: stored[name][::STRIDE].astype(np.float64) for name in stored}
-    off = joint_distances(kept["true"], kept["joints"]), np.linalg.norm(kept["true"] - kept["joints"], axis=2)
-    far = DEPTH * (row["views"] == 1) * kept["depths"][:, None, None] * ndtri(0.5 + 0.5 * np.array(LEVELS))[:, None]
+    off = (
+        joint_distances(kept["true"], kept["joints"]),
+        np.linalg.norm(kept["true"] - kept["joints"], axis=2),
+    )
+    far = (
+        DEPTH
+        * (row["views"] == 1)
+        * kept["depths"][:, None, None]
+        * ndtri(0.5 + 0.5 * np.array(LEVELS))[:, None]
+    )
     held = np.empty((2, len(GRID), len(LEVELS), len(JOINTS)))
     arrays = [kept[name] for name in ("distances", "weights", "spreads", "factors")]
     for k, shared in enumerate(GRID):
         frames = zip(*arrays, strict=True)
         radii = np.array(
-            [f * quantiles(away, weights, np.hypot(spread, shared), 3) for away, weights, spread, f in frames]
+            [
+                f * quantiles(away, weights, np.hypot(spread, shared), 3)
+                for away, weights, spread, f in frames
+            ]
         )
         for where, widened in enumerate((radii, np.hypot(radii, far))):
             held[where, k] = (off[where][:, None] <= widened).mean(axis=0)
-    return Film(row["body"], row["views"], held, kept["depths"] / kept["true_depths"] - 1.0)
+    return Film(
+        row["body"], row["views"], held, kept["depths"] / kept["true_depths"] - 1.0
+    )
 
 
 def least_shared(films: Sequence[Film], where: int, joints: Sequence[int]) -> int:
     """Return the place in the grid of the least shared error with which 80 % hold 80 % of some joints."""
-    held = np.mean([film.held[where, :, MAIN_LEVEL][:, joints] for film in films], axis=(0, 2))
+    held = np.mean(
+        [film.held[where, :, MAIN_LEVEL][:, joints] for film in films], axis=(0, 2)
+    )
     enough = np.flatnonzero(held >= LEVELS[MAIN_LEVEL])
     return int(enough[0]) if len(enough) else len(GRID) - 1
 
 
 def intervals_lines(films: Sequence[Film]) -> Iterator[str]:
     """Yield what all films teach, and how often intervals hold for each body, learned from films of the others."""
-    alone = np.abs(np.concatenate([film.depths_off for film in films if film.views == 1]))
+    alone = np.abs(
+        np.concatenate([film.depths_off for film in films if film.views == 1])
+    )
     yield f"depth by one camera: {np.quantile(alone, LEVELS[MAIN_LEVEL]) / ndtri(0.5 + 0.5 * LEVELS[MAIN_LEVEL]):.3f}"
     yield ""
-    heads = ["cameras", "in the", *(f"{100 * level:.0f} %" for level in LEVELS), *(f"80 % of {part}" for part in PARTS)]
-    cells, unwidened = [], []
+    heads = [
+        "cameras",
+        "in the",
+        *(f"{100 * level:.0f} %" for level in LEVELS),
+        *(f"80 % of {part}" for part in PARTS),
+    ]
+    cells = []
+    unwidened = []
     for views, (where, name) in product(PLACES, enumerate(("body", "world"))):
         some = [film for film in films if film.views == views]
-        taught = {part: int(1e3 * GRID[least_shared(some, where, joints)]) for part, joints in JOINTS_OF.items()}
+        taught = {
+            part: int(1e3 * GRID[least_shared(some, where, joints)])
+            for part, joints in JOINTS_OF.items()
+        }
         yield f"{views} cameras, in the {name}, mm: {taught}"
         held = np.empty((len(some), len(LEVELS), len(JOINTS)))
         for film, shares in zip(some, held, strict=True):
             others = [other for other in some if other.body != film.body]
             for joints in JOINTS_OF.values():
-                shares[:, joints] = film.held[where, least_shared(others, where, joints)][:, joints]
-        parts = [percent(float(held[:, MAIN_LEVEL, joints].mean()), 0) for joints in JOINTS_OF.values()]
-        cells.append([str(views), name, *(percent(float(x), 0) for x in held[..., 1:].mean(axis=(0, 2))), *parts])
+                shares[:, joints] = film.held[
+                    where, least_shared(others, where, joints)
+                ][:, joints]
+        parts = [
+            percent(float(held[:, MAIN_LEVEL, joints].mean()), 0)
+            for joints in JOINTS_OF.values()
+        ]
+        cells.append(
+            [
+                str(views),
+                name,
+                *(percent(float(x), 0) for x in held[..., 1:].mean(axis=(0, 2))),
+                *parts,
+            ]
+        )
         bare = np.mean([film.held[where, 0, :, 1:] for film in some], axis=(0, 2))
         unwidened.append([str(views), name, *(percent(float(x), 0) for x in bare)])
     yield ""
@@ -451,9 +647,18 @@ def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
                 str(views),
                 str(len(some)),
                 f"{np.median([row['mpjpe_mm'] for row in some]):.0f}",
-                *(f"{np.median([row[name] for row in through]):.0f}" for name in ("mpjpe_mm", "flesh_mm")),
-                *(f"{np.median([row['degrees'][name] for row in through]):.1f}" for name in SAGITTAL),
-                *(f"{100.0 * np.mean([abs(row['lengths'][name]) for row in some]):.1f}" for name in SEGMENTS),
+                *(
+                    f"{np.median([row[name] for row in through]):.0f}"
+                    for name in ("mpjpe_mm", "flesh_mm")
+                ),
+                *(
+                    f"{np.median([row['degrees'][name] for row in through]):.1f}"
+                    for name in SAGITTAL
+                ),
+                *(
+                    f"{100.0 * np.mean([abs(row['lengths'][name]) for row in some]):.1f}"
+                    for name in SEGMENTS
+                ),
                 percent(float(np.mean([row["known_exchanged"] for row in some])), 1),
             ]
         )
@@ -478,7 +683,12 @@ def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for row in rows:
         films.setdefault(row["name"].partition("-seed-")[0], []).append(row["mpjpe_mm"])
     cells = [
-        [name, str(len(mpjpe)), f"{min(mpjpe):.0f} to {max(mpjpe):.0f}", f"{np.std(mpjpe, ddof=1):.1f}"]
+        [
+            name,
+            str(len(mpjpe)),
+            f"{min(mpjpe):.0f} to {max(mpjpe):.0f}",
+            f"{np.std(mpjpe, ddof=1):.1f}",
+        ]
         for name, mpjpe in films.items()
         if len(mpjpe) > 1
     ]
@@ -487,7 +697,14 @@ def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield left and right steps of limps, true and measured."""
-    heads = ["limp", "cameras", "left, right m: true", "measured", "left, right s: true", "measured"]
+    heads = [
+        "limp",
+        "cameras",
+        "left, right m: true",
+        "measured",
+        "left, right s: true",
+        "measured",
+    ]
     cells = []
     for row in rows:
         steps = [
@@ -499,7 +716,10 @@ def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             [
                 row["name"],
                 str(row["views"]),
-                *(", ".join("-" if x is None else f"{x:.2f}" for x in each) for each in steps),
+                *(
+                    ", ".join("-" if x is None else f"{x:.2f}" for x in each)
+                    for each in steps
+                ),
             ]
         )
     yield from markdown(heads, cells, 2)
@@ -514,11 +734,17 @@ def main(folder: Path, report: bool, workers: int | None) -> None:
     rows = folder / "rows.jsonl"
     done = earlier(str(rows), lambda row: row["name"])
     if not report:
-        jobs = {shot.name: partial(measured, folder, shot) for shot in shots() if shot.name not in done}
+        jobs = {
+            shot.name: partial(measured, folder, shot)
+            for shot in shots()
+            if shot.name not in done
+        }
         done |= each(jobs, workers, partial(kept, str(rows))) if jobs else {}
     tracked = [row for row in done.values() if "refused" not in row]
     films = [row for row in tracked if not row["seed"]]
-    click.echo(f"{len(films)} of {len(shots()) - SEVERAL * (SEEDS - 1)} films were tracked")
+    click.echo(
+        f"{len(films)} of {len(shots()) - SEVERAL * (SEEDS - 1)} films were tracked"
+    )
     for lines in (
         intervals_lines([film_of(folder, row) for row in films]),
         accuracy_lines(films),

@@ -27,7 +27,8 @@ from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit_reproduce.jobs import each
 from table import WORKERS, bar
 
-MOTION, SIZE = "walk-b", (320, 240)
+MOTION = "walk-b"
+SIZE = (320, 240)
 PERCENT = 10.0
 SUBJECTS = 8  # people, each of another build
 
@@ -66,34 +67,61 @@ def subject(seed: int) -> Body:
 def builds_lines(workers: int | None) -> Iterator[str]:
     """Yield by how many percent stature and limbs are off, after the fit and before it, for every setup."""
     keys = list(product(SETUPS, range(SUBJECTS)))
-    figures_of = each({(one.label, k): partial(_percent_off, one, k) for one, k in keys}, workers, bar)
+    figures_of = each(
+        {(one.label, k): partial(_percent_off, one, k) for one, k in keys}, workers, bar
+    )
     for one in SETUPS:
-        pairs = np.array([figures_of[one.label, k] for k in range(SUBJECTS)])  # (subjects, 2, parts)
+        # (subjects, 2, parts)
+        pairs = np.array([figures_of[one.label, k] for k in range(SUBJECTS)])
         for k, label in enumerate(("fitted", "average")):
-            parts = zip(PARTS, pairs[:, k].mean(axis=0), pairs[:, k].max(axis=0), strict=True)
-            figures = [f"{part} {mean:.1f} (at most {most:.1f})" for part, mean, most in parts]
+            parts = zip(
+                PARTS, pairs[:, k].mean(axis=0), pairs[:, k].max(axis=0), strict=True
+            )
+            figures = [
+                f"{part} {mean:.1f} (at most {most:.1f})" for part, mean, most in parts
+            ]
             yield f"{one.label:22} {label:8} % off: {', '.join(figures)}"
 
 
 def _percent_off(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
     """Return by how many percent a subject's parts are off after the fit, and as they were taken to be before it."""
-    options, average, true = TrackOptions(method="@loose"), Body.of(built_in.average_skeleton()), subject(seed)
+    options = TrackOptions(method="@loose")
+    average = Body.of(built_in.average_skeleton())
+    true = subject(seed)
     walk = replace(built_in.motion(MOTION), skeleton=true.skeleton)
     scene = synthetic(walk, setup.views_degrees, SIZE, [], (None, None))
     scene = replace(scene, body=true, observations=rendered(walk, true, scene.cameras))
     height = true.stature if setup.stature else None
-    start = average if height is None else average.scaled(*[height / average.stature] * 2)
+    start = (
+        average if height is None else average.scaled(*[height / average.stature] * 2)
+    )
     training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
-    task = Task(start, scene.cameras, EVALUATIONS, scene.yaw, scene.anchor, setup.translation, training=training)
-    shape, _ = fitted_build(task, scene, prepare(options, task).follow, BODY_FRAMES, height, seed)
+    task = Task(
+        start,
+        scene.cameras,
+        EVALUATIONS,
+        scene.yaw,
+        scene.anchor,
+        setup.translation,
+        training=training,
+    )
+    shape, _ = fitted_build(
+        task, scene, prepare(options, task).follow, BODY_FRAMES, height, seed
+    )
     return _off(shape.body, true), _off(start, true)
 
 
 def _off(body: Body, true: Body) -> list[float]:
     """Return by how many percent stature and limbs are off."""
     limbs = [[BONES.index(bone) for bone in bones] for bones in LIMBS.values()]
-    lengths, others = ([one.stature, *(one.skeleton.lengths[limb].sum() for limb in limbs)] for one in (body, true))
-    return [100.0 * abs(length / other - 1.0) for length, other in zip(lengths, others, strict=True)]
+    lengths, others = (
+        [one.stature, *(one.skeleton.lengths[limb].sum() for limb in limbs)]
+        for one in (body, true)
+    )
+    return [
+        100.0 * abs(length / other - 1.0)
+        for length, other in zip(lengths, others, strict=True)
+    ]
 
 
 @click.command(cls=Command, help=__doc__)

@@ -12,7 +12,9 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Track
 
-METHOD, EVALUATIONS = "exemplars", 9760  # evaluations of a frame, the default of `posefit track`
+# evaluations of a frame, the default of `posefit track`
+METHOD = "exemplars"
+EVALUATIONS = 9760
 
 
 class Clip(NamedTuple):
@@ -34,7 +36,8 @@ class Clip(NamedTuple):
         return f"library:-{self.subject}"
 
 
-WALKS, RUNS = "walks", "runs"
+WALKS = "walks"
+RUNS = "runs"
 # The first few of a group are of different people, since a quick look takes only these. Most runs of the database are
 # shorter than two seconds.
 GROUPS: dict[str, tuple[Clip, ...]] = {
@@ -91,16 +94,28 @@ GROUPS: dict[str, tuple[Clip, ...]] = {
 
 # Clips that no study learned from or was tuned on, for one report at the end.
 ASIDE: dict[str, tuple[Clip, ...]] = {
-    WALKS: (Clip("16_32", 120, 0, "walks straight"), Clip("16_21", 78, 0, "walks fast")),
+    WALKS: (
+        Clip("16_32", 120, 0, "walks straight"),
+        Clip("16_21", 78, 0, "walks fast"),
+    ),
     RUNS: (Clip("09_05", 36, 0, "runs"), Clip("16_45", 34, 0, "jogs")),
-    "jumps": (Clip("16_06", 100, 0, "jumps forward"), Clip("127_26", 62, 0, "runs and leaps")),
-    "turns": (Clip("16_29", 71, 0, "walks fast and turns right"), Clip("16_30", 67, 0, "walks and turns right")),
+    "jumps": (
+        Clip("16_06", 100, 0, "jumps forward"),
+        Clip("127_26", 62, 0, "runs and leaps"),
+    ),
+    "turns": (
+        Clip("16_29", 71, 0, "walks fast and turns right"),
+        Clip("16_30", 67, 0, "walks and turns right"),
+    ),
     "dances": (
         Clip("05_10", 120, 0, "dances"),
         Clip("49_21", 120, 0, "turns many times"),
         Clip("49_07", 118, 0, "cartwheel"),
     ),
-    "everyday": (Clip("02_08", 120, 0, "swings something"), Clip("14_33", 120, 0, "stands, goes a step")),
+    "everyday": (
+        Clip("02_08", 120, 0, "swings something"),
+        Clip("14_33", 120, 0, "stands, goes a step"),
+    ),
 }
 
 Views = tuple[float, ...]
@@ -109,16 +124,22 @@ SIDES: tuple[Views, ...] = ((0.0,), (45.0,), (90.0,), (135.0,), (180.0,))
 PAIRS: tuple[Views, ...] = ((0.0, 90.0), (45.0, 135.0))
 FOUR: Views = (0.0, 90.0, 180.0, 270.0)
 
-OFF_PERCENT = 10.0  # that bones and radii of another body are off at most: five per cent, root mean square
+# that bones and radii of another body are off at most: five per cent, root mean square
+OFF_PERCENT = 10.0
 DAMAGE = {"holes": 0.3, "blobs": 0.3, "jitter": 0.3, "dropped": 0.1}
 CHANGES: dict[str, Mapping[str, Any]] = {
     "first yaw unknown": {"yaw_off_degrees": ALL_AROUND},
     "translation aligned": {"translation": "aligned"},
-    "aligned, first yaw unknown": {"translation": "aligned", "yaw_off_degrees": ALL_AROUND},
+    "aligned, first yaw unknown": {
+        "translation": "aligned",
+        "yaw_off_degrees": ALL_AROUND,
+    },
     "body 5 % off": {"body_off_percent": OFF_PERCENT},
     "damaged silhouettes": {"corruption": DAMAGE},
 }
-CHANGES["all of these"] = {name: value for change in CHANGES.values() for name, value in change.items()}
+CHANGES["all of these"] = {
+    name: value for change in CHANGES.values() for name, value in change.items()
+}
 
 
 def cell_fields(clip: Clip, views: Views, frames: int, **fields: Any) -> dict[str, Any]:
@@ -138,7 +159,12 @@ def cell_fields(clip: Clip, views: Views, frames: int, **fields: Any) -> dict[st
 
 def track_of(cell: TrackCell, scene: Scene, **changes: Any) -> Track:
     """Return the track of a cell in a scene, which may differ from the cell's own, with some options changed."""
-    training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
-    options = {name: getattr(cell, name) for name in ("method", "evaluations", "translation", "seed")}
+    training = training_motions(
+        training_clips(cell.train, followed=cell.motion), scene.fps
+    )
+    options = {
+        name: getattr(cell, name)
+        for name in ("method", "evaluations", "translation", "seed")
+    }
     chosen = TrackOptions(settings=settings_text(cell.settings), **(options | changes))
     return track_scene(scene, training, completed(chosen, scene.truth))

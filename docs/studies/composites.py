@@ -12,7 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from angles import SAGITTAL, angle_errors
-from composites_scene import PLACES, SHOWS, SIZE, Situation, check_video, film, plate, situation
+from composites_scene import (
+    PLACES,
+    SHOWS,
+    SIZE,
+    Situation,
+    check_video,
+    film,
+    plate,
+    situation,
+)
 from posefit import clinical_angles
 from posefit.cli.output import Command
 from posefit.fitting import metrics
@@ -36,38 +45,55 @@ Masks = NDArray[np.bool_]  # (views, T, height, width)
 def uncut(masks: Masks) -> NDArray[np.bool_]:
     """Return in which frames of each view (views, T) a person is seen and nowhere cut by the picture's border."""
     edges = (masks[:, :, 0], masks[:, :, -1], masks[..., 0], masks[..., -1])
-    return np.asarray(masks.any(axis=(2, 3)) & ~np.any([edge.any(axis=2) for edge in edges], axis=0))
+    return np.asarray(
+        masks.any(axis=(2, 3)) & ~np.any([edge.any(axis=2) for edge in edges], axis=0)
+    )
 
 
 def track_figures(track: Track, situation: Situation, truth: Masks) -> dict[str, Any]:
     """Return what a track is worth in the frames in which a camera sees all of the person."""
-    true, estimate, seen = situation.actors[0].motion, track.motion, np.asarray(uncut(truth).any(axis=0))
-    mpjpe, swapped = metrics.mpjpe_mm(true.joints, estimate.joints), nearer_mirrored(true.joints, estimate.joints)
+    true = situation.actors[0].motion
+    estimate = track.motion
+    seen = np.asarray(uncut(truth).any(axis=0))
+    mpjpe = metrics.mpjpe_mm(true.joints, estimate.joints)
+    swapped = nearer_mirrored(true.joints, estimate.joints)
     unknown = track.table["unknown_sides"]
     known = seen & (unknown == 0.0)
     return {
         "mpjpe_mm": float(mpjpe[seen].mean()),
         "lost": float((mpjpe[seen] > LOST_MM).mean()),
         "swapped": float(swapped[seen].mean()),
-        "said_unknown": float((unknown[seen] == 1.0).mean()) if np.isfinite(unknown[seen]).any() else None,
+        "said_unknown": float((unknown[seen] == 1.0).mean())
+        if np.isfinite(unknown[seen]).any()
+        else None,
         "known_wrong": float(swapped[known].mean()) if known.any() else None,
         **angle_errors(true, clinical_angles(estimate.skeleton, estimate.poses), seen),
     }
 
 
-def legs_exchanged(scene: Scene, actor: Motion, seen: NDArray[np.bool_]) -> float | None:
+def legs_exchanged(
+    scene: Scene, actor: Motion, seen: NDArray[np.bool_]
+) -> float | None:
     """Return in what share of the pictures (views, T) that are `seen` a segmenter's landmarks exchange the legs.
 
     None where no segmenter gives landmarks.
     """
-    exchanged, legs = list[bool](), GROUPS[0]
-    for camera, view, rows in zip(scene.cameras, range(len(scene.cameras)), seen, strict=True):
+    exchanged = list[bool]()
+    legs = GROUPS[0]
+    for camera, view, rows in zip(
+        scene.cameras, range(len(scene.cameras)), seen, strict=True
+    ):
         for k in np.flatnonzero(rows):
             landmarks = scene.observations[int(k)].landmarks
             if landmarks is not None and landmarks[view, :, 2].any():
                 pixels, depths = camera.project(actor.joints[k])
                 same, other = (
-                    (np.linalg.norm(pixels[legs] - landmarks[view, group, :2], axis=1) * depths[legs]).sum()
+                    (
+                        np.linalg.norm(
+                            pixels[legs] - landmarks[view, group, :2], axis=1
+                        )
+                        * depths[legs]
+                    ).sum()
                     for group in (legs, MIRRORED[legs])
                 )
                 exchanged.append(bool(other < same))
@@ -84,7 +110,9 @@ def other_person_share(scene: Scene, masks: NDArray[np.bool_]) -> float | None:
     others = list[bool]()
     for k, observation in enumerate(scene.observations):
         for view, silhouette in enumerate(observation.silhouettes):
-            first, *rest = (int((silhouette.mask & actor[view, k]).sum()) for actor in masks)
+            first, *rest = (
+                int((silhouette.mask & actor[view, k]).sum()) for actor in masks
+            )
             if observation.usable and silhouette.mask.any():
                 others.append(max(rest) > first)
     return float(np.mean(others))
@@ -126,15 +154,22 @@ class Shot(NamedTuple):
 def row_of(video: str, shot: Shot) -> dict[str, Any]:
     """Return the row of a shot: it is filmed, taken out and tracked; what was refused is said in the tool's words."""
     with tempfile.TemporaryDirectory() as name:
-        folder, scene = Path(name), situation(shot.situation, shot.views, shot.seed)
+        folder = Path(name)
+        scene = situation(shot.situation, shot.views, shot.seed)
         plates = [plate(video, number, SIZE) for number in range(shot.views)]
         videos, masks = film(scene, plates, shot.seed, folder)
-        row: dict[str, Any] = {**shot._asdict(), "people": scene.people, "frames": len(scene)}
+        row: dict[str, Any] = {
+            **shot._asdict(),
+            "people": scene.people,
+            "frames": len(scene),
+        }
         try:
             result = track(
                 videos,
                 camera=scene.cameras,
-                extraction=None if shot.extraction == DEFAULT else Extraction(shot.extraction),
+                extraction=None
+                if shot.extraction == DEFAULT
+                else Extraction(shot.extraction),
                 height=scene.actors[0].body.stature,
                 # who gives a height knows whose it is
                 person=entry_point(masks[0, 0]) if len(masks) > 1 else None,
@@ -144,29 +179,73 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
         except ValueError as error:
             return row | {"refused": str(error).replace(f"{folder}/", "")}
         assert result.trust is not None
-        exchanged = legs_exchanged(result.scene, scene.actors[0].motion, uncut(masks[0]))
-        row |= track_figures(result, scene, masks[0]) | {"other_person": other_person_share(result.scene, masks)}
+        exchanged = legs_exchanged(
+            result.scene, scene.actors[0].motion, uncut(masks[0])
+        )
+        row |= track_figures(result, scene, masks[0]) | {
+            "other_person": other_person_share(result.scene, masks)
+        }
         return row | {"legs_exchanged": exchanged, "trust": result.trust.grade}
 
 
 def composites_lines(rows: Sequence[Row]) -> Iterator[str]:
     table = []
     for row in rows:
-        cells = [row["situation"], str(row["views"]), row["extraction"], str(row["seed"])]
+        cells = [
+            row["situation"],
+            str(row["views"]),
+            row["extraction"],
+            str(row["seed"]),
+        ]
         for name, (_, digits, factor) in COLUMNS.items():
-            cells.append("-" if row.get(name) is None else f"{factor * row[name]:.{digits}f}")
+            cells.append(
+                "-" if row.get(name) is None else f"{factor * row[name]:.{digits}f}"
+            )
         table.append([*cells, row.get("trust", "-")])
-    heads = ["situation", "cameras", "extraction", "seed", *(head for head, _, _ in COLUMNS.values()), "trust"]
+    heads = [
+        "situation",
+        "cameras",
+        "extraction",
+        "seed",
+        *(head for head, _, _ in COLUMNS.values()),
+        "trust",
+    ]
     yield from markdown(heads, table, 3)
-    yield from (f"{row['situation']}, {row['extraction']}: {row['refused']}" for row in rows if "refused" in row)
+    yield from (
+        f"{row['situation']}, {row['extraction']}: {row['refused']}"
+        for row in rows
+        if "refused" in row
+    )
 
 
 @click.command(cls=Command, help=__doc__)
 @click.argument("video")
-@click.option("--situation", "situations", multiple=True, type=click.Choice(list(SHOWS)), help="By default all.")
-@click.option("--extraction", "extractions", multiple=True, default=(DEFAULT, "mixture"), help="A segmenter's name.")
-@click.option("--seeds", type=click.IntRange(1), default=1, show_default=True, help="Of other people in other clothes.")
-@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
+@click.option(
+    "--situation",
+    "situations",
+    multiple=True,
+    type=click.Choice(list(SHOWS)),
+    help="By default all.",
+)
+@click.option(
+    "--extraction",
+    "extractions",
+    multiple=True,
+    default=(DEFAULT, "mixture"),
+    help="A segmenter's name.",
+)
+@click.option(
+    "--seeds",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="Of other people in other clothes.",
+)
+@click.option(
+    "--rows",
+    metavar="FILE",
+    help="A file for a row a line: the same command continues there.",
+)
 @WORKERS
 def main(
     video: str, situations: Sequence[str], extractions: Sequence[str], seeds: int, rows: str | None,
@@ -176,8 +255,16 @@ def main(
         registry().offer("segmenter", name)
     check_video(video)
     grid = product(range(seeds), situations or SHOWS, PLACES, extractions)
-    shots = [Shot(shown, views, extraction, seed) for seed, shown, views, extraction in grid]
-    done = measured({shot: partial(row_of, video, shot) for shot in shots}, rows, keyed(Shot), workers, LIMITS)
+    shots = [
+        Shot(shown, views, extraction, seed) for seed, shown, views, extraction in grid
+    ]
+    done = measured(
+        {shot: partial(row_of, video, shot) for shot in shots},
+        rows,
+        keyed(Shot),
+        workers,
+        LIMITS,
+    )
     for line in composites_lines([*done.values()]):
         click.echo(line)
 

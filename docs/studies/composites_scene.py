@@ -24,7 +24,9 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 from posefit.silhouette.rasteriser import NEAR
 
-TILE = 256  # texels to a side of a weave, which are a turn around a limb and `LENGTH` metres along it
+# texels to a side of a weave, which are a turn around a limb and `LENGTH` metres along
+# it
+TILE = 256
 LENGTH = 0.6
 ROUGH = (4, 12, 40, 128)  # waves of a weave to a side, the coarse ones first
 GARMENTS: Mapping[str, str] = {
@@ -41,10 +43,12 @@ GARMENTS: Mapping[str, str] = {
     "radius": "skin",
 }  # all others are the shirt
 SKIN = ((140, 165, 205), (95, 120, 165), (60, 80, 115))  # blue, green, red
-SHIRTS = ((60, 60, 170), (150, 90, 50), (215, 215, 220), None)  # None is the colour of what is behind
+# None is the colour of what is behind
+SHIRTS = ((60, 60, 170), (150, 90, 50), (215, 215, 220), None)
 TROUSERS = ((110, 70, 40), None, (45, 45, 50), (95, 140, 165))
 SHOES = ((40, 40, 45), (220, 220, 220))
-STRENGTH = {"shirt": 0.22, "trousers": 0.14, "skin": 0.05, "shoes": 0.1}  # of a weave, a share of the colour
+# of a weave, a share of the colour
+STRENGTH = {"shirt": 0.22, "trousers": 0.14, "skin": 0.05, "shoes": 0.1}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,9 @@ def outfit(number: int, behind: Image) -> Outfit:
     """Return clothes by their number, seen before a picture: what has its colour is as what is about its middle."""
     rng = np.random.default_rng([number, 3])
     height, width = behind.shape[:2]
-    about = behind[height // 3 : 4 * height // 5, width // 4 : 3 * width // 4].reshape(-1, 3)
+    about = behind[height // 3 : 4 * height // 5, width // 4 : 3 * width // 4].reshape(
+        -1, 3
+    )
     near = np.median(about, axis=0) * rng.uniform(0.9, 1.1)
     colours = {
         "shirt": SHIRTS[number % len(SHIRTS)],
@@ -70,26 +76,37 @@ def outfit(number: int, behind: Image) -> Outfit:
     }
     worn = [GARMENTS.get(kind(bone), "shirt") for bone in BONES]
     each = [near if colours[garment] is None else colours[garment] for garment in worn]
-    return Outfit(np.array(each, dtype=np.float64), np.array([STRENGTH[garment] for garment in worn]), _weave(rng))
+    return Outfit(
+        np.array(each, dtype=np.float64),
+        np.array([STRENGTH[garment] for garment in worn]),
+        _weave(rng),
+    )
 
 
 def _weave(rng: np.random.Generator) -> NDArray[np.float32]:
     """Return a pattern of mean 0 and deviation 1 that goes on where it ends."""
     whole = np.zeros((TILE, TILE), dtype=np.float32)
     for waves in ROUGH:
-        small = np.pad(rng.normal(size=(waves, waves)).astype(np.float32), 2, mode="wrap")
+        small = np.pad(
+            rng.normal(size=(waves, waves)).astype(np.float32), 2, mode="wrap"
+        )
         edge = round(2 * TILE / waves)
-        large = cv2.resize(small, (TILE + 2 * edge, TILE + 2 * edge), interpolation=cv2.INTER_CUBIC)
+        large = cv2.resize(
+            small, (TILE + 2 * edge, TILE + 2 * edge), interpolation=cv2.INTER_CUBIC
+        )
         whole += large[edge : edge + TILE, edge : edge + TILE]
     return np.asarray((whole - whole.mean()) / whole.std())
 
 
 FILMED = (1768, 994)  # pixels of the video
-EMPTY = (0, 8, 16, 24, 30, *range(216, 230))  # frames, an odd number: a pixel is empty in most of them
-LIVING = 31  # frames from the first, whose difference from the empty picture is what lives in it
+# frames, an odd number: a pixel is empty in most of them
+EMPTY = (0, 8, 16, 24, 30, *range(216, 230))
+# frames from the first, whose difference from the empty picture is what lives in it
+LIVING = 31
 PEOPLE = 25  # grey levels: where it ever differs by more, somebody is there
 SEEN = (1240, 697)  # pixels of the part that one camera sees
-CORNERS = ((260, 297), (0, 297), (120, 250), (330, 200))  # left and top of that of each camera
+# left and top of that of each camera
+CORNERS = ((260, 297), (0, 297), (120, 250), (330, 200))
 FLICKER = 0.012  # of the brightness, slowly; and a third as much from frame to frame
 NOISE = 2.0  # grey levels, of the sensor
 
@@ -99,7 +116,8 @@ class Plate:
     """The empty pictures of one camera."""
 
     still: NDArray[np.float32] = field(repr=False)  # (height, width, 3)
-    living: NDArray[np.int8] = field(repr=False)  # (frames, height, width, 3), added to it
+    # (frames, height, width, 3), added to it
+    living: NDArray[np.int8] = field(repr=False)
 
     def frame(self, k: int) -> NDArray[np.float32]:
         """Return the picture of frame k, without flicker or noise: to and fro through what lives."""
@@ -114,10 +132,14 @@ def plate(video: str | Path, camera: int, size: tuple[int, int]) -> Plate:
     part = np.s_[top : top + SEEN[1], left : left + SEEN[0]]
 
     def scaled(image: Any) -> Any:
-        seen = cv2.resize(image[part].astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        seen = cv2.resize(
+            image[part].astype(np.float32), size, interpolation=cv2.INTER_AREA
+        )
         return seen[:, ::-1] if camera % 2 else seen
 
-    return Plate(scaled(still), np.stack([scaled(one).astype(np.int8) for one in living]))
+    return Plate(
+        scaled(still), np.stack([scaled(one).astype(np.int8) for one in living])
+    )
 
 
 def sensed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Image:
@@ -129,12 +151,16 @@ def sensed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Imag
 
 def check_video(path: str) -> Video:
     """Return the video of empty pictures. Raises ValueError where it is another one."""
-    video, frames = Video.of(path), max(EMPTY) + 1
+    video = Video.of(path)
+    frames = max(EMPTY) + 1
     count = video.count() if video.size == FILMED else 0
     if count != frames:
         wanted, came = (f"{width}x{height}" for width, height in (FILMED, video.size))
-        wanted, came = f"{wanted} pixels and {frames} frames", f"{came} and {count} frames" if count else f"{came}"
-        raise InputError(f"{path}: expected the demonstration video of Sports2D, {wanted}, got {came}")
+        wanted = f"{wanted} pixels and {frames} frames"
+        came = f"{came} and {count} frames" if count else f"{came}"
+        raise InputError(
+            f"{path}: expected the demonstration video of Sports2D, {wanted}, got {came}"
+        )
     return video
 
 
@@ -142,15 +168,28 @@ def check_video(path: str) -> Video:
 def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.int8]]]:
     """Return the whole empty picture, and what the first frames differ from it by where nobody is."""
     video = check_video(path)
-    frames = {k: image for k, image in enumerate(video.frames(0, None, FILMED)) if k in EMPTY or k < LIVING}
+    frames = {
+        k: image
+        for k, image in enumerate(video.frames(0, None, FILMED))
+        if k in EMPTY or k < LIVING
+    }
     half = len(EMPTY) // 2  # of an odd number: the median is one of them
-    still = np.partition([frames[k] for k in EMPTY], half, axis=0)[half].astype(np.float32)
-    most, away = np.zeros(still.shape[:2], dtype=np.float32), []
+    still = np.partition([frames[k] for k in EMPTY], half, axis=0)[half].astype(
+        np.float32
+    )
+    most = np.zeros(still.shape[:2], dtype=np.float32)
+    away = []
     for k in range(LIVING):
         differs = frames[k].astype(np.float32) - still
-        most = np.maximum(most, cv2.GaussianBlur(np.abs(differs).max(axis=2), (0, 0), 4.0))
-        away.append(np.clip(differs, -128.0, 127.0).astype(np.int8))  # a quarter of the memory
-    somebody = cv2.dilate((most > PEOPLE).astype(np.uint8), np.ones((41, 41), dtype=np.uint8)) > 0
+        most = np.maximum(
+            most, cv2.GaussianBlur(np.abs(differs).max(axis=2), (0, 0), 4.0)
+        )
+        # a quarter of the memory
+        away.append(np.clip(differs, -128.0, 127.0).astype(np.int8))
+    somebody = (
+        cv2.dilate((most > PEOPLE).astype(np.uint8), np.ones((41, 41), dtype=np.uint8))
+        > 0
+    )
     for one in away:
         one[somebody] = 0
     return still, away
@@ -161,11 +200,14 @@ LIGHT = np.array([0.45, -0.75, 0.48])  # the way the light goes, in the world
 AMBIENT = 0.55  # share of the light that comes from everywhere
 SHADE = 0.4  # share of the light that a cast shadow takes
 SOFT = 3.0  # pixels: the spread of a shadow's edge
-OVER = 1.06  # by how much more than its radius a cone is painted, so that no pixel of its mask is without colour
+# by how much more than its radius a cone is painted, so that no pixel of its mask is
+# without colour
+OVER = 1.06
 _PARENTS = np.array(PARENTS[1:])
 _HIPS = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
 _SPINE = JOINTS.index("root"), JOINTS.index("thorax")
-_FORWARD = np.array([kind(bone) in ("foot", "toes") for bone in BONES])  # these go forward themselves
+# these go forward themselves
+_FORWARD = np.array([kind(bone) in ("foot", "toes") for bone in BONES])
 
 
 class Posed(NamedTuple):
@@ -177,10 +219,19 @@ class Posed(NamedTuple):
     outfit: Outfit
 
 
-def composited(picture: NDArray[np.float32], camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
+def composited(
+    picture: NDArray[np.float32], camera: Camera, people: Sequence[Posed]
+) -> NDArray[np.float32]:
     image = picture * _shadow(camera, people)[..., None]
-    width, height = FINER * camera.width, FINER * camera.height
-    fine = replace(camera, width=width, height=height, focal=FINER * camera.focal, centre=FINER * camera.centre)
+    width = FINER * camera.width
+    height = FINER * camera.height
+    fine = replace(
+        camera,
+        width=width,
+        height=height,
+        focal=FINER * camera.focal,
+        centre=FINER * camera.centre,
+    )
     mask = np.zeros((fine.height, fine.width), dtype=bool)
     for one in people:
         mask |= project(one.body, fine, one.pose, one.place)
@@ -191,7 +242,9 @@ def composited(picture: NDArray[np.float32], camera: Camera, people: Sequence[Po
     part = mask[box]
     colours[~part] = 0.0
     small = part.shape[1] // FINER, part.shape[0] // FINER
-    share = cv2.resize(part.astype(np.float32), small, interpolation=cv2.INTER_AREA)[..., None]
+    share = cv2.resize(part.astype(np.float32), small, interpolation=cv2.INTER_AREA)[
+        ..., None
+    ]
     seen = cv2.resize(colours, small, interpolation=cv2.INTER_AREA)
     rows, columns = (slice(one.start // FINER, one.stop // FINER) for one in box)
     image[rows, columns] = (1.0 - share) * image[rows, columns] + seen
@@ -204,23 +257,32 @@ def true_masks(camera: Camera, people: Sequence[Posed]) -> list[Mask]:
     depths = [camera.project(one.place)[1] for one in people]
     seen = []
     for k, mask in enumerate(whole):
-        hidden = [other for other, depth in zip(whole, depths, strict=True) if depth < depths[k]]
+        hidden = [
+            other
+            for other, depth in zip(whole, depths, strict=True)
+            if depth < depths[k]
+        ]
         seen.append(mask & ~np.any(hidden, axis=0) if hidden else mask)
     return seen
 
 
 def _box(mask: Mask) -> Any:
     """Return the part of a fine mask that is not empty, of whole coarse pixels; None where all is."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows = np.flatnonzero(mask.any(axis=1))
+    columns = np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return None
-    return tuple(slice(FINER * (one[0] // FINER), FINER * (one[-1] // FINER + 1)) for one in (rows, columns))
+    return tuple(
+        slice(FINER * (one[0] // FINER), FINER * (one[-1] // FINER + 1))
+        for one in (rows, columns)
+    )
 
 
 def _painted(camera: Camera, box: Any, people: Sequence[Posed]) -> NDArray[np.float32]:
     """Return the colours (height, width, 3) of the nearest surfaces in a part of a picture."""
     shape = box[0].stop - box[0].start, box[1].stop - box[1].start
-    colours, nearest = np.zeros((*shape, 3), dtype=np.float32), np.full(shape, np.inf, dtype=np.float32)
+    colours = np.zeros((*shape, 3), dtype=np.float32)
+    nearest = np.full(shape, np.inf, dtype=np.float32)
     for one in people:
         for part, depths, painted in _cones(camera, box, one):
             nearer = depths < nearest[part]
@@ -241,42 +303,71 @@ def _cones(camera: Camera, box: Any, one: Posed) -> Iterator[tuple[Any, Array, A
         if depths[ends].min() <= NEAR:
             continue
         radii = OVER * one.body.radii[bone] * scale[ends] + 1.0
-        low = np.maximum((pixels[ends] - radii[:, None]).min(axis=0) - [box[1].start, box[0].start], 0.0)
-        high = (pixels[ends] + radii[:, None]).max(axis=0) - [box[1].start, box[0].start] + 1.0
+        low = np.maximum(
+            (pixels[ends] - radii[:, None]).min(axis=0) - [box[1].start, box[0].start],
+            0.0,
+        )
+        high = (
+            (pixels[ends] + radii[:, None]).max(axis=0)
+            - [box[1].start, box[0].start]
+            + 1.0
+        )
         left, top = low.astype(int)
-        right, bottom = np.minimum(high, [box[1].stop - box[1].start, box[0].stop - box[0].start]).astype(int)
+        right, bottom = np.minimum(
+            high, [box[1].stop - box[1].start, box[0].stop - box[0].start]
+        ).astype(int)
         if left >= right or top >= bottom:
             continue
         y, x = np.mgrid[top:bottom, left:right] + 0.5
         way = pixels[ends[1]] - pixels[ends[0]]
-        off_x, off_y = x + box[1].start - pixels[ends[0], 0], y + box[0].start - pixels[ends[0], 1]
-        along = np.clip((off_x * way[0] + off_y * way[1]) / max(way @ way, 1e-9), 0.0, 1.0)
-        off_x, off_y = off_x - along * way[0], off_y - along * way[1]
+        off_x = x + box[1].start - pixels[ends[0], 0]
+        off_y = y + box[0].start - pixels[ends[0], 1]
+        along = np.clip(
+            (off_x * way[0] + off_y * way[1]) / max(way @ way, 1e-9), 0.0, 1.0
+        )
+        off_x = off_x - along * way[0]
+        off_y = off_y - along * way[1]
         radius = radii[0] + along * (radii[1] - radii[0])
         aside = np.hypot(off_x, off_y) / radius
         bulge = np.sqrt(np.clip(1.0 - aside**2, 0.0, 1.0))
-        normals = np.stack([off_x / radius, off_y / radius, -bulge], axis=-1) @ camera.rotation
+        normals = (
+            np.stack([off_x / radius, off_y / radius, -bulge], axis=-1)
+            @ camera.rotation
+        )
         depth = depths[ends[0]] + along * (depths[ends[1]] - depths[ends[0]])
-        depth = np.where(aside <= 1.0, depth - bulge * radius / scale[ends].mean(), np.inf)
+        depth = np.where(
+            aside <= 1.0, depth - bulge * radius / scale[ends].mean(), np.inf
+        )
         axis = joints[ends[1]] - joints[ends[0]]
         reference = across if _FORWARD[bone] else ahead
         colour = _lit(one.outfit, bone, normals, along, axis, reference)
         yield np.s_[top:bottom, left:right], depth.astype(np.float32), colour
 
 
-def _lit(outfit: Outfit, bone: int, normals: Array, along: Array, axis: Array, reference: Array) -> Array:
+def _lit(
+    outfit: Outfit,
+    bone: int,
+    normals: Array,
+    along: Array,
+    axis: Array,
+    reference: Array,
+) -> Array:
     """Return the colours of a bone's surface: its weave goes around the axis from a direction that turns with it."""
     long = float(np.linalg.norm(axis))
     axis = axis / max(long, 1e-9)
     first = reference - (reference @ axis) * axis
     first /= max(float(np.linalg.norm(first)), 1e-9)
-    around = np.arctan2(normals @ np.cross(axis, first), normals @ first) / (2.0 * np.pi)
+    around = np.arctan2(normals @ np.cross(axis, first), normals @ first) / (
+        2.0 * np.pi
+    )
     column = (around * TILE).astype(int) % TILE
     row = ((37 * bone) + along * long / LENGTH * TILE).astype(int) % TILE
     woven = 1.0 + outfit.strengths[bone] * outfit.weave[row, column]
     towards = -LIGHT / np.linalg.norm(LIGHT)
     light = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ towards, 0.0, 1.0) * 1.6
-    return np.asarray((woven * light)[..., None] * outfit.colours[bone], dtype=np.float32)
+    return np.asarray(
+        (woven * light)[..., None] * outfit.colours[bone], dtype=np.float32
+    )
 
 
 def _shadow(camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
@@ -290,10 +381,20 @@ def _shadow(camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
             ends = [int(_PARENTS[bone]), bone + 1]
             if depths[ends].min() <= 1.0:
                 continue
-            thick = 2.0 * float(one.body.radii[bone].mean() * camera.focal[0] / depths[ends].mean())
+            thick = 2.0 * float(
+                one.body.radii[bone].mean() * camera.focal[0] / depths[ends].mean()
+            )
             points = np.clip(16.0 * pixels[ends], -1e6, 1e6).astype(int)
             # the ground is seen at a grazing angle, and so is the thickness of what lies on it
-            cv2.line(dark, points[0].tolist(), points[1].tolist(), 255, max(1, round(0.4 * thick)), cv2.LINE_AA, 4)
+            cv2.line(
+                dark,
+                points[0].tolist(),
+                points[1].tolist(),
+                255,
+                max(1, round(0.4 * thick)),
+                cv2.LINE_AA,
+                4,
+            )
     soft = cv2.GaussianBlur(dark, (0, 0), SOFT)
     return np.asarray(1.0 - SHADE * soft.astype(np.float32) / 255.0)
 
@@ -307,7 +408,8 @@ class Actor:
     """Somebody in a scene: his body, how he moves, when he is there at all, and which clothes he wears."""
 
     body: Body
-    motion: Motion = field(repr=False)  # of the whole scene; where he is not there, it means nothing
+    # of the whole scene; where he is not there, it means nothing
+    motion: Motion = field(repr=False)
     present: NDArray[np.bool_] = field(repr=False)  # (T,)
     outfit: int
 
@@ -324,15 +426,24 @@ def walked_on(motion: Motion, metres: float) -> Motion:
     """
     start, stop = cycle(motion)
     count = stop - start
-    poses, places = motion.poses[start : stop + 1].copy(), motion.translations[start : stop + 1].copy()
+    poses = motion.poses[start : stop + 1].copy()
+    places = motion.translations[start : stop + 1].copy()
     share = np.arange(count + 1)[:, None] / count
-    poses -= share * np.concatenate([wrapped(poses[-1, :3] - poses[0, :3]), poses[-1, 3:] - poses[0, 3:]])
+    poses -= share * np.concatenate(
+        [wrapped(poses[-1, :3] - poses[0, :3]), poses[-1, 3:] - poses[0, 3:]]
+    )
     places[:, 1] -= share[:, 0] * (places[-1, 1] - places[0, 1])
     step = places[-1] - places[0]
     times = int(np.ceil(metres / np.linalg.norm(step)))
     far = np.concatenate([places[:-1] + k * step for k in range(times)])
     kept = int(np.searchsorted(np.linalg.norm(far - far[0], axis=1), metres))
-    return Motion(motion.name, motion.skeleton, np.tile(poses[:-1], (times, 1))[:kept], far[:kept], motion.fps)
+    return Motion(
+        motion.name,
+        motion.skeleton,
+        np.tile(poses[:-1], (times, 1))[:kept],
+        far[:kept],
+        motion.fps,
+    )
 
 
 def cycle(motion: Motion) -> tuple[int, int]:
@@ -351,7 +462,8 @@ def cycle(motion: Motion) -> tuple[int, int]:
 def facing_elsewhere(motion: Motion, angle: float) -> Motion:
     poses, (x, y, z) = motion.poses.copy(), motion.translations.T
     poses[:, 0] += angle
-    sine, cosine = np.sin(angle), np.cos(angle)
+    sine = np.sin(angle)
+    cosine = np.cos(angle)
     places = np.column_stack([cosine * x + sine * z, y, cosine * z - sine * x])
     return Motion(motion.name, motion.skeleton, poses, places, motion.fps)
 
@@ -364,7 +476,9 @@ def on_ground(motion: Motion, body: Body) -> Motion:
 
 
 def moved(motion: Motion, by: Array) -> Motion:
-    return Motion(motion.name, motion.skeleton, motion.poses, motion.translations + by, motion.fps)
+    return Motion(
+        motion.name, motion.skeleton, motion.poses, motion.translations + by, motion.fps
+    )
 
 
 def heading(motion: Motion) -> float:
@@ -375,7 +489,8 @@ def heading(motion: Motion) -> float:
 
 def middle_of(motion: Motion) -> Array:
     """Return the middle of the ground that a motion covers, a point (3,) with y = 0."""
-    low, high = motion.translations.min(axis=0), motion.translations.max(axis=0)
+    low = motion.translations.min(axis=0)
+    high = motion.translations.max(axis=0)
     return np.asarray(0.5 * (low + high) * [1.0, 0.0, 1.0])
 
 
@@ -386,40 +501,69 @@ def longest(motion: Motion) -> float:
     return float(np.arctan2(axes[0, 0], axes[0, 1]))
 
 
-def through(motion: Motion, body: Body, reach: float, *, back: bool = False, aside: float = 0.0) -> Motion:
+def through(
+    motion: Motion, body: Body, reach: float, *, back: bool = False, aside: float = 0.0
+) -> Motion:
     """Return a walk from x = -reach to x = reach, or back, `aside` metres nearer to z."""
     long = walked_on(motion, 2.0 * reach)
-    ahead = on_ground(facing_elsewhere(long, (-ALONG if back else ALONG) - heading(long)), body)
+    ahead = on_ground(
+        facing_elsewhere(long, (-ALONG if back else ALONG) - heading(long)), body
+    )
     return moved(ahead, [0.0, 0.0, aside] - middle_of(ahead))
 
 
 def one_after_other(parts: Sequence[Motion | int]) -> tuple[Motion, NDArray[np.bool_]]:
     """Return motions one after the other, and in which frames somebody is there; a number is frames without anybody."""
     first = next(part for part in parts if isinstance(part, Motion))
-    poses, places, present = [], [], []
+    poses = []
+    places = []
+    present = []
     for part in parts:
         if isinstance(part, Motion):
             poses.append(part.poses)
             places.append(part.translations)
             present += [True] * len(part)
         else:
-            poses.append(np.repeat(poses[-1][-1:] if poses else first.poses[:1], part, axis=0))
-            places.append(np.repeat(places[-1][-1:] if places else first.translations[:1], part, axis=0))
+            poses.append(
+                np.repeat(poses[-1][-1:] if poses else first.poses[:1], part, axis=0)
+            )
+            places.append(
+                np.repeat(
+                    places[-1][-1:] if places else first.translations[:1], part, axis=0
+                )
+            )
             present += [False] * part
-    motion = Motion(first.name, first.skeleton, np.concatenate(poses), np.concatenate(places), first.fps)
+    motion = Motion(
+        first.name,
+        first.skeleton,
+        np.concatenate(poses),
+        np.concatenate(places),
+        first.fps,
+    )
     return motion, np.array(present)
 
 
 SIZE = (640, 360)  # pixels of a frame
-DISTANCE, HEIGHT = 8.0, 0.95  # metres of a camera from the middle, and above the ground
+# metres of a camera from the middle, and above the ground
+DISTANCE = 8.0
+HEIGHT = 0.95
 ACROSS = np.radians(36.0)  # that a camera sees
-PLACES: Mapping[int, Sequence[float]] = {1: (0.0,), 2: (-30.0, 30.0), 4: (-30.0, 30.0, 150.0, 210.0)}  # degrees
+# degrees
+PLACES: Mapping[int, Sequence[float]] = {
+    1: (0.0,),
+    2: (-30.0, 30.0),
+    4: (-30.0, 30.0, 150.0, 210.0),
+}
 REACH = {1: 3.4, 2: 5.2, 4: 5.2}  # metres to either side, where nobody is seen any more
-BARE, AWAY = 10, 20  # frames without anybody: before and after, and until somebody comes back
+# frames without anybody: before and after, and until somebody comes back
+BARE = 10
+AWAY = 20
 FARTHER = 1.5  # that whoever passes aside goes to either side, for each metre aside
 NEARER = 0.7  # metres from the middle, of each of two who pass
-MIRRORED = [joint - 1 for joint in MIRROR[1:]]  # of each bone, the one on the other side
-GIRTH = 10.0  # percent that a part of the body may be thicker or thinner than the library's
+# of each bone, the one on the other side
+MIRRORED = [joint - 1 for joint in MIRROR[1:]]
+# percent that a part of the body may be thicker or thinner than the library's
+GIRTH = 10.0
 LONGEST = 240  # frames of somebody who is always there
 
 # Who goes through (clips of one cycle at least), and who is always there (from which frame on, to which): others in
@@ -428,7 +572,11 @@ WALKS = ("16_47", "02_01", "49_01")
 STAYING: Mapping[str, Sequence[tuple[str, int, int]]] = {
     "stands": (("49_15", 0, 150), ("14_04", 0, 150), ("29_02", 100, 250)),
     "waves": (("29_05", 60, 240), ("14_05", 40, 212), ("02_06", 0, 180)),
-    "to and fro": (("29_01", 0, LONGEST), ("09_12", 0, LONGEST), ("09_12", 200, 200 + LONGEST)),
+    "to and fro": (
+        ("29_01", 0, LONGEST),
+        ("09_12", 0, LONGEST),
+        ("09_12", 200, 200 + LONGEST),
+    ),
     "squats": (("02_06", 180, 400), ("14_06", 0, 130), ("14_20", 0, 120)),
 }
 TREADMILL = 4.0  # metres to either side, that are walked on the spot
@@ -466,23 +614,35 @@ SHOWS = {
 
 def situation(name: str, views: int, seed: int) -> Situation:
     rng = np.random.default_rng([seed, views])
-    turned = rng.uniform(-8.0, 8.0) + 90.0 * (name == "towards")  # degrees, so that no side view is exactly one
+    # degrees, so that no side view is exactly one
+    turned = rng.uniform(-8.0, 8.0) + 90.0 * (name == "towards")
     target = np.array([0.0, HEIGHT, 0.0])
-    cameras = [Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS) for degrees in PLACES[views]]
+    cameras = [
+        Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS)
+        for degrees in PLACES[views]
+    ]
     return Situation(_actors(name, views, seed), cameras)
 
 
 def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
     walk = WALKS[seed % len(WALKS)]
     if name in STAYING:
-        return [_staying(STAYING[name][seed % len(STAYING[name])], seed, along=name == "to and fro")]
+        return [
+            _staying(
+                STAYING[name][seed % len(STAYING[name])],
+                seed,
+                along=name == "to and fro",
+            )
+        ]
     if name in ("treadmill", "towards"):
         return [_on_treadmill(walk, seed)]
     if name == "through":
         return [_walker(walk, views, seed)]
     if name == "two":
         near = _walker(walk, views, seed, aside=NEARER)
-        far = _walker(WALKS[(seed + 1) % len(WALKS)], views, seed + 1, back=True, aside=-NEARER)
+        far = _walker(
+            WALKS[(seed + 1) % len(WALKS)], views, seed + 1, back=True, aside=-NEARER
+        )
         count = max(len(near.motion), len(far.motion))
         return [_lasting(actor, count) for actor in (near, far)]
     return [_returning(walk, views, seed, back=name == "back")]
@@ -491,20 +651,30 @@ def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
 def _dressed(motion: Motion, seed: int) -> tuple[Motion, Body]:
     """Return a motion, and a body whose parts are thicker and thinner than proportions say, left and right alike."""
     body = Body.of(motion.skeleton)
-    shares = 1.0 + np.random.default_rng([seed, 1]).uniform(-GIRTH, GIRTH, len(body.radii)) / 100.0
+    shares = (
+        1.0
+        + np.random.default_rng([seed, 1]).uniform(-GIRTH, GIRTH, len(body.radii))
+        / 100.0
+    )
     return motion, body.scaled(1.0, 0.5 * (shares + shares[MIRRORED]))
 
 
-def _walker(name: str, views: int, seed: int, *, back: bool = False, aside: float = 0.0) -> Actor:
+def _walker(
+    name: str, views: int, seed: int, *, back: bool = False, aside: float = 0.0
+) -> Actor:
     motion, body = _dressed(frames_of(name), seed)
-    walk = through(motion, body, REACH[views] + FARTHER * abs(aside), back=back, aside=aside)
+    walk = through(
+        motion, body, REACH[views] + FARTHER * abs(aside), back=back, aside=aside
+    )
     whole, present = one_after_other([BARE, walk, BARE])
     return Actor(body, whole, present, seed)
 
 
 def _returning(name: str, views: int, seed: int, *, back: bool) -> Actor:
     motion, body = _dressed(frames_of(name), seed)
-    first, second = (through(motion, body, REACH[views], back=way) for way in (False, back))
+    first, second = (
+        through(motion, body, REACH[views], back=way) for way in (False, back)
+    )
     whole, present = one_after_other([BARE, first, AWAY, second, BARE])
     return Actor(body, whole, present, seed)
 
@@ -524,7 +694,11 @@ def _staying(frames: tuple[str, int, int], seed: int, *, along: bool) -> Actor:
 def _on_treadmill(name: str, seed: int) -> Actor:
     motion, body = _dressed(frames_of(name), seed)
     walk = through(motion, body, TREADMILL)
-    gone = np.linspace(walk.translations[0], walk.translations[-1], len(walk)) * [1.0, 0.0, 1.0]
+    gone = np.linspace(walk.translations[0], walk.translations[-1], len(walk)) * [
+        1.0,
+        0.0,
+        1.0,
+    ]
     there = replace(walk, translations=walk.translations - gone)
     return Actor(body, there, np.ones(len(there), dtype=bool), seed)
 
@@ -547,28 +721,45 @@ def film(
     camera.
     """
     rng = np.random.default_rng([seed, 4])
-    videos, masks = [], []
+    videos = []
+    masks = []
     fps = situation.actors[0].motion.fps
-    for number, (camera, behind) in enumerate(zip(situation.cameras, plates, strict=True)):
+    for number, (camera, behind) in enumerate(
+        zip(situation.cameras, plates, strict=True)
+    ):
         path = folder / f"camera-{number + 1}.mp4"
         visible: list[list[Mask]] = []
         with VideoWriter(path, fps, (camera.width, camera.height)) as writer:
             for k, (people, each) in enumerate(_frames(situation, camera, behind)):
-                writer.write(sensed(composited(behind.frame(k), camera, people), k, rng))
+                writer.write(
+                    sensed(composited(behind.frame(k), camera, people), k, rng)
+                )
                 visible.append(each)
         videos.append(path)
         masks.append(np.stack(visible, axis=1))
     return videos, np.stack(masks, axis=1)
 
 
-def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tuple[list[Posed], list[Mask]]]:
+def _frames(
+    situation: Situation, camera: Camera, behind: Plate
+) -> Iterator[tuple[list[Posed], list[Mask]]]:
     """Yield who is there in each frame, and the visible part of each actor."""
-    clothes = [outfit(actor.outfit, behind.still.astype(np.uint8)) for actor in situation.actors]
+    clothes = [
+        outfit(actor.outfit, behind.still.astype(np.uint8))
+        for actor in situation.actors
+    ]
     for k in range(len(situation)):
         people = [
             Posed(actor.body, actor.motion.poses[k], actor.motion.translations[k], worn)
             for actor, worn in zip(situation.actors, clothes, strict=True)
             if actor.present[k]
         ]
-        visible, nothing = iter(true_masks(camera, people)), np.zeros((camera.height, camera.width), dtype=bool)
-        yield people, [next(visible) if actor.present[k] else nothing for actor in situation.actors]
+        visible = iter(true_masks(camera, people))
+        nothing = np.zeros((camera.height, camera.width), dtype=bool)
+        yield (
+            people,
+            [
+                next(visible) if actor.present[k] else nothing
+                for actor in situation.actors
+            ],
+        )

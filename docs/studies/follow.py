@@ -22,7 +22,9 @@ from posefit.tracking.options import TrackOptions
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
 
-CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
+# twenty-seven seconds, which are gone through forwards and backwards as often as it
+# takes
+CLIP = "14_13"
 POSES = 40  # of a call, by which the effort of a step is measured
 
 
@@ -32,9 +34,20 @@ def follow_figures(frames: int) -> dict[str, float]:
     `ms` is the CPU time of a frame, and `mb` the process's peak memory. `step_poses` is how many costs of poses take as
     long as a step of a fit.
     """
-    training = [clip.motion() for clip in recorded.clips(without=[recorded.clip(CLIP).subject])]
-    scene = synthetic(recorded.clip(CLIP).motion(), (45.0,), (320, 240), [], (None, None))
-    task = replace(task_of(scene, TrackOptions(translation="aligned", evaluations=EVALUATIONS), training), yaw=None)
+    training = [
+        clip.motion() for clip in recorded.clips(without=[recorded.clip(CLIP).subject])
+    ]
+    scene = synthetic(
+        recorded.clip(CLIP).motion(), (45.0,), (320, 240), [], (None, None)
+    )
+    task = replace(
+        task_of(
+            scene,
+            TrackOptions(translation="aligned", evaluations=EVALUATIONS),
+            training,
+        ),
+        yaw=None,
+    )
 
     def observations(count: int) -> Iterator[Observation]:
         last = scene.count - 1
@@ -43,27 +56,42 @@ def follow_figures(frames: int) -> dict[str, float]:
 
     with threadpool_limits(1):
         tracker = registry().offer("tracker", "exemplars").factory(task)
-        list(tracker.track(observations(2), np.random.default_rng(0)))  # loads what is compiled
+        # loads what is compiled
+        list(tracker.track(observations(2), np.random.default_rng(0)))
         began = process_time()
         for _ in tracker.track(observations(frames), np.random.default_rng(0)):
             pass
         seconds = process_time() - began
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
-        return {"ms": 1e3 * seconds / frames, "mb": peak, "step_poses": _step_poses(task, scene)}
+        return {
+            "ms": 1e3 * seconds / frames,
+            "mb": peak,
+            "step_poses": _step_poses(task, scene),
+        }
 
 
 def _step_poses(task: Task, scene: Scene) -> float:
     truth = scene.truth
     assert truth is not None
-    poses, places = (np.repeat(array[:1], POSES, axis=0) for array in (truth.poses, truth.translations))
-    poses += np.random.default_rng(0).normal(0.0, 0.1, poses.shape) * truth.skeleton.free
+    poses, places = (
+        np.repeat(array[:1], POSES, axis=0)
+        for array in (truth.poses, truth.translations)
+    )
+    poses += (
+        np.random.default_rng(0).normal(0.0, 0.1, poses.shape) * truth.skeleton.free
+    )
     frame_costs = FrameCosts(task, scene.observations[0])
-    contours, weights = frame_costs.contours(places[0]), precisions(START_TURN, KNOWN_SHIFT)
+    contours = frame_costs.contours(places[0])
+    weights = precisions(START_TURN, KNOWN_SHIFT)
     jobs = (
-        lambda: fitted(task.body, contours, (poses, places), poses, weights, CONTINUED_REACHES),
+        lambda: fitted(
+            task.body, contours, (poses, places), poses, weights, CONTINUED_REACHES
+        ),
         lambda: frame_costs.full(poses, places),
     )
-    fit, cost = (min(repeat(job, number=1, repeat=20, timer=process_time)) for job in jobs)
+    fit, cost = (
+        min(repeat(job, number=1, repeat=20, timer=process_time)) for job in jobs
+    )
     return fit / len(CONTINUED_REACHES) / cost
 
 

@@ -52,8 +52,14 @@ from posefit_reproduce.sapso.motions import paper_motions
 from posefit_reproduce.sapso.paper import FRAMES as FRAMES_OF_THE_PAPER
 
 Activity = Literal["walk", "run"]
-ACTIVITIES: dict[str, Activity] = {"walking": "walk", "jogging": "run", "jog": "run", "running": "run"}
-HUMANEVA_START = 5  # the first frames of its films are copies of one: a fault of their codec
+ACTIVITIES: dict[str, Activity] = {
+    "walking": "walk",
+    "jogging": "run",
+    "jog": "run",
+    "running": "run",
+}
+# the first frames of its films are copies of one: a fault of their codec
+HUMANEVA_START = 5
 MAX_TEXT_BYTES = 1_000_000
 MILLIMETRES = 1e3  # in a metre
 IMAGES = 6  # estimated by themselves, and shown
@@ -62,7 +68,9 @@ SQUARE = 0.65  # of the person's height in pixels: half the side of such a pictu
 SOLID = 0.65  # how much of the film the body hides
 SINGLE = "PCA + SAPSO, images"
 TRACKED = (*PAPER, LETTER)
-LABELS = {SINGLE: SINGLE} | {name: f"{METHOD_LABELS[name]}, tracked" for name in TRACKED}
+LABELS = {SINGLE: SINGLE} | {
+    name: f"{METHOD_LABELS[name]}, tracked" for name in TRACKED
+}
 Estimates = dict[int, Frame]  # the poses of some frames of a scene
 
 
@@ -83,14 +91,19 @@ def recording_of(film: Path) -> Recording:
 
     Raises InputError where files that belong to it are missing or are not what they should be.
     """
-    name, above = existing(film).stem, film.resolve().parent.parent
+    name = existing(film).stem
+    above = film.resolve().parent.parent
     if kth := re.fullmatch(r"(person\d+_(walking|jogging|running)_d\d)_uncomp", name):
         tables = [folder / "00sequences.txt" for folder in (film.parent, above)]
         table = next((table for table in tables if table.is_file()), tables[1])
         return Recording(kth[1], film, ACTIVITIES[kth[2]], _kth_frames(table, kth[1]))
-    if humaneva := re.fullmatch(r"(?P<trial>(Walking|Jog)_\d+)_\((?P<camera>(C|BW)\d)\)", name):
+    if humaneva := re.fullmatch(
+        r"(?P<trial>(Walking|Jog)_\d+)_\((?P<camera>(C|BW)\d)\)", name
+    ):
         camera = humaneva["camera"]
-        calibration = read_calibration(above / "Calibration_Data" / f"{camera}.cal", Video.of(film).size)
+        calibration = read_calibration(
+            above / "Calibration_Data" / f"{camera}.cal", Video.of(film).size
+        )
         activity = ACTIVITIES[humaneva[2].lower()]
         named = f"{above.name}_{humaneva['trial']}_{camera}"
         return Recording(named, film, activity, (HUMANEVA_START, None), calibration)
@@ -104,7 +117,9 @@ def _kth_frames(table: Path, name: str) -> Range:
     text = read_text(existing(table), MAX_TEXT_BYTES)
     line = re.search(rf"^\s*{name}\s+frames\s+(\d+)\s*-\s*(\d+)", text, re.MULTILINE)
     if line is None:
-        raise InputError(f"{table}: expected a line such as '{name} frames 1-75, 120-190', got none")
+        raise InputError(
+            f"{table}: expected a line such as '{name} frames 1-75, 120-190', got none"
+        )
     return int(line[1]) - 1, int(line[2])
 
 
@@ -118,23 +133,40 @@ def read_calibration(path: Path, size: tuple[int, int]) -> Calibration:
     try:
         values = np.array([float(word) for word in words[:22]])
         rotation = values[10:19].reshape(3, 3)
-        valid = np.isfinite(values).all() and np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-2
+        valid = (
+            np.isfinite(values).all()
+            and np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-2
+        )
     except ValueError:
         valid = False
     if not valid or len(words) < 22 or min(values[:2]) <= 0.0:
-        raise InputError(f"{path}: expected 22 numbers: focal lengths, centre, skew, distortion, rotation, translation")
-    matrix = np.array([[values[0], 0.0, values[2]], [0.0, values[1], values[3]], [0.0, 0.0, 1.0]])
-    return Calibration(path.stem, size, matrix, values[5:10], rotation, values[19:] / MILLIMETRES)
+        raise InputError(
+            f"{path}: expected 22 numbers: focal lengths, centre, skew, distortion, rotation, translation"
+        )
+    matrix = np.array(
+        [[values[0], 0.0, values[2]], [0.0, values[1], values[3]], [0.0, 0.0, 1.0]]
+    )
+    return Calibration(
+        path.stem, size, matrix, values[5:10], rotation, values[19:] / MILLIMETRES
+    )
 
 
-def filmed_scene(recording: Recording, frames: Range = (None, None), **view: Any) -> tuple[Scene, int]:
+def filmed_scene(
+    recording: Recording, frames: Range = (None, None), **view: Any
+) -> tuple[Scene, int]:
     """Return the scene of 100 frames of a film, or of those chosen, and the number of its first frame."""
     count = Video.of(recording.film).count()
     start, stop = span(recording.frames if frames == (None, None) else frames, count)
     if frames == (None, None):
         stop = min(stop, start + FRAMES_OF_THE_PAPER)
     camera = () if recording.calibration is None else (recording.calibration,)
-    scene = scene_of([recording.film], camera=camera, frames=(start, stop), asf=recording.skeleton, **view)
+    scene = scene_of(
+        [recording.film],
+        camera=camera,
+        frames=(start, stop),
+        asf=recording.skeleton,
+        **view,
+    )
     return replace(scene, name=recording.name), start
 
 
@@ -146,11 +178,18 @@ def estimates_of(scene: Scene, training: Sequence[Motion]) -> dict[str, Estimate
     """
     estimates: dict[str, Estimates] = {}
     for name in TRACKED:
-        how = TrackOptions(**options_of(name, training, ITERATIONS), smooth=False, body_frames=0)
-        track = track_scene(replace(scene, yaw=None), training, completed(how, scene.truth))
+        how = TrackOptions(
+            **options_of(name, training, ITERATIONS), smooth=False, body_frames=0
+        )
+        track = track_scene(
+            replace(scene, yaw=None), training, completed(how, scene.truth)
+        )
         estimates[name] = dict(enumerate(track.frames))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
-    chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
+    chosen = [
+        usable[k]
+        for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))
+    ]
     images = {k: replace(scene.observations[k], yaw=None) for k in chosen}
     single = estimate_images(scene, images, training, OURS, ITERATIONS, 0)
     return {SINGLE: dict(zip(chosen, single, strict=True)), **estimates}
@@ -167,7 +206,9 @@ def figures_of(estimates: Estimates, scene: Scene) -> dict[str, float]:
     }
 
 
-def picture(scene: Scene, estimates: dict[str, Estimates], frames: Sequence[int], first: int) -> Image:
+def picture(
+    scene: Scene, estimates: dict[str, Estimates], frames: Sequence[int], first: int
+) -> Image:
     """Return the person in frames of a film side by side, and below with the body of each estimate.
 
     `frames` are their numbers in the scene, whose first frame has the number `first` in the film.
@@ -180,8 +221,18 @@ def picture(scene: Scene, estimates: dict[str, Estimates], frames: Sequence[int]
         squares = []
         for k in frames:
             drawn = films[k].copy()
-            draw_body(drawn, scene.body, scene.cameras[0], results[k].pose, results[k].translation)
-            squares.append(_square(cv2.addWeighted(drawn, SOLID, films[k], 1.0 - SOLID, 0.0), masks[k]))
+            draw_body(
+                drawn,
+                scene.body,
+                scene.cameras[0],
+                results[k].pose,
+                results[k].translation,
+            )
+            squares.append(
+                _square(
+                    cv2.addWeighted(drawn, SOLID, films[k], 1.0 - SOLID, 0.0), masks[k]
+                )
+            )
         rows.append(np.hstack(squares))
         write(rows[-1], LABELS[name], (8, 20))
     for number, k in enumerate(frames):
@@ -193,8 +244,12 @@ def _square(image: Any, silhouette: Silhouette) -> Image:
     """Return the square of a picture that shows the person, black beyond its borders and darker under its label."""
     (x, y), tall = extent_of(silhouette)
     half = SQUARE * tall
-    placed = TALL / (2.0 * half) * np.array([[1.0, 0.0, half - x], [0.0, 1.0, half - y]])
-    square: Image = np.asarray(cv2.warpAffine(image, placed, (TALL, TALL)), dtype=np.uint8)
+    placed = (
+        TALL / (2.0 * half) * np.array([[1.0, 0.0, half - x], [0.0, 1.0, half - y]])
+    )
+    square: Image = np.asarray(
+        cv2.warpAffine(image, placed, (TALL, TALL)), dtype=np.uint8
+    )
     square[:28] //= 4
     return square
 
@@ -202,17 +257,33 @@ def _square(image: Any, silhouette: Silhouette) -> Image:
 def table_of(name: str, figures: dict[str, dict[str, float]]) -> Table:
     """Return what is known of a film's estimates, without a truth."""
     rows = [
-        [LABELS[method], *(str(row[key]) for key in ("frames", "usable")), f"{row['iou']:.3f}", f"{row['cost']:.2f}"]
+        [
+            LABELS[method],
+            *(str(row[key]) for key in ("frames", "usable")),
+            f"{row['iou']:.3f}",
+            f"{row['cost']:.2f}",
+        ]
         for method, row in figures.items()
     ]
-    return Table(name, ["method", "frames", "usable", "IoU with the mask", "cost (4)"], rows)
+    return Table(
+        name, ["method", "frames", "usable", "IoU with the mask", "cost (4)"], rows
+    )
 
 
 @click.command(cls=Command)
 @click.argument("films", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--activity", type=click.Choice(["walk", "run"]), help="What films show whose names do not say it.")
+@click.option(
+    "--activity",
+    type=click.Choice(["walk", "run"]),
+    help="What films show whose names do not say it.",
+)
 @CLIPS
-@click.option("--out", required=True, metavar="DIR", help="New folder for the tables and the pictures of both figures.")
+@click.option(
+    "--out",
+    required=True,
+    metavar="DIR",
+    help="New folder for the tables and the pictures of both figures.",
+)
 @options((FRAMES, *track_flags("height"), *EXTRACTION))
 def main(
     films: tuple[Path, ...],
@@ -228,25 +299,38 @@ def main(
     FILMS are of KTH's actions, HumanEva-I or CMU's motion capture database as unpacked, or any others. Of each film 100
     frames are taken, from the first that shows the person by what its data set says, unless --frames chooses others.
     """
-    view = {"height": height, "extraction": extraction_of(extraction, "video") or Extraction()}
+    view = {
+        "height": height,
+        "extraction": extraction_of(extraction, "video") or Extraction(),
+    }
     recordings = [recording_of(film) for film in films]
     for recording in recordings:
         if recording.activity is None and activity is None:
-            raise InputError(f"--activity must be given for films that do not say it, such as {recording.film}")
+            raise InputError(
+                f"--activity must be given for films that do not say it, such as {recording.film}"
+            )
     motions = paper_motions(clips, FRAMES_OF_THE_PAPER)
     with new_folder(out) as folder:
         for recording in recordings:
             shows = recording.activity or activity
             scene, first = filmed_scene(recording, frames, **view)
             estimates = estimates_of(scene, motions[str(shows)].training)
-            table = table_of(recording.name, {name: figures_of(each, scene) for name, each in estimates.items()})
+            table = table_of(
+                recording.name,
+                {name: figures_of(each, scene) for name, each in estimates.items()},
+            )
             (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
             head = f"{recording.name}: {shows}, frames {first} to {first + scene.count - 1}, camera {scene.placing}"
             click.echo("\n".join([f"{head}\n\n{table}\n", *scene.warnings]))
-            shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
+            shown = list(estimates[SINGLE])
+            single = {SINGLE: estimates.pop(SINGLE)}
             for figure, each in (("figure-8", single), ("figure-10", estimates)):
                 image = picture(scene, each, shown, first)
-                cv2.imwrite(str(folder / f"{figure}-{recording.name}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 85])
+                cv2.imwrite(
+                    str(folder / f"{figure}-{recording.name}.jpg"),
+                    image,
+                    [cv2.IMWRITE_JPEG_QUALITY, 85],
+                )
 
 
 if __name__ == "__main__":

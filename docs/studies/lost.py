@@ -16,7 +16,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from clips import CHANGES, FOUR, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
+from clips import (
+    CHANGES,
+    FOUR,
+    GROUPS,
+    PAIRS,
+    SIDES,
+    WALKS,
+    Clip,
+    Views,
+    cell_fields,
+    track_of,
+)
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
@@ -29,21 +40,35 @@ from posefit.silhouette.mask import Mask, Silhouette
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.uncertainty.modes import mirrored_gain
-from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
+from posefit_exemplars.lost_model import (
+    NAMES,
+    EvidenceMeans,
+    FailureClassifier,
+    LogisticModel,
+)
 from table import WORKERS, markdown, measured, percent
 
 RNG_STREAM = 2026  # part of every seed
 LASTING = 10  # frames of a lasting error: a third of a second
-RIM = 0.006  # of the person's height: the standard deviation of how far all borders of a track are outside
+# of the person's height: the standard deviation of how far all borders of a track are
+# outside
+RIM = 0.006
 EDGE = 0.004  # and of a border's own deviation, drawn for each frame
 SMOOTH = 0.02  # its correlation length
-BITES, BULGES = 0.8, 0.8  # means of their numbers, Poisson
-SIZES = (0.02, 0.06)  # radii of these and of missing ends, as shares of the person's height
-MISSING, SHADOW = 0.3, 0.3  # probabilities of a missing end and of a shadow
+# means of their numbers, Poisson
+BITES = 0.8
+BULGES = 0.8
+# radii of these and of missing ends, as shares of the person's height
+SIZES = (0.02, 0.06)
+# probabilities of a missing end and of a shadow
+MISSING = 0.3
+SHADOW = 0.3
 SHADOWS = (0.1, 0.25)  # strengths of shadows
 
 
-def noisy_mask(mask: Mask, rim: float, lasting: np.random.Generator, fresh: np.random.Generator) -> Mask:
+def noisy_mask(
+    mask: Mask, rim: float, lasting: np.random.Generator, fresh: np.random.Generator
+) -> Mask:
     """Return a mask (height, width) with errors of a camera's; one of which little would be left is unchanged.
 
     Lasting errors are drawn from `lasting`, in the same order whatever the mask; the rest from `fresh`.
@@ -51,14 +76,21 @@ def noisy_mask(mask: Mask, rim: float, lasting: np.random.Generator, fresh: np.r
     if not mask.any():
         return mask
     rows, columns = np.nonzero(mask)
-    top, tall = int(rows.min()), int(np.ptp(rows)) + 1
-    left, wide = int(columns.min()), int(np.ptp(columns)) + 1
+    top = int(rows.min())
+    tall = int(np.ptp(rows)) + 1
+    left = int(columns.min())
+    wide = int(np.ptp(columns)) + 1
     noisy = mask.copy()
     if lasting.random() < SHADOW:
         noisy = shadow(noisy, lasting.uniform(*SHADOWS), lasting)
-    for count, value in ((lasting.poisson(BULGES), True), (lasting.poisson(BITES), False)):
+    for count, value in (
+        (lasting.poisson(BULGES), True),
+        (lasting.poisson(BITES), False),
+    ):
         for across, down, size in lasting.random((count, 3)):
-            near = np.hypot(columns - left - across * wide, rows - top - down * tall).argmin()
+            near = np.hypot(
+                columns - left - across * wide, rows - top - down * tall
+            ).argmin()
             _disc(noisy, columns[near], rows[near], _radius(size, tall), value)
     gone, end, size = lasting.random(3)
     if gone < MISSING:
@@ -79,24 +111,41 @@ def _disc(mask: Mask, x: int, y: int, radius: int, value: bool) -> None:
     mask[drawn.astype(bool)] = value
 
 
-def with_mask_noise(observations: Sequence[Observation], seed: Sequence[int]) -> list[Observation]:
+def with_mask_noise(
+    observations: Sequence[Observation], seed: Sequence[int]
+) -> list[Observation]:
     """Return observations with errors in the masks, independent for each camera and reproducible."""
 
     def noisy(mask: Mask, k: int, camera: int) -> Silhouette:
         whole = np.random.default_rng([RNG_STREAM, *seed, camera])
         begins = int(whole.integers(LASTING))
-        lasting = np.random.default_rng([RNG_STREAM, *seed, camera, 1, (k + begins) // LASTING])
+        lasting = np.random.default_rng(
+            [RNG_STREAM, *seed, camera, 1, (k + begins) // LASTING]
+        )
         fresh = np.random.default_rng([RNG_STREAM, *seed, camera, 2, k])
-        return Silhouette.of(noisy_mask(mask, RIM * whole.standard_normal(), lasting, fresh))
+        return Silhouette.of(
+            noisy_mask(mask, RIM * whole.standard_normal(), lasting, fresh)
+        )
 
     return [
-        replace(seen, silhouettes=[noisy(each.mask, k, camera) for camera, each in enumerate(seen.silhouettes)])
+        replace(
+            seen,
+            silhouettes=[
+                noisy(each.mask, k, camera)
+                for camera, each in enumerate(seen.silhouettes)
+            ],
+        )
         for k, seen in enumerate(observations)
     ]
 
 
-CLEAN, MASKS = "as they are", "as masks are"
-ALL_CHANGES = {name: value for name, value in CHANGES["all of these"].items() if name != "corruption"}
+CLEAN = "as they are"
+MASKS = "as masks are"
+ALL_CHANGES = {
+    name: value
+    for name, value in CHANGES["all of these"].items()
+    if name != "corruption"
+}
 CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES, MASKS: ALL_CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
 FRAMES = 48  # of a clip at most
@@ -141,9 +190,17 @@ class Case(NamedTuple):
 def cases() -> list[Case]:
     """Return the tracks, those of one person together, since they share a library."""
     clips = [(group, clip) for group, some in EVERY.items() for clip in some]
-    conditions, tracks = [name for name in CONDITIONS if name != MASKS], []
+    conditions = [name for name in CONDITIONS if name != MASKS]
+    tracks = []
     for k, (group, clip) in enumerate(clips):
-        tracks.append(Case(group, clip, VIEWS[k % len(VIEWS)], conditions[(3 * k + k // len(VIEWS)) % len(conditions)]))
+        tracks.append(
+            Case(
+                group,
+                clip,
+                VIEWS[k % len(VIEWS)],
+                conditions[(3 * k + k // len(VIEWS)) % len(conditions)],
+            )
+        )
         tracks.append(Case(group, clip, VIEWS[(k + 2) % len(VIEWS)], MASKS))
         if group in COMMON:
             tracks.append(Case(group, clip, SIDES[(k + 4) % len(SIDES)], MASKS))
@@ -154,15 +211,23 @@ def cases() -> list[Case]:
 Row = Mapping[str, Any]
 Flags = NDArray[np.bool_]
 
-EXCHANGED = 10.0  # millimetres by which a mirrored pose is nearer to the truth; below, its sides hardly differ
+# millimetres by which a mirrored pose is nearer to the truth; below, its sides hardly
+# differ
+EXCHANGED = 10.0
 STRENGTH = 0.03  # variance of the normal prior of weights
-SWAPPED = 0.02  # share of exchanged sides among the frames whose sides are known, where `BOUNDS` allow it
+# share of exchanged sides among the frames whose sides are known, where `BOUNDS` allow
+# it
+SWAPPED = 0.02
 BOUNDS = (0.01, 0.5)  # of the probability from which sides are unknown
 DIGITS = 6
 # The features of each model: evidence of a frame, and its means
 LOST_SIGNS = ("cost", "cost, lately", "farthest", "farthest, lately", "views")
 SIDES_SIGNS = (
-    *(f"{name}{mean}" for name in ("cost", "reflected", "mirrored", "second") for mean in ("", ", in general")),
+    *(
+        f"{name}{mean}"
+        for name in ("cost", "reflected", "mirrored", "second")
+        for mean in ("", ", in general")
+    ),
     *("farthest, in general", "across", "ahead", "speed", "views"),
 )
 
@@ -188,7 +253,9 @@ def lost_frames(rows: Sequence[Row]) -> Flags:
 
 def swapped_frames(rows: Sequence[Row]) -> Flags:
     """Return in which frames of all rows left and right are exchanged."""
-    return np.concatenate([np.array(row["mirrored_gain_mm"]) > EXCHANGED for row in rows])
+    return np.concatenate(
+        [np.array(row["mirrored_gain_mm"]) > EXCHANGED for row in rows]
+    )
 
 
 def fit(rows: Sequence[Row]) -> dict[str, Any]:
@@ -202,14 +269,19 @@ def judge(rows: Sequence[Row]) -> list[Predictions]:
     Raises ValueError where there are fewer than three: of the others, too, each is left out once.
     """
     if len(people := dict.fromkeys(row["subject"] for row in rows)) < 3:
-        raise InputError(f"rows must be of three people or more, got those of {', '.join(people)}")
+        raise InputError(
+            f"rows must be of three people or more, got those of {', '.join(people)}"
+        )
     known = [features(row) for row in rows]
     predictions: dict[int, Predictions] = {}
     for own, others in _left_out(rows):
-        models = FailureClassifier.from_dict(_fitted([rows[k] for k in others], [known[k] for k in others]))
+        models = FailureClassifier.from_dict(
+            _fitted([rows[k] for k in others], [known[k] for k in others])
+        )
         for k in own:
             exchanged, lost = (
-                np.array([model.probability(values) for values in known[k]]) for model in (models.sides, models.lost)
+                np.array([model.probability(values) for values in known[k]])
+                for model in (models.sides, models.lost)
             )
             predictions[k] = Predictions(lost, exchanged, exchanged >= models.unknown)
     return [predictions[k] for k in range(len(rows))]
@@ -218,22 +290,36 @@ def judge(rows: Sequence[Row]) -> list[Predictions]:
 def _left_out(rows: Sequence[Row]) -> list[tuple[list[int], list[int]]]:
     """Return the rows of each person, and those of the others."""
     people = list(dict.fromkeys(row["subject"] for row in rows))
-    each = [[k for k, row in enumerate(rows) if row["subject"] == person] for person in people]
+    each = [
+        [k for k, row in enumerate(rows) if row["subject"] == person]
+        for person in people
+    ]
     return [(own, [k for k in range(len(rows)) if k not in own]) for own in each]
 
 
 def _fitted(rows: Sequence[Row], known: Sequence[Array]) -> dict[str, Any]:
     """Return both models, and the probability from which sides are unknown, by models without each person in turn."""
     lost = _logistic("lost", np.concatenate(known), lost_frames(rows), LOST_SIGNS)
-    sides = _logistic("swapped", np.concatenate(known), swapped_frames(rows), SIDES_SIGNS)
-    exchanged, swapped = list[Array](), list[Flags]()
+    sides = _logistic(
+        "swapped", np.concatenate(known), swapped_frames(rows), SIDES_SIGNS
+    )
+    exchanged = list[Array]()
+    swapped = list[Flags]()
     for own, others in _left_out(rows):
         truth = swapped_frames([rows[k] for k in others])
-        fitted = _logistic("swapped", np.concatenate([known[k] for k in others]), truth, SIDES_SIGNS)
+        fitted = _logistic(
+            "swapped", np.concatenate([known[k] for k in others]), truth, SIDES_SIGNS
+        )
         model = LogisticModel.from_dict(fitted)
-        exchanged.append(np.array([model.probability(values) for k in own for values in known[k]]))
+        exchanged.append(
+            np.array([model.probability(values) for k in own for values in known[k]])
+        )
         swapped.append(swapped_frames([rows[k] for k in own]))
-    return {"lost": lost, "sides": sides, "unknown": _unknown(np.concatenate(exchanged), np.concatenate(swapped))}
+    return {
+        "lost": lost,
+        "sides": sides,
+        "unknown": _unknown(np.concatenate(exchanged), np.concatenate(swapped)),
+    }
 
 
 def _unknown(exchanged: Array, swapped: Flags) -> float:
@@ -241,22 +327,32 @@ def _unknown(exchanged: Array, swapped: Flags) -> float:
     order = np.argsort(exchanged, kind="stable")
     shares = np.cumsum(swapped[order]) / np.arange(1, len(order) + 1)
     few = np.flatnonzero(shares <= SWAPPED)
-    return round(float(np.clip(exchanged[order][few[-1]] if len(few) else 0.0, *BOUNDS)), DIGITS)
+    return round(
+        float(np.clip(exchanged[order][few[-1]] if len(few) else 0.0, *BOUNDS)), DIGITS
+    )
 
 
-def _logistic(name: str, known: Array, truth: Flags, signs: Sequence[str]) -> dict[str, Any]:
+def _logistic(
+    name: str, known: Array, truth: Flags, signs: Sequence[str]
+) -> dict[str, Any]:
     """Return a logistic model of some of the features (n, F), as JSON holds it."""
     from sklearn.linear_model import LogisticRegression
 
     if truth.all() or not truth.any():
-        raise InputError(f"frames must be {name} and not {name}, got {int(truth.sum())} of {len(truth)}")
-    mean, spread = known.mean(axis=0), known.std(axis=0)
+        raise InputError(
+            f"frames must be {name} and not {name}, got {int(truth.sum())} of {len(truth)}"
+        )
+    mean = known.mean(axis=0)
+    spread = known.std(axis=0)
     used = [k for k, sign in enumerate(NAMES) if sign in signs and spread[k] > 1e-9]
     model = LogisticRegression(C=STRENGTH, max_iter=2000)
     model.fit((known[:, used] - mean[used]) / spread[used], truth)
     weights = model.coef_[0] / spread[used]
     bias = float(model.intercept_[0] - weights @ mean[used])
-    named = {NAMES[row]: round(float(weight), DIGITS) for row, weight in zip(used, weights, strict=True)}
+    named = {
+        NAMES[row]: round(float(weight), DIGITS)
+        for row, weight in zip(used, weights, strict=True)
+    }
     return {"weights": named, "bias": round(bias, DIGITS)}
 
 
@@ -282,7 +378,10 @@ def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:
         "fps": scene.fps,
         "mpjpe_mm": result.table["mpjpe_mm"].round(2).tolist(),
         "mirrored_gain_mm": [round(gain, 1) for gain in gains.tolist()],
-        "evidence": [{name: round(value, DIGITS) for name, value in values.items()} for values in evidence],
+        "evidence": [
+            {name: round(value, DIGITS) for name, value in values.items()}
+            for values in evidence
+        ],
     }
 
 
@@ -298,8 +397,11 @@ def cameras(row: Row) -> str:
 
 def line_of(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Iterator[str]:
     """Yield how well swapped sides and lost frames of rows are noticed."""
-    swapped, lost = swapped_frames(rows), lost_frames(rows)
-    lost_by, exchanged, unknown = (np.concatenate(parts) for parts in zip(*predictions, strict=True))
+    swapped = swapped_frames(rows)
+    lost = lost_frames(rows)
+    lost_by, exchanged, unknown = (
+        np.concatenate(parts) for parts in zip(*predictions, strict=True)
+    )
     yield from (percent(swapped.mean()), auroc(exchanged, swapped))
     yield from (percent(unknown.mean()), share(swapped, ~unknown))
     yield from (percent(lost.mean()), auroc(lost_by, lost))
@@ -315,10 +417,16 @@ def auroc(scores: Array, positive: Flags) -> str:
     """Return how often a positive has a higher score than a negative, ties a half; a dash without both."""
     from sklearn.metrics import roc_auc_score
 
-    return "-" if positive.all() or not positive.any() else f"{roc_auc_score(positive, scores):.3f}"
+    return (
+        "-"
+        if positive.all() or not positive.any()
+        else f"{roc_auc_score(positive, scores):.3f}"
+    )
 
 
-def lost_lines(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Iterator[str]:
+def lost_lines(
+    rows: Sequence[Row], predictions: Sequence[Predictions]
+) -> Iterator[str]:
     """Yield the printed table, and the error of the least doubted frames."""
     from sklearn.metrics import roc_curve
 
@@ -326,11 +434,17 @@ def lost_lines(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Itera
     parts = {"all": every}
     for kind in (lambda row: row["group"], cameras):
         for name in dict.fromkeys(map(kind, rows)):
-            parts[name] = [(row, predicted) for row, predicted in every if kind(row) == name]
+            parts[name] = [
+                (row, predicted) for row, predicted in every if kind(row) == name
+            ]
     heads = ["swapped %", "AUROC", "unknown %", "swapped of known ones %"]
     heads += ["lost %", "AUROC", "called lost: recall %", "false alarms %"]
-    yield from markdown(["", *heads], [[name, *line_of(*zip(*part, strict=True))] for name, part in parts.items()])
-    errors, lost = np.concatenate([row["mpjpe_mm"] for row in rows]), lost_frames(rows)
+    yield from markdown(
+        ["", *heads],
+        [[name, *line_of(*zip(*part, strict=True))] for name, part in parts.items()],
+    )
+    errors = np.concatenate([row["mpjpe_mm"] for row in rows])
+    lost = lost_frames(rows)
     probable = np.concatenate([prediction.lost for prediction in predictions])
     alarms, recalls, _ = roc_curve(lost, probable, drop_intermediate=False)
     half = errors[np.argsort(probable, kind="stable")[: len(errors) // 2]]
@@ -340,18 +454,32 @@ def lost_lines(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Itera
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
-@click.option("--store", metavar="FILE.json", help="New file for the fitted models, for exemplars to read.")
+@click.option(
+    "--rows",
+    metavar="FILE",
+    help="A file for a row a line: the same command continues there.",
+)
+@click.option(
+    "--store",
+    metavar="FILE.json",
+    help="New file for the fitted models, for exemplars to read.",
+)
 @WORKERS
 def main(rows: str | None, store: str | None, workers: int | None) -> None:
     with new_file(store) if store else nullcontext() as stored:
-        cells = [(track, cell_of(track.spec)) for track in cases()]  # all are made, and so checked, before any runs
-        jobs = {(track.group, track.clip.name, *track[2:]): partial(row_of, cell, track) for track, cell in cells}
+        # all are made, and so checked, before any runs
+        cells = [(track, cell_of(track.spec)) for track in cases()]
+        jobs = {
+            (track.group, track.clip.name, *track[2:]): partial(row_of, cell, track)
+            for track, cell in cells
+        }
         tracks = [*measured(jobs, rows, key_of, workers).values()]
         for line in lost_lines(tracks, judge(tracks)):
             click.echo(line)
         if stored is not None:
-            stored.write_text(json.dumps(fit(tracks), indent=1) + "\n", encoding="utf-8")
+            stored.write_text(
+                json.dumps(fit(tracks), indent=1) + "\n", encoding="utf-8"
+            )
 
 
 if __name__ == "__main__":

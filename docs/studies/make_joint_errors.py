@@ -29,9 +29,12 @@ MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a
 AZIMUTHS = np.radians([0.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0])
 DISTANCE = 4.4  # metres
 SIZE = (320, 240)
-OFF = 0.05  # legs: how far from the truth a point is expected, as after a good prediction
+# legs: how far from the truth a point is expected, as after a good prediction
+OFF = 0.05
 OUTLIER = 0.16  # legs
-CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried along with the root (Interpretation V8)
+# legs: the deviation granted to points that are only carried along with the root
+# (Interpretation V8)
+CIRCULAR = 0.25
 
 
 def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
@@ -42,15 +45,23 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
         motion = built_in.motion(name)
         body = Body.of(motion.skeleton)
         leg = leg_of(motion.skeleton)
-        camera = Camera.around(np.array([0.0, 0.95, 0.0]), motion.poses[0, 0] + azimuth, DISTANCE, SIZE)
+        camera = Camera.around(
+            np.array([0.0, 0.95, 0.0]), motion.poses[0, 0] + azimuth, DISTANCE, SIZE
+        )
         scale = camera.focal[0] / DISTANCE
-        for pose, place in zip(motion.poses[::2], motion.translations[::2] * [1.0, 1.0, 0.0], strict=True):
+        for pose, place in zip(
+            motion.poses[::2], motion.translations[::2] * [1.0, 1.0, 0.0], strict=True
+        ):
             lines = lines_of(project(body, camera, pose, place))
-            true, _ = camera.project(motion.skeleton.joints(pose, place)[ENDS].mean(axis=1))
+            true, _ = camera.project(
+                motion.skeleton.joints(pose, place)[ENDS].mean(axis=1)
+            )
             expected = true + rng.normal(0.0, OFF * leg * scale, true.shape)
             assert lines is not None
             gates = np.full(len(POINTS), GATE[0] * leg * scale)
-            points, confidence, _ = detect(lines, expected, gates, leg * scale, head_radius(body) * scale, unbiased)
+            points, confidence, _ = detect(
+                lines, expected, gates, leg * scale, head_radius(body) * scale, unbiased
+            )
             for k, point in enumerate(POINTS):
                 if confidence[k] > 0.0:
                     errors_of[point].append((points[k] - true[k]) / (leg * scale))
@@ -63,22 +74,32 @@ def main() -> None:
     errors_of = detection_errors(np.random.default_rng(0))
     frames = len(errors_of["root"])
     stored: dict[str, dict[str, Any]] = {}
-    for name in dict.fromkeys(one.removeprefix("left ").removeprefix("right ") for one in POINTS):
+    for name in dict.fromkeys(
+        one.removeprefix("left ").removeprefix("right ") for one in POINTS
+    ):
         sides = [one for one in POINTS if one.split()[-1] == name]
-        errors = np.concatenate([np.array(errors_of[one]).reshape(-1, 2) for one in sides])
+        errors = np.concatenate(
+            [np.array(errors_of[one]).reshape(-1, 2) for one in sides]
+        )
         middle = np.array([0.0, np.median(errors[:, 1])])
         kept = errors[np.linalg.norm(errors - middle, axis=1) < OUTLIER]
         bias = np.array([0.0, kept[:, 1].mean()])
         spread = np.sqrt(((kept - bias) ** 2).mean(axis=0))
         if sides[0] in BODY:
-            bias, spread = np.zeros(2), np.full(2, CIRCULAR)
+            bias = np.zeros(2)
+            spread = np.full(2, CIRCULAR)
         print(
             f"{name:10s} seen {len(errors) / (frames * len(sides)):.2f} outliers {1 - len(kept) / len(errors):.2f} "
             f"bias {bias[1]:+.3f} deviation {spread[0]:.3f} {spread[1]:.3f} legs"
         )
-        stored |= {one: {"bias": bias.round(4).tolist(), "deviation": spread.round(4).tolist()} for one in sides}
+        stored |= {
+            one: {"bias": bias.round(4).tolist(), "deviation": spread.round(4).tolist()}
+            for one in sides
+        }
     text = json.dumps({"points": {name: stored[name] for name in POINTS}}, indent=1)
-    Path(joints.__file__).with_name("joints.json").write_text(text + "\n", encoding="utf-8")
+    Path(joints.__file__).with_name("joints.json").write_text(
+        text + "\n", encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

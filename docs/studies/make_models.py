@@ -27,14 +27,24 @@ from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit_vsmm import motion as models
-from posefit_vsmm.motion import FPS, LAMBDA, MotionModels, leg_of, ridge, without_heading
+from posefit_vsmm.motion import (
+    FPS,
+    LAMBDA,
+    MotionModels,
+    leg_of,
+    ridge,
+    without_heading,
+)
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode, minus
 
-FADING = 0.07  # share of its way from the mean pose that a joint loses in a frame where nothing else is learned
+# share of its way from the mean pose that a joint loses in a frame where nothing else
+# is learned
+FADING = 0.07
 DRAWN = 400  # frames of a built-in motion
 POSES = 24  # typical poses of a model
 CAPTURED = 100  # captured poses of a model, in even steps
-LEAST = (0.002, np.radians(0.3))  # legs and radians: the least deviation a frame that any coordinate is granted
+# legs and radians: the least deviation a frame that any coordinate is granted
+LEAST = (0.002, np.radians(0.3))
 AHEAD = 10  # frames
 # of the whole body's quaternion and each bone's: the one of the other side
 OTHER_SIDE = [0, *(1 + HELD.index(MIRROR[joint]) for joint in HELD)]
@@ -53,16 +63,24 @@ class Teaching(NamedTuple):
 
     fitted: tuple[Excerpt, ...]
     kept: Excerpt
-    drawn: tuple[str, ...] = ()  # built-in motions: no clip shows walking with arms held out
+    # built-in motions: no clip shows walking with arms held out
+    drawn: tuple[str, ...] = ()
 
 
 TEACHINGS = {
     "stiff-walk": Teaching((Excerpt("17/17_03", 0, 330),), Excerpt("17/17_03", 340)),
-    "walk": Teaching((Excerpt("02/02_01"), Excerpt("05/05_01"), Excerpt("16/16_15")), Excerpt("16/16_17", 0, 250)),
-    "arms-out": Teaching((Excerpt("49/49_18", 0, 820),), Excerpt("49/49_18", 830), ("arms-out-a",)),
+    "walk": Teaching(
+        (Excerpt("02/02_01"), Excerpt("05/05_01"), Excerpt("16/16_15")),
+        Excerpt("16/16_17", 0, 250),
+    ),
+    "arms-out": Teaching(
+        (Excerpt("49/49_18", 0, 820),), Excerpt("49/49_18", 830), ("arms-out-a",)
+    ),
     "jacks": Teaching((Excerpt("13/13_29", 0, 456),), Excerpt("14/14_06", 0, 420)),
     "jump": Teaching((Excerpt("16/16_03"), Excerpt("49/49_02")), Excerpt("16/16_01")),
-    "squat": Teaching((Excerpt("13/13_29", 3792, 4584),), Excerpt("14/14_06", 1008, 1572)),
+    "squat": Teaching(
+        (Excerpt("13/13_29", 3792, 4584),), Excerpt("14/14_06", 1008, 1572)
+    ),
 }
 
 
@@ -98,17 +116,24 @@ def mirrored_states(states: Array) -> Array:
 
 def pairs(clip: Recorded) -> tuple[Array, Array]:
     """Return states (n, 43) and what they are a frame later at 30 a second, in the heading's frame, root at 0."""
-    step = round(clip.fps / FPS)  # Interpretation V6: all pairs of a recording so far apart
-    before, after = [], []
+    # Interpretation V6: all pairs of a recording so far apart
+    step = round(clip.fps / FPS)
+    before = []
+    after = []
     for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
         heading, here = without_heading(first)
         here *= np.where(here[:, :1] < 0.0, -1.0, 1.0)
         turn = Rotation.from_quat(heading, scalar_first=True).inv()
         there = second[3:].reshape(-1, 4).copy()
-        there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(scalar_first=True)
-        there *= np.where(np.einsum("ij,ij->i", here, there)[:, None] < 0.0, -1.0, 1.0)  # Interpretation V4
+        there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(
+            scalar_first=True
+        )
+        # Interpretation V4
+        there *= np.where(np.einsum("ij,ij->i", here, there)[:, None] < 0.0, -1.0, 1.0)
         before.append(np.concatenate([np.zeros(3), here.ravel()]))
-        after.append(np.concatenate([turn.apply(second[:3] - first[:3]), there.ravel()]))
+        after.append(
+            np.concatenate([turn.apply(second[:3] - first[:3]), there.ravel()])
+        )
     return np.array(before), np.array(after)
 
 
@@ -124,14 +149,21 @@ def noise(model: MotionModels, before: Array, after: Array) -> Array:
 
 def typical(before: Array) -> Array:
     """Return the means (24, 40) of similar poses."""
-    middles = KMeans(POSES, n_init=4, random_state=0).fit(before[:, 3:]).cluster_centers_.reshape(POSES, -1, 4)
-    return np.asarray((middles / np.linalg.norm(middles, axis=2, keepdims=True)).reshape(POSES, -1))
+    middles = (
+        KMeans(POSES, n_init=4, random_state=0)
+        .fit(before[:, 3:])
+        .cluster_centers_.reshape(POSES, -1, 4)
+    )
+    return np.asarray(
+        (middles / np.linalg.norm(middles, axis=2, keepdims=True)).reshape(POSES, -1)
+    )
 
 
 def ahead(model: MotionModels, clip: Recorded, frames: int) -> tuple[float, float]:
     """Return the mean error in degrees over the quaternions of a model so many frames ahead, and of standing still."""
     step = round(clip.fps / FPS) * frames
-    first, second = clip.states[:-step], clip.states[step:]
+    first = clip.states[:-step]
+    second = clip.states[step:]
     states = first[None]
     for _ in range(frames):
         states = model.step(states)
@@ -145,17 +177,27 @@ def _mean_degrees(errors: Array) -> float:
 
 def dependent(clips: list[Recorded]) -> dict[str, Any]:
     """Return how the angles of the other joints follow the nine rotations: ridge regression over all clips."""
-    inputs, wanted = [], []
+    inputs = []
+    wanted = []
     for clip in clips:
         for states, angles in (
             (clip.states, clip.angles),
-            (mirrored_states(clip.states), mirrored_poses(built_in.average_skeleton(), clip.angles)),
+            (
+                mirrored_states(clip.states),
+                mirrored_poses(built_in.average_skeleton(), clip.angles),
+            ),
         ):
             quaternions = states[::4, 7:].reshape(-1, 4)
-            inputs.append(Rotation.from_quat(quaternions, scalar_first=True).as_rotvec().reshape(-1, 3 * len(BONES)))
+            inputs.append(
+                Rotation.from_quat(quaternions, scalar_first=True)
+                .as_rotvec()
+                .reshape(-1, 3 * len(BONES))
+            )
             wanted.append(angles[::4, OTHER_ANGLES])
-    x, y = np.concatenate(inputs), np.concatenate(wanted)
-    middle, mean = x.mean(axis=0), y.mean(axis=0)
+    x = np.concatenate(inputs)
+    y = np.concatenate(wanted)
+    middle = x.mean(axis=0)
+    mean = y.mean(axis=0)
     normal = (x - middle).T @ (x - middle) + 0.05 * len(x) * np.eye(x.shape[1])
     matrix = np.linalg.solve(normal, (x - middle).T @ (y - mean)).T
     return {"matrix": rounded(matrix), "offset": rounded(mean - matrix @ middle)}
@@ -163,10 +205,16 @@ def dependent(clips: list[Recorded]) -> dict[str, Any]:
 
 def rounded(values: Array) -> Any:
     """Return nested lists of numbers of five significant digits."""
-    return [float(f"{v:.5g}") for v in values] if values.ndim == 1 else [rounded(row) for row in values]
+    return (
+        [float(f"{v:.5g}") for v in values]
+        if values.ndim == 1
+        else [rounded(row) for row in values]
+    )
 
 
-def normalised_ridge(before: Array, after: Array, target: Array, weight: float) -> tuple[Array, Array]:
+def normalised_ridge(
+    before: Array, after: Array, target: Array, weight: float
+) -> tuple[Array, Array]:
     """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
 
     The penalty is `weight` a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
@@ -176,48 +224,86 @@ def normalised_ridge(before: Array, after: Array, target: Array, weight: float) 
     unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
     scaled = (inputs - middle) / unit
     wanted = after - before - inputs @ target.T
-    wanted[:, [0, 2]] = 0.0  # the way over the ground is not predicted: stepping on the spot is walking, too
+    # the way over the ground is not predicted: stepping on the spot is walking, too
+    wanted[:, [0, 2]] = 0.0
     mean = wanted.mean(axis=0)
     matrix = ridge(scaled, wanted - mean, weight * len(scaled)) / unit
     return matrix + target, mean - matrix @ middle
 
 
 @click.command(cls=Command)
-@click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
+@click.argument(
+    "root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU"
+)
 def main(root: Path) -> None:
     """Write models.json beside the models. Raises ValueError where a clip it needs is missing."""
     stored: dict[str, Any] = {}
     every: list[Recorded] = []
     identity = np.vstack([np.zeros((3, STATE - 3)), np.eye(STATE - 3)])
-    for clip in (clip for teaching in TEACHINGS.values() for clip in (*teaching.fitted, teaching.kept)):
+    for clip in (
+        clip
+        for teaching in TEACHINGS.values()
+        for clip in (*teaching.fitted, teaching.kept)
+    ):
         if not (root / f"{clip.path}.amc").is_file():
-            raise InputError(f"CMU_DIR must hold {clip.path}.amc, got {root} without it")
+            raise InputError(
+                f"CMU_DIR must hold {clip.path}.amc, got {root} without it"
+            )
     for name, teaching in TEACHINGS.items():
         clips = [recorded(root, clip) for clip in teaching.fitted]
-        clips += [moving(built_in.motion(one, frames=DRAWN, fps=AMC_FPS)) for one in teaching.drawn]
+        clips += [
+            moving(built_in.motion(one, frames=DRAWN, fps=AMC_FPS))
+            for one in teaching.drawn
+        ]
         kept = recorded(root, teaching.kept)
         every += clips
-        sides = [pairs(one._replace(states=s)) for one in clips for s in (one.states, mirrored_states(one.states))]
+        sides = [
+            pairs(one._replace(states=s))
+            for one in clips
+            for s in (one.states, mirrored_states(one.states))
+        ]
         before, after = (np.concatenate(part) for part in zip(*sides, strict=True))
         typicals = typical(before)
         found: dict[str, Any] = {}
         report: dict[str, float] = {}
-        captured = before[np.linspace(0, len(before) - 1, CAPTURED).astype(np.int64), 3:]
+        captured = before[
+            np.linspace(0, len(before) - 1, CAPTURED).astype(np.int64), 3:
+        ]
         literal = ridge(before[:, 3:], after) - identity, np.zeros(STATE)
         ours = normalised_ridge(before, after, -FADING * identity, LAMBDA)
         for shrink, (matrix, offset) in (("identity", ours), ("zero", literal)):
             model = MotionModels(
-                (name,), matrix[None], offset[None], np.eye(ERROR)[None], typicals[None], captured[None]
+                (name,),
+                matrix[None],
+                offset[None],
+                np.eye(ERROR)[None],
+                typicals[None],
+                captured[None],
             )
             covariance = noise(model, before, after)
-            found[shrink] = {"matrix": rounded(matrix), "offset": rounded(offset), "noise": rounded(covariance)}
+            found[shrink] = {
+                "matrix": rounded(matrix),
+                "offset": rounded(offset),
+                "noise": rounded(covariance),
+            }
             for frames in (1, AHEAD):
                 error, still = ahead(model, kept, frames)
-                report |= {f"{shrink}_{frames}": round(error, 2), f"still_{frames}": round(still, 2)}
+                report |= {
+                    f"{shrink}_{frames}": round(error, 2),
+                    f"still_{frames}": round(still, 2),
+                }
         print(name, len(before), report)
-        stored[name] = {**found, "poses": rounded(typicals), "captured": captured.round(3).tolist(), "report": report}
+        stored[name] = {
+            **found,
+            "poses": rounded(typicals),
+            "captured": captured.round(3).tolist(),
+            "report": report,
+        }
     target_file = Path(models.__file__).with_name("models.json")
-    text = json.dumps({"origin": ORIGIN, "models": stored, "dependent_joints": dependent(every)}, separators=(",", ":"))
+    text = json.dumps(
+        {"origin": ORIGIN, "models": stored, "dependent_joints": dependent(every)},
+        separators=(",", ":"),
+    )
     target_file.write_text(text + "\n", encoding="utf-8")
     print(f"{target_file.name}: {len(text)} bytes")
 

@@ -18,8 +18,19 @@ from scipy.spatial.transform import Rotation
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.geometry.rotation import (
+    joint_angles_from_rotation,
+    rotation_from_joint_angles,
+)
+from posefit.geometry.skeleton import (
+    ANGLES,
+    BONES,
+    INNER,
+    JOINTS,
+    MIRROR,
+    Skeleton,
+    angle_index,
+)
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import parse_asf
@@ -35,7 +46,9 @@ def held_out(phases: Array, side: float) -> tuple[Array, Array]:
     """Return where upper arm and forearm point (n, 3) when the arm is held out; `side` is 1 for the left."""
     lift = -0.05 + np.sin(BOB) * side * np.cos(2.0 * np.pi * phases)
     flat = np.full(len(phases), side)
-    return np.column_stack([flat, lift, 0.05 + 0.0 * flat]), np.column_stack([flat, lift + 0.1, 0.25 + 0.0 * flat])
+    return np.column_stack([flat, lift, 0.05 + 0.0 * flat]), np.column_stack(
+        [flat, lift + 0.1, 0.25 + 0.0 * flat]
+    )
 
 
 def waving(phases: Array, side: float) -> tuple[Array, Array]:
@@ -43,30 +56,45 @@ def waving(phases: Array, side: float) -> tuple[Array, Array]:
     swing = SWING * np.sin(2.0 * np.pi * WAVES * phases)
     flat = np.full(len(phases), side)
     upper = np.column_stack([flat, -0.15 + 0.0 * flat, 0.2 + 0.0 * flat])
-    return upper, np.column_stack([side * np.sin(swing) + 0.1 * side, np.cos(swing), 0.15 + 0.0 * flat])
+    return upper, np.column_stack(
+        [side * np.sin(swing) + 0.1 * side, np.cos(swing), 0.15 + 0.0 * flat]
+    )
 
 
-def drawn(skeleton: Skeleton, side: str, upper: Array, fore: Array) -> tuple[list[int], Array]:
+def drawn(
+    skeleton: Skeleton, side: str, upper: Array, fore: Array
+) -> tuple[list[int], Array]:
     """Return the angles' places in a pose, and the angles (n, 4), of an arm that points where it should.
 
     Each pose starts from the one before, so that the angles go on smoothly.
     """
-    shoulder, elbow, wrist = (JOINTS.index(side + name) for name in ("clavicle", "humerus", "radius"))
-    first, bend = angle_index(elbow), angle_index(wrist)
+    shoulder, elbow, wrist = (
+        JOINTS.index(side + name) for name in ("clavicle", "humerus", "radius")
+    )
+    first = angle_index(elbow)
+    bend = angle_index(wrist)
     places = [first, first + 1, first + 2, bend]
 
     def residual(angles: Array, upper: Array, fore: Array, before: Array) -> Array:
         pose = np.zeros((1, ANGLES))
         pose[0, places] = angles
         joints = skeleton.joints(pose)[0]
-        ways = (joints[elbow] - joints[shoulder], upper), (joints[wrist] - joints[elbow], fore)
-        off = [way / np.linalg.norm(way) - wanted / np.linalg.norm(wanted) for way, wanted in ways]
+        ways = (
+            (joints[elbow] - joints[shoulder], upper),
+            (joints[wrist] - joints[elbow], fore),
+        )
+        off = [
+            way / np.linalg.norm(way) - wanted / np.linalg.norm(wanted)
+            for way, wanted in ways
+        ]
         return np.concatenate([*off, 0.02 * (angles - before)])
 
     solutions = np.zeros((len(upper), 4))
     guess = np.radians([0.0, 0.0, 0.0, 40.0])
     for k in range(len(upper)):
-        guess = np.asarray(least_squares(residual, guess, args=(upper[k], fore[k], guess)).x)
+        guess = np.asarray(
+            least_squares(residual, guess, args=(upper[k], fore[k], guess)).x
+        )
         solutions[k] = guess
     return places, solutions
 
@@ -145,11 +173,13 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
     velocity = np.polyfit(times, motion.translations, 1)[0]
     places = motion.translations
     if kind in ON_THE_SPOT:
-        places, velocity = places - times[:, None] * velocity * [1.0, 0.0, 1.0], np.zeros(3)
+        places = places - times[:, None] * velocity * [1.0, 0.0, 1.0]
+        velocity = np.zeros(3)
     speed = float(np.hypot(velocity[0], velocity[2]))
     heading = np.arctan2(velocity[0], velocity[2])
     if speed < STANDING:
-        speed, heading = 0.0, float(np.angle(np.exp(1j * motion.poses[:, 0]).mean()))
+        speed = 0.0
+        heading = float(np.angle(np.exp(1j * motion.poses[:, 0]).mean()))
     turn = Rotation.from_euler("y", -heading).as_matrix()
     path = places @ turn.T
     path[:, 2] -= speed * times
@@ -163,8 +193,12 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
         columns = basis(times / period, HARMONICS)
         # a little damping: a clip barely longer than its period leaves the highest harmonics undetermined
         normal = columns.T @ columns + 1e-3 * np.eye(columns.shape[1])
-        coefficients: Array = np.linalg.solve(normal, columns.T @ used).astype(np.float64)
-        return float(np.abs(used - columns @ coefficients)[:, 3:].sum() / len(used) / 66.0), coefficients
+        coefficients: Array = np.linalg.solve(normal, columns.T @ used).astype(
+            np.float64
+        )
+        return float(
+            np.abs(used - columns @ coefficients)[:, 3:].sum() / len(used) / 66.0
+        ), coefficients
 
     periods = np.arange(clip.shortest, clip.longest, 0.0025)
     period = float(periods[np.argmin([residual(p)[0] for p in periods])])
@@ -187,15 +221,23 @@ def in_step(coefficients: Array, free: NDArray[np.int64], kind: str) -> Array:
         if name is None:
             return np.zeros(len(coefficients))
         # the root's height is the second series; the first three are its path
-        first = 1 if name == "root" else 3 + int(np.searchsorted(free, angle_index(JOINTS.index(name))))
+        first = (
+            1
+            if name == "root"
+            else 3 + int(np.searchsorted(free, angle_index(JOINTS.index(name))))
+        )
         return np.asarray(coefficients[:, first])
 
     high, low = BEATS[kind]
     swing = series(high) - series(low)
     shift = np.arctan2(swing[1 + HARMONICS], swing[1])
     turns = shift * np.arange(1, HARMONICS + 1)[:, None]
-    cosines, sines = coefficients[1 : 1 + HARMONICS], coefficients[1 + HARMONICS :]
-    moved = cosines * np.cos(turns) + sines * np.sin(turns), sines * np.cos(turns) - cosines * np.sin(turns)
+    cosines = coefficients[1 : 1 + HARMONICS]
+    sines = coefficients[1 + HARMONICS :]
+    moved = (
+        cosines * np.cos(turns) + sines * np.sin(turns),
+        sines * np.cos(turns) - cosines * np.sin(turns),
+    )
     return np.vstack([coefficients[:1], *moved])
 
 
@@ -203,24 +245,50 @@ def armed(model: dict[str, Any], skeleton: Skeleton, kind: str) -> None:
     """Give a model of a walk the arms of its kind, as far as a trunk that leans and turns a little lets them."""
     phases = np.arange(PHASES) / PHASES
     for side, directions in ARMS.get(kind, {}).items():
-        places, angles = drawn(skeleton, side, *directions(phases, 1.0 if side == "l" else -1.0))
+        places, angles = drawn(
+            skeleton, side, *directions(phases, 1.0 if side == "l" else -1.0)
+        )
         coefficients = np.linalg.lstsq(basis(phases, HARMONICS), angles, rcond=None)[0]
         for place, series in zip(places, coefficients.T, strict=True):
-            model["series"][3 + model["angles"].index(place)] = np.round(series, DIGITS).tolist()
+            model["series"][3 + model["angles"].index(place)] = np.round(
+                series, DIGITS
+            ).tolist()
 
 
 def average(skeletons: list[Skeleton]) -> dict[str, Any]:
     """Return the mean of some skeletons and their mirror images."""
     flip = np.diag([-1.0, 1.0, 1.0])
     other = np.array(MIRROR)[1:] - 1
-    offsets = np.mean([half for one in skeletons for half in (one.offsets, one.offsets[other] @ flip)], axis=0)
-    frames = np.array([half for one in skeletons for half in (one.axes, flip @ one.axes[other] @ flip)])
-    axes = np.array([Rotation.from_matrix(frames[:, bone]).mean().as_matrix() for bone in range(len(BONES))])
+    offsets = np.mean(
+        [
+            half
+            for one in skeletons
+            for half in (one.offsets, one.offsets[other] @ flip)
+        ],
+        axis=0,
+    )
+    frames = np.array(
+        [
+            half
+            for one in skeletons
+            for half in (one.axes, flip @ one.axes[other] @ flip)
+        ]
+    )
+    axes = np.array(
+        [
+            Rotation.from_matrix(frames[:, bone]).mean().as_matrix()
+            for bone in range(len(BONES))
+        ]
+    )
     inner = {JOINTS[joint] for joint in INNER}
     return {
         "offsets": np.round(offsets, DIGITS).tolist(),
-        "axes_degrees": np.round(np.degrees(joint_angles_from_rotation(axes)), 4).tolist(),
-        "channels": [[bone, list(free)] for bone, free in skeletons[0].channels if bone in inner],
+        "axes_degrees": np.round(
+            np.degrees(joint_angles_from_rotation(axes)), 4
+        ).tolist(),
+        "channels": [
+            [bone, list(free)] for bone, free in skeletons[0].channels if bone in inner
+        ],
         "limits_degrees": limits_degrees(skeletons),
     }
 
@@ -228,7 +296,8 @@ def average(skeletons: list[Skeleton]) -> dict[str, Any]:
 def limits_degrees(skeletons: list[Skeleton]) -> list[list[float]]:
     """Return the widest of the joint limits that some skeletons state."""
     stated = np.array([one.limits for one in skeletons if one.limits is not None])
-    low, high = np.degrees(stated[..., 0].min(axis=0)), np.degrees(stated[..., 1].max(axis=0))
+    low = np.degrees(stated[..., 0].min(axis=0))
+    high = np.degrees(stated[..., 1].max(axis=0))
     widest: list[list[float]] = np.round(np.column_stack([low, high]), 4).tolist()
     return widest
 
@@ -240,18 +309,26 @@ def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
     poses = np.zeros((len(phases), 66))
     poses[:, model["angles"]] = values[:, 3:]
     joints = skeleton.joints(poses, values[:, :3])
-    model["series"][1][0] = round(model["series"][1][0] + 0.03 - float(joints[..., 1].min()), DIGITS)
+    model["series"][1][0] = round(
+        model["series"][1][0] + 0.03 - float(joints[..., 1].min()), DIGITS
+    )
 
 
 @click.command(cls=Command)
-@click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
+@click.argument(
+    "root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU"
+)
 def main(root: Path) -> None:
     """Write built_in.json beside this file. Raises ValueError where a file it needs is missing."""
-    needed = [f"{subject}/{subject}.asf" for subject in SUBJECTS] + [f"{clip.path}.amc" for clip in CLIPS.values()]
+    needed = [f"{subject}/{subject}.asf" for subject in SUBJECTS] + [
+        f"{clip.path}.amc" for clip in CLIPS.values()
+    ]
     for name in needed:
         if not (root / name).is_file():
             raise InputError(f"CMU_DIR must hold {name}, got {root} without it")
-    bones = average([parse_asf(root / subject / f"{subject}.asf").skeleton for subject in SUBJECTS])
+    bones = average(
+        [parse_asf(root / subject / f"{subject}.asf").skeleton for subject in SUBJECTS]
+    )
     skeleton = Skeleton(
         "average",
         np.array(bones["offsets"]),
@@ -259,13 +336,19 @@ def main(root: Path) -> None:
         tuple((bone, tuple(free)) for bone, free in bones["channels"]),
         np.radians(bones["limits_degrees"]),
     )
-    motions = {name: fitted(root, clip, activity_of(name)) for name, clip in CLIPS.items()}
+    motions = {
+        name: fitted(root, clip, activity_of(name)) for name, clip in CLIPS.items()
+    }
     for name, model in motions.items():
         armed(model, skeleton, activity_of(name))
         grounded(model, skeleton)
-        print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")
+        print(
+            f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees"
+        )
     target = Path(built_in.__file__).with_name("built_in.json")
-    text = json.dumps({"origin": ORIGIN, "skeleton": bones, "motions": motions}, separators=(",", ":"))
+    text = json.dumps(
+        {"origin": ORIGIN, "skeleton": bones, "motions": motions}, separators=(",", ":")
+    )
     target.write_text(text + "\n", encoding="utf-8")
     print(f"{target.name}: {len(text)} bytes")
 

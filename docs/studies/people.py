@@ -17,7 +17,18 @@ from typing import Any
 import click
 import numpy as np
 
-from clips import ASIDE, CHANGES, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
+from clips import (
+    ASIDE,
+    CHANGES,
+    GROUPS,
+    PAIRS,
+    SIDES,
+    WALKS,
+    Clip,
+    Views,
+    cell_fields,
+    track_of,
+)
 from posefit.cli.output import Command
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.space import Translation
@@ -33,15 +44,19 @@ from table import LEDGER, WORKERS, bar, field_text, grouped, markdown, percent, 
 
 CHANGED = 3  # walks that are also followed in worse conditions, from 45 and 90 degrees
 SEEDED = 2  # clips of a group that are followed with more seeds, from 45 and 90 degrees
-SEEDS = (1, 2)  # with which these are followed again: which hypothesis is chosen depends on a few draws
+# with which these are followed again: which hypothesis is chosen depends on a few draws
+SEEDS = (1, 2)
 
-Cells = Iterator[tuple[str, dict[str, Any]]]  # what they are called in a table, and their fields
+# what they are called in a table, and their fields
+Cells = Iterator[tuple[str, dict[str, Any]]]
 
 
 def by_group(groups: Mapping[str, Sequence[Clip]]) -> Cells:
     """Yield the cells of all clips by one camera and by two."""
     for group, clips in groups.items():
-        for clip, view in product(clips, (*SIDES[:3], *(PAIRS if clips is GROUPS[WALKS] else PAIRS[1:]))):
+        for clip, view in product(
+            clips, (*SIDES[:3], *(PAIRS if clips is GROUPS[WALKS] else PAIRS[1:]))
+        ):
             again = groups is GROUPS and clip in clips[:SEEDED] and view in SIDES[1:3]
             for seed in (0, *SEEDS) if again else (0,):
                 yield group, cell_fields(clip, view, clip.frames, seed=seed)
@@ -56,21 +71,44 @@ def by_condition() -> Cells:
 
 def people_lines(aside: bool, workers: int | None, ledger: str | None) -> Iterator[str]:
     """Yield the tables: by group and number of cameras, by group and view, and in worse conditions."""
-    cells = list(by_group(ASIDE if aside else GROUPS)), [] if aside else list(by_condition())
-    different = {repr(fields): fields for some in cells for _, fields in some}  # a plan has no cell twice
-    results = dict(zip(different, rows(Plan.of({"cells": [*different.values()]}), workers, ledger), strict=True))
-    groups, conditions = ([{**results[repr(fields)], "line": line} for line, fields in some] for some in cells)
-    yield from grouped(groups, lambda row: [row["line"], str(len(row["spec"]["view_degrees"]))], ["group", "cameras"])
+    cells = (
+        list(by_group(ASIDE if aside else GROUPS)),
+        [] if aside else list(by_condition()),
+    )
+    # a plan has no cell twice
+    different = {repr(fields): fields for some in cells for _, fields in some}
+    results = dict(
+        zip(
+            different,
+            rows(Plan.of({"cells": [*different.values()]}), workers, ledger),
+            strict=True,
+        )
+    )
+    groups, conditions = (
+        [{**results[repr(fields)], "line": line} for line, fields in some]
+        for some in cells
+    )
+    yield from grouped(
+        groups,
+        lambda row: [row["line"], str(len(row["spec"]["view_degrees"]))],
+        ["group", "cameras"],
+    )
     yield ""
-    yield from grouped(groups, lambda row: [row["line"], field_text(row, "view_degrees")], ["group", "view"])
+    yield from grouped(
+        groups,
+        lambda row: [row["line"], field_text(row, "view_degrees")],
+        ["group", "view"],
+    )
     if conditions:
         yield ""
         yield from grouped(conditions, lambda row: [row["line"]], ["walks"])
 
 
-WITHIN = 10  # frames after the person is visible again, in which the track has to be right again
+# frames after the person is visible again, in which the track has to be right again
+WITHIN = 10
 STAYS = 10  # frames after these, all of which have to be right
-AWAY = 20  # frames that the person is out of the picture before they come back the other way
+# frames that the person is out of the picture before they come back the other way
+AWAY = 20
 WALKERS = 5  # walks that are tried
 BEFORE = 60  # frames that they are visible until then, and afterwards
 GAPS = {"10 frames of nothing": 10, "30 frames of nothing": 30}
@@ -79,22 +117,36 @@ KINDS = (*GAPS, RETURN)
 TRANSLATIONS: tuple[Translation, ...] = ("known", "aligned")
 
 
-def hidden(observations: Sequence[Observation], start: int, stop: int) -> list[Observation]:
+def hidden(
+    observations: Sequence[Observation], start: int, stop: int
+) -> list[Observation]:
     """Return observations of which some show nothing, not even where the person is."""
-    empty = [Silhouette.of(np.zeros_like(silhouette.mask)) for silhouette in observations[start].silhouettes]
+    empty = [
+        Silhouette.of(np.zeros_like(silhouette.mask))
+        for silhouette in observations[start].silhouettes
+    ]
     nothing = Observation(empty, None, usable=False)
-    return [nothing if start <= k < stop else observation for k, observation in enumerate(observations)]
+    return [
+        nothing if start <= k < stop else observation
+        for k, observation in enumerate(observations)
+    ]
 
 
-def trial(cell: TrackCell, views: Views, kind: str, translation: Translation) -> tuple[bool, bool]:
+def trial(
+    cell: TrackCell, views: Views, kind: str, translation: Translation
+) -> tuple[bool, bool]:
     """Return whether a track has no lost frame from ten frames after an absence on, and faces the right way there."""
     scene = cell_scene(cell)
-    scene, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
+    scene, back = (
+        returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
+    )
     track = track_of(cell, scene, translation=translation)
     assert track.truth is not None
     later = slice(back + WITHIN, back + WITHIN + STAYS)
     facing = np.cos(track.motion.poses[later, 0] - track.truth.poses[later, 0]) > 0.0
-    return bool((track.table["mpjpe_mm"][later] <= LOST_MM).all()), bool(facing.mean() > 0.5)
+    return bool((track.table["mpjpe_mm"][later] <= LOST_MM).all()), bool(
+        facing.mean() > 0.5
+    )
 
 
 def with_gap(scene: Scene, frames: int) -> tuple[Scene, int]:
@@ -113,31 +165,49 @@ def returned(scene: Scene, views: Views) -> tuple[Scene, int]:
     assert truth is not None
     turned = np.array(truth.poses)
     turned[:, 0] += np.pi
-    first, last = truth.translations[0], truth.translations[-1]
+    first = truth.translations[0]
+    last = truth.translations[-1]
     across = (first + last) * [1.0, 0.0, 1.0] - truth.translations * [1.0, 0.0, 1.0]
     places = across + truth.translations * [0.0, 1.0, 0.0]
     poses = np.concatenate([truth.poses, np.tile(truth.poses[-1], (AWAY, 1)), turned])
-    translations = np.concatenate([truth.translations, np.tile(last, (AWAY, 1)), places])
+    translations = np.concatenate(
+        [truth.translations, np.tile(last, (AWAY, 1)), places]
+    )
     motion = Motion(truth.name, truth.skeleton, poses, translations, truth.fps)
     size = scene.cameras[0].width, scene.cameras[0].height
     whole = synthetic(motion, views, size, [], (None, None))
     observations = rendered(motion, whole.body, whole.cameras)
-    gone, back = len(truth), len(truth) + AWAY
-    return replace(whole, yaw=scene.yaw, observations=hidden(observations, gone, back)), back
+    gone = len(truth)
+    back = len(truth) + AWAY
+    return replace(
+        whole, yaw=scene.yaw, observations=hidden(observations, gone, back)
+    ), back
 
 
 def recovery_lines(workers: int | None) -> Iterator[str]:
     """Yield for each kind of absence and of translation the shares of trials in which a track was right."""
     jobs = {}  # all cells are made, and so checked, before any runs
-    for clip, view, kind, translation in product(GROUPS[WALKS][:WALKERS], SIDES[1:3], KINDS, TRANSLATIONS):
-        cell = cell_of(cell_fields(clip, view, BEFORE if kind == RETURN else clip.frames))
-        jobs[clip.name, view, kind, translation] = partial(trial, cell, view, kind, translation)
+    for clip, view, kind, translation in product(
+        GROUPS[WALKS][:WALKERS], SIDES[1:3], KINDS, TRANSLATIONS
+    ):
+        cell = cell_of(
+            cell_fields(clip, view, BEFORE if kind == RETURN else clip.frames)
+        )
+        jobs[clip.name, view, kind, translation] = partial(
+            trial, cell, view, kind, translation
+        )
     trials = each(jobs, workers, bar)
     table = []
     for case in product(KINDS, TRANSLATIONS):
         some = np.array([result for key, result in trials.items() if key[2:] == case])
-        table.append([*case, str(len(some)), *(percent(share, 0) for share in some.mean(axis=0))])
-    yield from markdown(["out of sight", "translation", "trials", "right again %", "facing right %"], table, 2)
+        table.append(
+            [*case, str(len(some)), *(percent(share, 0) for share in some.mean(axis=0))]
+        )
+    yield from markdown(
+        ["out of sight", "translation", "trials", "right again %", "facing right %"],
+        table,
+        2,
+    )
 
 
 @click.command(cls=Command, help=__doc__)
@@ -146,7 +216,9 @@ def recovery_lines(workers: int | None) -> Iterator[str]:
 @LEDGER
 @WORKERS
 def main(recovery: bool, aside: bool, ledger: str | None, workers: int | None) -> None:
-    for line in recovery_lines(workers) if recovery else people_lines(aside, workers, ledger):
+    for line in (
+        recovery_lines(workers) if recovery else people_lines(aside, workers, ledger)
+    ):
         click.echo(line)
 
 

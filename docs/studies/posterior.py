@@ -37,7 +37,8 @@ from posefit_reproduce.jobs import each
 from table import WORKERS, bar, markdown, percent
 
 FRAMES = 50
-DANCES, EVERYDAY = "dances", "everyday"
+DANCES = "dances"
+EVERYDAY = "everyday"
 # clips that other measurements do not use, by group
 MORE = {
     EVERYDAY: (
@@ -55,7 +56,11 @@ MAX_CLIPS = 4  # of a person
 
 
 # masks and a body as those of footage
-HARD = {name: value for name, value in CHANGES["all of these"].items() if name != "yaw_off_degrees"}
+HARD = {
+    name: value
+    for name, value in CHANGES["all of these"].items()
+    if name != "yaw_off_degrees"
+}
 
 
 class Case(NamedTuple):
@@ -82,10 +87,13 @@ def pieces() -> list[tuple[str, Clip]]:
     for place in range(max(map(len, clips_of.values()))):
         for group, clips in clips_of.items():
             if place < len(clips):
-                same_person = [clip for _, clip in chosen if clip.subject == clips[place].subject]
+                same_person = [
+                    clip for _, clip in chosen if clip.subject == clips[place].subject
+                ]
                 if len(same_person) < MAX_CLIPS:
                     chosen.append((group, clips[place]))
-    return sorted(chosen, key=lambda pair: pair[1].subject)  # a person's library is made once
+    # a person's library is made once
+    return sorted(chosen, key=lambda pair: pair[1].subject)
 
 
 def planned_tracks() -> list[Case]:
@@ -95,7 +103,15 @@ def planned_tracks() -> list[Case]:
         planned += [Case(group, clip, side, "known") for side in sides]
         last = (PAIRS[k // 2 % len(PAIRS)], "known") if k % 2 else (sides[0], "aligned")
         planned.append(Case(group, clip, *last))
-        planned.append(Case(group, clip, PAIRS[k // 2 % 2] if k % 2 else sides[1], "aligned", hard=True))
+        planned.append(
+            Case(
+                group,
+                clip,
+                PAIRS[k // 2 % 2] if k % 2 else sides[1],
+                "aligned",
+                hard=True,
+            )
+        )
     return planned
 
 
@@ -121,11 +137,18 @@ class Samples:
     @property
     def off(self) -> Array:
         """The error of each joint (T, 27), metres, both roots at one point."""
-        return joint_distances(self.skeleton.joints(self.truth), self.skeleton.joints(self.reported))
+        return joint_distances(
+            self.skeleton.joints(self.truth), self.skeleton.joints(self.reported)
+        )
 
     def posterior(self, k: int) -> Posterior:
         """Return the posterior of a frame before recalibration."""
-        return Posterior(self.drawn[k], np.zeros((len(self.weights[k]), 3)), self.weights[k], coherent=True)
+        return Posterior(
+            self.drawn[k],
+            np.zeros((len(self.weights[k]), 3)),
+            self.weights[k],
+            coherent=True,
+        )
 
 
 def sampled(case: Case) -> Samples:
@@ -155,8 +178,12 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "elbows": ("lhumerus", "rhumerus"),
     "hands": ("lradius", "lwrist", "lhand", "rradius", "rwrist", "rhand"),
 }
-MEMBERS = {name: np.array([JOINTS.index(joint) for joint in joints]) for name, joints in GROUPS.items()}
-ALONE = {str(angle): np.array([angle]) for angle in range(ANGLES)}  # some have no freedom, and so no error
+MEMBERS = {
+    name: np.array([JOINTS.index(joint) for joint in joints])
+    for name, joints in GROUPS.items()
+}
+# some have no freedom, and so no error
+ALONE = {str(angle): np.array([angle]) for angle in range(ANGLES)}
 SPREADS = np.geomspace(0.05, 2.0, 12)  # in expected errors
 EVERY = 5  # frames, of which one is used for factors, as neighbours are similar
 SHARPNESSES = np.geomspace(0.05, 1.0, 24)
@@ -172,23 +199,36 @@ class TrackFeatures:
     track: Samples
     evidence: Array = field(repr=False)  # (T, 4)
     error: Array = field(repr=False)  # (T,) metres, the mean over joints
-    modes: list[Array] = field(repr=False)  # weights of each frame's modes, the heaviest first
-    nearest: Array = field(repr=False)  # (T, 2) the mode nearest to the truth, and its distance, metres
+    # weights of each frame's modes, the heaviest first
+    modes: list[Array] = field(repr=False)
+    # (T, 2) the mode nearest to the truth, and its distance, metres
+    nearest: Array = field(repr=False)
 
     @classmethod
     def of(cls, track: Samples) -> "TrackFeatures":
         """Return the features of a track."""
-        skeleton, cameras = track.skeleton, len(track.case.views)
+        skeleton = track.skeleton
+        cameras = len(track.case.views)
         posteriors = [track.posterior(k) for k in range(len(track))]
         frames = list(zip(posteriors, track.reported, track.costs, strict=True))
-        signs = np.array([evidence(skeleton, posterior, pose, cost, cameras) for posterior, pose, cost in frames])
-        modes, nearest = [], []
+        signs = np.array(
+            [
+                evidence(skeleton, posterior, pose, cost, cameras)
+                for posterior, pose, cost in frames
+            ]
+        )
+        modes = []
+        nearest = []
         for posterior, truth in zip(posteriors, track.truth, strict=True):
             of_frame = modes_of(skeleton, posterior)
-            distances = poses_apart(skeleton, np.array([mode.pose for mode in of_frame]), truth[None])[:, 0]
+            distances = poses_apart(
+                skeleton, np.array([mode.pose for mode in of_frame]), truth[None]
+            )[:, 0]
             modes.append(np.array([mode.weight for mode in of_frame]))
             nearest.append((distances.argmin(), distances.min()))
-        return cls(track, signs, track.off[:, 1:].mean(axis=1), modes, np.array(nearest))
+        return cls(
+            track, signs, track.off[:, 1:].mean(axis=1), modes, np.array(nearest)
+        )
 
 
 def calibration_of(tracks: Sequence[TrackFeatures]) -> Calibration:
@@ -197,8 +237,12 @@ def calibration_of(tracks: Sequence[TrackFeatures]) -> Calibration:
     joints, angles = _spreads(calibration, tracks)
     calibration = replace(calibration, joint_spreads=joints, angle_spreads=angles)
     joint_factors, angle_factors = _factors(calibration, tracks)
-    calibration = replace(calibration, joint_factors=joint_factors, angle_factors=angle_factors)
-    return replace(calibration, sharpness=_sharpness(tracks), none=_none(calibration, tracks))
+    calibration = replace(
+        calibration, joint_factors=joint_factors, angle_factors=angle_factors
+    )
+    return replace(
+        calibration, sharpness=_sharpness(tracks), none=_none(calibration, tracks)
+    )
 
 
 def sharpened(weights: Array, sharpness: float) -> Array:
@@ -209,10 +253,17 @@ def sharpened(weights: Array, sharpness: float) -> Array:
 
 def _sharpness(tracks: Sequence[TrackFeatures]) -> float:
     """Return the power of modes' weights at which the modes that are nearest to the truth are likeliest."""
-    weights, likelihoods = frame_weights(tracks), []
-    pairs = [(modes, int(row)) for track in tracks for modes, row in zip(track.modes, track.nearest[:, 0], strict=True)]
+    weights = frame_weights(tracks)
+    likelihoods = []
+    pairs = [
+        (modes, int(row))
+        for track in tracks
+        for modes, row in zip(track.modes, track.nearest[:, 0], strict=True)
+    ]
     for sharpness in SHARPNESSES:
-        likelihoods.append(weights @ [np.log(sharpened(modes, sharpness)[row]) for modes, row in pairs])
+        likelihoods.append(
+            weights @ [np.log(sharpened(modes, sharpness)[row]) for modes, row in pairs]
+        )
     return float(SHARPNESSES[int(np.argmax(likelihoods))])
 
 
@@ -220,12 +271,22 @@ def _rounded(values: Any) -> Any:
     """Return values as JSON holds them, numbers to four digits."""
     if isinstance(values, dict):
         return {name: _rounded(value) for name, value in values.items()}
-    return [_rounded(value) for value in values] if np.ndim(values) else float(f"{float(values):.4g}")
+    return (
+        [_rounded(value) for value in values]
+        if np.ndim(values)
+        else float(f"{float(values):.4g}")
+    )
 
 
 def _none(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> Array:
     """Return the coefficients (3,) of the log-odds that no mode is right: the truth is far from the nearest one."""
-    signs = np.array([none_features(calibration.log(signs)) for track in tracks for signs in track.evidence])
+    signs = np.array(
+        [
+            none_features(calibration.log(signs))
+            for track in tracks
+            for signs in track.evidence
+        ]
+    )
     far = np.concatenate([track.nearest[:, 1] > APART for track in tracks])
     return logistic(signs, far, frame_weights(tracks))
 
@@ -236,57 +297,97 @@ def frame_weights(tracks: Sequence[TrackFeatures]) -> Array:
     for features in tracks:
         clip = features.track.case.clip
         frames[clip] = frames.get(clip, 0) + len(features.track)
-    weights = [np.full(len(features.track), 1.0 / frames[features.track.case.clip]) for features in tracks]
+    weights = [
+        np.full(len(features.track), 1.0 / frames[features.track.case.clip])
+        for features in tracks
+    ]
     return np.asarray(np.concatenate(weights) / len(frames))
 
 
 def _expected_error(tracks: Sequence[TrackFeatures]) -> Calibration:
     """Return the logarithm of the error as a function of evidence, by weighted least squares."""
-    signs, errors = (np.concatenate([getattr(track, name) for track in tracks]) for name in ("evidence", "error"))
+    signs, errors = (
+        np.concatenate([getattr(track, name) for track in tracks])
+        for name in ("evidence", "error")
+    )
     weighted = signs.T * frame_weights(tracks)
-    slopes = np.linalg.solve(weighted @ signs + RIDGE * np.eye(signs.shape[1]), weighted @ np.log(errors))
+    slopes = np.linalg.solve(
+        weighted @ signs + RIDGE * np.eye(signs.shape[1]), weighted @ np.log(errors)
+    )
     low, high = np.quantile(signs @ slopes, [0.005, 0.995])
     plain = Recalibration()
-    corrections = plain.joint_spreads, plain.angle_spreads, plain.joint_factors, plain.angle_factors
-    return Calibration(slopes, (float(low), float(high)), *corrections, 1.0, np.zeros(3))
+    corrections = (
+        plain.joint_spreads,
+        plain.angle_spreads,
+        plain.joint_factors,
+        plain.angle_factors,
+    )
+    return Calibration(
+        slopes, (float(low), float(high)), *corrections, 1.0, np.zeros(3)
+    )
 
 
-def _spreads(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> tuple[Array, Array]:
+def _spreads(
+    calibration: Calibration, tracks: Sequence[TrackFeatures]
+) -> tuple[Array, Array]:
     """Return the spreads of joints (27,) and angles (66,), in expected errors, at which the truth is likeliest."""
-    joints, angles = np.zeros((len(SPREADS), len(JOINTS))), np.zeros((len(SPREADS), ANGLES))
-    weights, begin = frame_weights(tracks), 0
+    joints = np.zeros((len(SPREADS), len(JOINTS)))
+    angles = np.zeros((len(SPREADS), ANGLES))
+    weights = frame_weights(tracks)
+    begin = 0
     for features in tracks:
-        track, rows = features.track, np.arange(0, len(features.track), EVERY)
+        track = features.track
+        rows = np.arange(0, len(features.track), EVERY)
         row_weights = weights[begin + rows]
         begin += len(track)
-        errors = np.exp([calibration.log(signs) for signs in features.evidence[rows]])[:, None]
+        errors = np.exp([calibration.log(signs) for signs in features.evidence[rows]])[
+            :, None
+        ]
         skeleton = track.skeleton
         true = skeleton.joints(track.truth[rows])
-        off = np.array([np.linalg.norm(skeleton.joints(track.drawn[k]) - true[i], axis=2) for i, k in enumerate(rows)])
+        off = np.array(
+            [
+                np.linalg.norm(skeleton.joints(track.drawn[k]) - true[i], axis=2)
+                for i, k in enumerate(rows)
+            ]
+        )
         turned = np.abs(wrapped(track.drawn[rows] - track.truth[rows, None]))
         for sums, distances, dimensions in ((joints, off, 3), (angles, turned, 1)):
             for t, spread in enumerate(SPREADS):
                 wide = spread * errors
                 logs = -0.5 * (distances / wide[:, None]) ** 2
                 top = logs.max(axis=1)
-                likelihoods = np.einsum("tk,tkn->tn", track.weights[rows], np.exp(logs - top[:, None]))
-                sums[t] += row_weights @ (np.log(likelihoods) + top - dimensions * np.log(wide))
+                likelihoods = np.einsum(
+                    "tk,tkn->tn", track.weights[rows], np.exp(logs - top[:, None])
+                )
+                sums[t] += row_weights @ (
+                    np.log(likelihoods) + top - dimensions * np.log(wide)
+                )
     best = SPREADS[joints.argmax(axis=0)]
     best[0] = 0.0  # all roots are at one point
     return best, SPREADS[angles.argmax(axis=0)]
 
 
-def _factors(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> tuple[Array, Array]:
+def _factors(
+    calibration: Calibration, tracks: Sequence[TrackFeatures]
+) -> tuple[Array, Array]:
     """Return the conformal factors of joints (levels, 27) and angles (levels, 66), each of its group."""
     clips: dict[object, list[tuple[Array, Array]]] = {}
     for features in tracks:
-        clips.setdefault(features.track.case.clip, []).append(scores(calibration, features, EVERY))
-    by_clip = [[np.concatenate(parts) for parts in zip(*some, strict=True)] for some in clips.values()]
+        clips.setdefault(features.track.case.clip, []).append(
+            scores(calibration, features, EVERY)
+        )
+    by_clip = [
+        [np.concatenate(parts) for parts in zip(*some, strict=True)]
+        for some in clips.values()
+    ]
     factors = [np.ones((len(LEVELS), count)) for count in (len(JOINTS), ANGLES)]
     for kind, groups in enumerate((MEMBERS, ALONE)):
         for members in groups.values():
             for level, share in enumerate(LEVELS):
-                clip_scores = [clip[kind][:, level, members].ravel() for clip in by_clip]
+                clip_scores = [
+                    clip[kind][:, level, members].ravel() for clip in by_clip
+                ]
                 factors[kind][level, members] = conformal_factor(clip_scores, share)
     return factors[0], factors[1]
 
@@ -300,7 +401,9 @@ def conformal_factor(scores: Sequence[Array], level: float) -> float:
     Distribution-free prediction sets for two-layer hierarchical models, 2023: the pooled CDF.
     """
     if not scores or any(not len(clip) for clip in scores):
-        raise InputError("scores must be of one clip or more, each with one score or more")
+        raise InputError(
+            "scores must be of one clip or more, each with one score or more"
+        )
     if not 0.0 < level < 1.0:
         raise InputError(f"level must be between 0 and 1, got {level}")
     clips = len(scores)
@@ -309,23 +412,37 @@ def conformal_factor(scores: Sequence[Array], level: float) -> float:
             f"clips must be at least {int(np.ceil(level / (1.0 - level) - 1e-9))} for a level of {level}, got {clips}"
         )
     values = np.concatenate([np.asarray(clip, dtype=np.float64) for clip in scores])
-    weights = np.concatenate([np.full(len(clip), 1.0 / (len(clip) * (clips + 1))) for clip in scores])
+    weights = np.concatenate(
+        [np.full(len(clip), 1.0 / (len(clip) * (clips + 1))) for clip in scores]
+    )
     order = np.argsort(values, kind="stable")
     reached = np.cumsum(weights[order])  # the pooled CDF
-    return float(values[order][min(int(np.searchsorted(reached, level - 1e-12)), len(values) - 1)])
+    return float(
+        values[order][
+            min(int(np.searchsorted(reached, level - 1e-12)), len(values) - 1)
+        ]
+    )
 
 
-def scores(calibration: Calibration, features: TrackFeatures, every: int = 1) -> tuple[Array, Array]:
+def scores(
+    calibration: Calibration, features: TrackFeatures, every: int = 1
+) -> tuple[Array, Array]:
     """Return the errors of joints (T, levels, 27) and angles (T, levels, 66), in radii of their intervals."""
     track = features.track
     turned = np.abs(wrapped(track.truth - track.reported))[::every, None]
     radii, halves = radii_of(calibration, features, every)
-    return track.off[::every, None] / np.maximum(radii, TINY), turned / np.maximum(halves, TINY)
+    return track.off[::every, None] / np.maximum(radii, TINY), turned / np.maximum(
+        halves, TINY
+    )
 
 
-def radii_of(calibration: Calibration, features: TrackFeatures, every: int = 1) -> tuple[Array, Array]:
+def radii_of(
+    calibration: Calibration, features: TrackFeatures, every: int = 1
+) -> tuple[Array, Array]:
     """Return the radii of joints (T, levels, 27) and the half intervals of angles (T, levels, 66)."""
-    joints, angles, track = [], [], features.track
+    joints = []
+    angles = []
+    track = features.track
     for k in range(0, len(track), every):
         recalibration = calibration.recalibration(calibration.log(features.evidence[k]))
         posterior = replace(track.posterior(k), recalibration=recalibration)
@@ -340,7 +457,9 @@ def logistic(design: Array, truth: NDArray[np.bool_], weights: Array) -> Array:
     for _ in range(STEPS):
         probable = 1.0 / (1.0 + np.exp(-np.clip(design @ coefficients, -30.0, 30.0)))
         slope = design.T @ (weights * (truth - probable)) - RIDGE * coefficients
-        bend = (design.T * (weights * probable * (1.0 - probable))) @ design + RIDGE * np.eye(len(coefficients))
+        bend = (
+            design.T * (weights * probable * (1.0 - probable))
+        ) @ design + RIDGE * np.eye(len(coefficients))
         coefficients = coefficients + np.linalg.solve(bend, slope)
     return np.asarray(coefficients)
 
@@ -352,11 +471,19 @@ def judged(tracks: Sequence[TrackFeatures]) -> list["Evaluation"]:
     """Return the evaluation of each track by a calibration that was fitted to other people."""
     people = list(dict.fromkeys(map(_person, tracks)))
     if len(people) < MIN_PEOPLE:
-        raise InputError(f"tracks must be of {MIN_PEOPLE} people or more, got {len(people)}")
+        raise InputError(
+            f"tracks must be of {MIN_PEOPLE} people or more, got {len(people)}"
+        )
     evaluations = []
     for person in people:
-        calibration = calibration_of([features for features in tracks if _person(features) != person])
-        evaluations += [evaluated(calibration, features) for features in tracks if _person(features) == person]
+        calibration = calibration_of(
+            [features for features in tracks if _person(features) != person]
+        )
+        evaluations += [
+            evaluated(calibration, features)
+            for features in tracks
+            if _person(features) == person
+        ]
     return evaluations
 
 
@@ -377,34 +504,67 @@ class Evaluation:
 
 
 def evaluated(calibration: Calibration, features: TrackFeatures) -> Evaluation:
-    none = np.array([calibration.recalibration(calibration.log(signs)).none for signs in features.evidence])
+    none = np.array(
+        [
+            calibration.recalibration(calibration.log(signs)).none
+            for signs in features.evidence
+        ]
+    )
     track = features.track
     radii, halves = radii_of(calibration, features)
-    inside, angles = track.off[:, None] <= radii, np.abs(wrapped(track.truth - track.reported))[:, None] <= halves
-    return Evaluation(features, calibration.sharpness, none, inside, radii, angles.mean(axis=(0, 2)))
+    inside = track.off[:, None] <= radii
+    angles = np.abs(wrapped(track.truth - track.reported))[:, None] <= halves
+    return Evaluation(
+        features, calibration.sharpness, none, inside, radii, angles.mean(axis=(0, 2))
+    )
 
 
-def coverage(name: str, tracks: Sequence[Evaluation], joints: Any = slice(1, None)) -> list[str]:
+def coverage(
+    name: str, tracks: Sequence[Evaluation], joints: Any = slice(1, None)
+) -> list[str]:
     """Return the line of some joints of tracks: how much the intervals hold, and the radius of 80 %."""
     weights = frame_weights([track.features for track in tracks])
     inside, radii = (
-        np.concatenate([getattr(track, kind)[:, :, joints].mean(axis=2) for track in tracks])
+        np.concatenate(
+            [getattr(track, kind)[:, :, joints].mean(axis=2) for track in tracks]
+        )
         for kind in ("inside", "radii")
     )
-    held, widths = weights @ inside, (1e3 * weights @ radii[:, 1], 1e3 * np.median(radii[:, 1]))
+    held = weights @ inside
+    widths = (1e3 * weights @ radii[:, 1], 1e3 * np.median(radii[:, 1]))
     return [name, *map(percent, held.tolist()), *(f"{width:.0f}" for width in widths)]
 
 
 def coverage_lines(tracks: Sequence[Evaluation]) -> Iterator[str]:
     """Yield the table of people left out: overall, by group of joints, by view and by kind of motion."""
-    cells = [coverage("all", tracks), *(coverage(name, tracks, members) for name, members in MEMBERS.items())]
-    for label in (lambda case: ", ".join(f"{view:g}" for view in case.views), lambda case: case.group):
+    cells = [
+        coverage("all", tracks),
+        *(coverage(name, tracks, members) for name, members in MEMBERS.items()),
+    ]
+    for label in (
+        lambda case: ", ".join(f"{view:g}" for view in case.views),
+        lambda case: case.group,
+    ):
         labels = [label(track.features.track.case) for track in tracks]
         for name in sorted(set(labels)):
-            cells.append(coverage(name, [track for track, own in zip(tracks, labels, strict=True) if own == name]))
+            cells.append(
+                coverage(
+                    name,
+                    [
+                        track
+                        for track, own in zip(tracks, labels, strict=True)
+                        if own == name
+                    ],
+                )
+            )
     angles = np.mean([track.turned for track in tracks], axis=0).tolist()
     cells.append(["angles instead of joints", *map(percent, angles), "", ""])
-    heads = ["joints of", *(f"{100 * level:.0f} % hold %" for level in LEVELS), "80 % radius mm", "median mm"]
+    heads = [
+        "joints of",
+        *(f"{100 * level:.0f} % hold %" for level in LEVELS),
+        "80 % radius mm",
+        "median mm",
+    ]
     yield from markdown(heads, cells)
 
 
@@ -414,8 +574,14 @@ def modes_line(evaluations: Sequence[Evaluation]) -> str:
     It is right where the truth is nearer to it than to any other mode, and as near as poses of one mode are.
     """
     none = np.concatenate([evaluation.none for evaluation in evaluations])
-    best = [sharpened(modes, track.sharpness)[0] for track in evaluations for modes in track.features.modes]
-    nearest = np.concatenate([evaluation.features.nearest for evaluation in evaluations])
+    best = [
+        sharpened(modes, track.sharpness)[0]
+        for track in evaluations
+        for modes in track.features.modes
+    ]
+    nearest = np.concatenate(
+        [evaluation.features.nearest for evaluation in evaluations]
+    )
     far = nearest[:, 1] > APART
     flags = (nearest[:, 0] == 0.0) & ~far, (1.0 - none) * best, far
     right, claimed, never = (percent(float(values.mean())) for values in flags)
@@ -423,16 +589,27 @@ def modes_line(evaluations: Sequence[Evaluation]) -> str:
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--store", metavar="FILE.json", help="New file for the calibration, for exemplars to read.")
+@click.option(
+    "--store",
+    metavar="FILE.json",
+    help="New file for the calibration, for exemplars to read.",
+)
 @WORKERS
 def main(store: str | None, workers: int | None) -> None:
     with new_file(store) if store else nullcontext() as file:
         jobs = {case: partial(sampled, case) for case in planned_tracks()}
-        tracks = [TrackFeatures.of(track) for track in each(jobs, workers, bar).values()]
+        tracks = [
+            TrackFeatures.of(track) for track in each(jobs, workers, bar).values()
+        ]
         evaluations = judged(tracks)
-        click.echo("\n".join([*coverage_lines(evaluations), "", modes_line(evaluations)]))
+        click.echo(
+            "\n".join([*coverage_lines(evaluations), "", modes_line(evaluations)])
+        )
         if file is not None:
-            fitted = {"temperature": POSTERIOR_TEMPERATURE, **_rounded(vars(calibration_of(tracks)))}
+            fitted = {
+                "temperature": POSTERIOR_TEMPERATURE,
+                **_rounded(vars(calibration_of(tracks))),
+            }
             file.write_text(json.dumps(fitted) + "\n", encoding="utf-8")
 
 

@@ -35,15 +35,25 @@ def proportions(table: Path) -> Array:
         rows = list(csv.DictReader(file))
     names = {"stature", *(name.strip("-") for of in MEASURES.values() for name in of)}
     columns = {name: np.array([float(row[name]) for row in rows]) for name in names}
-    lengths = [sum(columns[name.strip("-")] * (-1 if name[0] == "-" else 1) for name in of) for of in MEASURES.values()]
+    lengths = [
+        sum(columns[name.strip("-")] * (-1 if name[0] == "-" else 1) for name in of)
+        for of in MEASURES.values()
+    ]
     stature = columns["stature"]
-    return np.asarray(np.log(np.column_stack([1e-3 * stature, *(length / stature for length in lengths)])))
+    return np.asarray(
+        np.log(
+            np.column_stack([1e-3 * stature, *(length / stature for length in lengths)])
+        )
+    )
 
 
 def moments(men: Array, women: Array) -> tuple[Array, Array]:
     """Return the standard deviations (n,) and correlations (n, n) of a population of as many men as women."""
     middle = 0.5 * (men.mean(axis=0) + women.mean(axis=0))
-    covariance = sum(0.5 * (people - middle).T @ (people - middle) / len(people) for people in (men, women))
+    covariance = sum(
+        0.5 * (people - middle).T @ (people - middle) / len(people)
+        for people in (men, women)
+    )
     spread = np.sqrt(np.diag(covariance))
     return spread, covariance / np.outer(spread, spread)
 
@@ -52,7 +62,10 @@ def proportions_lines(men: Path, women: Path) -> Iterator[str]:
     spread, correlation = moments(proportions(men), proportions(women))
     heads = ["", "spread", *MEASURES]
     rows = zip(MEASURES, spread[1:], correlation[1:, 1:], strict=True)
-    cells = [[name, f"{deviation:.3f}", *(f"{value:.2f}" for value in row)] for name, deviation, row in rows]
+    cells = [
+        [name, f"{deviation:.3f}", *(f"{value:.2f}" for value in row)]
+        for name, deviation, row in rows
+    ]
     yield f"stature: {spread[0]:.3f}"
     yield from markdown(heads, cells, 1)
 

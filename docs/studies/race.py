@@ -22,16 +22,30 @@ from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES, SEARCHES
 from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
 NAME = "posefit/Race-v0"
-INSTANCES, SEEDS = 192, 2
+INSTANCES = 192
+SEEDS = 2
 # what a training of each learner has
-CURIOSITIES, SLOPES = (0.1, 0.2, 0.3, 0.4, 0.6, 0.8), (0.01, 0.03, 0.05, 0.1, 0.2)
-CANDIDATES, EPISODES, GENERATIONS = 16, 24, 60  # CMA-ES: policies a generation, each in so many episodes
+CURIOSITIES = (0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
+SLOPES = (0.01, 0.03, 0.05, 0.1, 0.2)
+# CMA-ES: policies a generation, each in so many episodes
+CANDIDATES = 16
+EPISODES = 24
+GENERATIONS = 60
 LINEAR_WEIGHTS = 9
 DISCOUNT = 0.995
-PPO_ENVIRONMENTS, PPO_ROLLOUT, PPO_STEPS = 64, 64, 200_000
-PPO_SETTINGS: dict[str, Any] = {"n_steps": PPO_ROLLOUT, "batch_size": 512, "learning_rate": 1e-3, "gae_lambda": 0.98}
-LOG_DEVIATION = -1.0  # of PPO's first actions: of several that are clipped to 1 the first would count
-SAC_ENVIRONMENTS, SAC_STEPS = 16, 24_000
+PPO_ENVIRONMENTS = 64
+PPO_ROLLOUT = 64
+PPO_STEPS = 200_000
+PPO_SETTINGS: dict[str, Any] = {
+    "n_steps": PPO_ROLLOUT,
+    "batch_size": 512,
+    "learning_rate": 1e-3,
+    "gae_lambda": 0.98,
+}
+# of PPO's first actions: of several that are clipped to 1 the first would count
+LOG_DEVIATION = -1.0
+SAC_ENVIRONMENTS = 16
+SAC_STEPS = 24_000
 SAC_SETTINGS: dict[str, Any] = {"buffer_size": SAC_STEPS, "gradient_steps": 4}
 REFERENCES = ("round robin", "random actions", "one restarted", "halving")
 LEARNERS = ("bandit", "linear, CMA-ES", "PPO, a shared net", "PPO", "SAC")
@@ -72,10 +86,13 @@ def halving(observation: Any, _: int) -> Array:
     features, common = race_features(observation)
     searches = features.shape[-2]
     parts = int(np.log2(searches)) + 1
-    done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)  # float32 shows the budget
+    # float32 shows the budget
+    done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)
     ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
     left = ranks < searches // 2.0 ** done[..., None]
-    return race_action(np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches)
+    return race_action(
+        np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches
+    )
 
 
 def bandit(observation: Any, step: int, *, curiosity: float) -> Array:
@@ -86,7 +103,8 @@ def bandit(observation: Any, step: int, *, curiosity: float) -> Array:
     2002, whose rewards are means and not bests.
     """
     features, _ = race_features(observation)
-    searches, used = int(features.shape[-2]), np.asarray(features[..., 3])
+    searches = int(features.shape[-2])
+    used = np.asarray(features[..., 3])
     total = step + searches
     generations = used / used.sum(axis=-1, keepdims=True) * total
     index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)
@@ -108,10 +126,14 @@ def linear(observation: Any, _: int, *, weights: Array) -> Array:
     return race_action(choice, scores.shape[-1])
 
 
-def final_costs(policy: Policy, env: Any, numbers: Sequence[int], seeds: Sequence[int]) -> tuple[Array, int]:
+def final_costs(
+    policy: Policy, env: Any, numbers: Sequence[int], seeds: Sequence[int]
+) -> tuple[Array, int]:
     """Return ln(1 + best cost) (n,) at the end of an episode of every environment of a vector, and the steps made."""
     observations, _ = env.reset(seed=list(seeds), options={"instance": list(numbers)})
-    costs, step, taken = np.full(env.num_envs, np.nan), 0, 0
+    costs = np.full(env.num_envs, np.nan)
+    step = 0
+    taken = 0
     while np.isnan(costs).any():
         taken += int(np.isnan(costs).sum())
         observations, _, ended, _, infos = env.step(policy(observations, step))
@@ -127,8 +149,10 @@ def _made(count: int) -> Any:
 
 def chosen(policies: Sequence[Policy], seed: int) -> tuple[Policy, int]:
     """Return the best of several policies on as many training instances as are held out, and the steps made."""
-    rng, env = np.random.default_rng(seed), _made(INSTANCES)
-    numbers, seeds = rng.integers(HELD_OUT, size=INSTANCES).tolist(), rng.integers(2**31, size=INSTANCES).tolist()
+    rng = np.random.default_rng(seed)
+    env = _made(INSTANCES)
+    numbers = rng.integers(HELD_OUT, size=INSTANCES).tolist()
+    seeds = rng.integers(2**31, size=INSTANCES).tolist()
     results = [final_costs(policy, env, numbers, seeds) for policy in policies]
     best = int(np.argmin([costs.mean() for costs, _ in results]))
     return policies[best], sum(steps for _, steps in results)
@@ -139,13 +163,19 @@ def evolved(seed: int) -> tuple[Policy, int]:
 
     All policies of a generation have the same episodes.
     """
-    rng, env, taken = np.random.default_rng(seed), _made(CANDIDATES * EPISODES), 0
+    rng = np.random.default_rng(seed)
+    env = _made(CANDIDATES * EPISODES)
+    taken = 0
     strategy = Strategy(np.zeros(LINEAR_WEIGHTS), np.ones(LINEAR_WEIGHTS), CANDIDATES)
     for _ in range(GENERATIONS):
         weights = strategy.sample(rng, CANDIDATES)
-        numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
+        numbers = rng.integers(HELD_OUT, size=EPISODES)
+        seeds = rng.integers(2**31, size=EPISODES)
         policy = partial(linear, weights=weights.repeat(EPISODES, axis=0))
-        tiled = np.tile(numbers, CANDIDATES).tolist(), np.tile(seeds, CANDIDATES).tolist()
+        tiled = (
+            np.tile(numbers, CANDIDATES).tolist(),
+            np.tile(seeds, CANDIDATES).tolist(),
+        )
         costs, steps = final_costs(policy, env, *tiled)
         strategy.learn(weights, costs.reshape(CANDIDATES, EPISODES).mean(axis=1))
         taken += steps
@@ -163,7 +193,12 @@ def trained(agent: str, seed: int) -> tuple[Policy, int]:
     torch.set_num_threads(1)
     common: dict[str, Any] = {"seed": seed, "device": "cpu", "gamma": DISCOUNT}
     if agent == "SAC":
-        model: Any = SAC("MlpPolicy", to_sb3_vec_env(_made(SAC_ENVIRONMENTS)), **SAC_SETTINGS, **common)
+        model: Any = SAC(
+            "MlpPolicy",
+            to_sb3_vec_env(_made(SAC_ENVIRONMENTS)),
+            **SAC_SETTINGS,
+            **common,
+        )
     else:
         policy = "MlpPolicy" if agent == "PPO" else _shared_net()
         common |= PPO_SETTINGS | {"policy_kwargs": {"log_std_init": LOG_DEVIATION}}
@@ -186,18 +221,27 @@ def _shared_net() -> type:
     width = 32
 
     class Scores(nn.Module):  # type: ignore[misc]
-        latent_dim_pi, latent_dim_vf = SEARCHES + 1, 2 * width
+        latent_dim_pi = SEARCHES + 1
+        latent_dim_vf = 2 * width
 
         def __init__(self) -> None:
             super().__init__()
             size = SEARCH_FEATURES + COMMON_FEATURES
-            self.score = nn.Sequential(nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh())
+            self.score = nn.Sequential(
+                nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh()
+            )
             self.last, self.another = nn.Linear(width, 1), nn.Linear(COMMON_FEATURES, 1)
-            self.value = nn.Sequential(nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh())
+            self.value = nn.Sequential(
+                nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh()
+            )
 
         def _rows(self, shown: Any) -> Any:
             common = shown[:, -COMMON_FEATURES:]
-            own = shown[:, :-COMMON_FEATURES].reshape(len(shown), SEARCH_FEATURES, SEARCHES).transpose(1, 2)
+            own = (
+                shown[:, :-COMMON_FEATURES]
+                .reshape(len(shown), SEARCH_FEATURES, SEARCHES)
+                .transpose(1, 2)
+            )
             return torch.cat([own, common[:, None].expand(-1, SEARCHES, -1)], dim=2)
 
         def forward_actor(self, shown: Any) -> Any:
@@ -219,7 +263,9 @@ def _shared_net() -> type:
             super()._build(schedule)
             self.action_net = nn.Identity()  # scores are the actions
             optimizer: Any = self.optimizer_class
-            self.optimizer = optimizer(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
+            self.optimizer = optimizer(
+                self.parameters(), lr=schedule(1), **self.optimizer_kwargs
+            )
 
     return SharedNet
 
@@ -237,13 +283,21 @@ def policy_of(turn: Turn, env: Any) -> tuple[Policy, int]:
     if turn.agent == "one restarted":
         return chosen([partial(restarted, slope=slope) for slope in SLOPES], turn.seed)
     if turn.agent == "bandit":
-        return chosen([partial(bandit, curiosity=curiosity) for curiosity in CURIOSITIES], turn.seed)
-    return evolved(turn.seed) if turn.agent == "linear, CMA-ES" else trained(turn.agent, turn.seed)
+        return chosen(
+            [partial(bandit, curiosity=curiosity) for curiosity in CURIOSITIES],
+            turn.seed,
+        )
+    return (
+        evolved(turn.seed)
+        if turn.agent == "linear, CMA-ES"
+        else trained(turn.agent, turn.seed)
+    )
 
 
 def row_of_turn(turn: Turn) -> dict[str, Any]:
     """Return a row: the final costs of a policy on the held-out instances, and the steps of its training."""
-    env, numbers = _made(INSTANCES), range(HELD_OUT, HELD_OUT + INSTANCES)
+    env = _made(INSTANCES)
+    numbers = range(HELD_OUT, HELD_OUT + INSTANCES)
     policy, steps = policy_of(turn, env)
     costs, _ = final_costs(policy, env, numbers, numbers)
     return turn._asdict() | {"steps": steps, "costs": costs.tolist()}
@@ -252,24 +306,36 @@ def row_of_turn(turn: Turn) -> dict[str, Any]:
 def race_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the printed table, the highest mean first; intervals are of 95 %, a bootstrap of seeds and instances."""
     agents = dict.fromkeys(row["agent"] for row in rows)
-    costs = {agent: np.array([row["costs"] for row in rows if row["agent"] == agent]) for agent in agents}
-    robin, cells = costs["round robin"], []
+    costs = {
+        agent: np.array([row["costs"] for row in rows if row["agent"] == agent])
+        for agent in agents
+    }
+    robin = costs["round robin"]
+    cells = []
     for agent, own in sorted(costs.items(), key=lambda item: -float(item[1].mean())):
         steps = np.mean([row["steps"] for row in rows if row["agent"] == agent])
         low, high = quantiles(drawn_means(robin) - drawn_means(own))
         gain = f"{robin.mean() - own.mean():.2f} ({low:.2f} to {high:.2f})"
         cells.append([agent, f"{steps:,.0f}", str(len(own)), f"{own.mean():.2f}", gain])
-    yield from markdown(["policy", "trained steps", "seeds", "ln(1 + cost)", "below round robin"], cells)
+    yield from markdown(
+        ["policy", "trained steps", "seeds", "ln(1 + cost)", "below round robin"], cells
+    )
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
+@click.option(
+    "--rows",
+    metavar="FILE",
+    help="A file for a row a line: the same command continues there.",
+)
 @WORKERS
 def main(rows: str | None, workers: int | None) -> None:
     check_learners()
     turns = [Turn(agent, 0) for agent in REFERENCES]
     turns += [Turn(agent, seed) for agent in LEARNERS for seed in range(SEEDS)]
-    done = measured({turn: partial(row_of_turn, turn) for turn in turns}, rows, keyed(Turn), workers)
+    done = measured(
+        {turn: partial(row_of_turn, turn) for turn in turns}, rows, keyed(Turn), workers
+    )
     for line in race_lines([*done.values()]):
         click.echo(line)
 

@@ -25,7 +25,8 @@ from posefit.sweep.ledger import Ledger
 from table import head_of, markdown, number, percent
 
 Row = Mapping[str, Any]
-Condition = tuple[str, int, bool, bool]  # motion, cameras, whether the first yaw is known, whether masks are clean
+# motion, cameras, whether the first yaw is known, whether masks are clean
+Condition = tuple[str, int, bool, bool]
 
 
 class Sentence(NamedTuple):
@@ -38,20 +39,65 @@ class Sentence(NamedTuple):
     rows: Callable[[Condition], bool] = lambda _: True
 
 
-WORSE, SLOWER = "mpjpe_mm", "cpu_seconds_per_frame"
+WORSE = "mpjpe_mm"
+SLOWER = "cpu_seconds_per_frame"
 SENTENCES = (
-    Sentence("a learned manifold has no way back in closed form", "sapso@isomap", "sapso@pca", WORSE),
-    Sentence("a GPLVM is not continuous: poses between come out badly", "sapso@gplvm", "sapso@pca", WORSE),
+    Sentence(
+        "a learned manifold has no way back in closed form",
+        "sapso@isomap",
+        "sapso@pca",
+        WORSE,
+    ),
+    Sentence(
+        "a GPLVM is not continuous: poses between come out badly",
+        "sapso@gplvm",
+        "sapso@pca",
+        WORSE,
+    ),
     Sentence("gradients converge fast", "sapso@pca", "gradient", SLOWER),
-    Sentence("gradients do not assure the global optimum", "gradient", "sapso@pca", "cost"),
+    Sentence(
+        "gradients do not assure the global optimum", "gradient", "sapso@pca", "cost"
+    ),
     Sentence("local search in layers is slow", "local@pca", "sapso@pca", SLOWER),
-    Sentence("local search in layers ends in local optima", "local@pca", "sapso@pca", "cost"),
-    Sentence("smoothing makes a particle filter more accurate", "filtered", "smoothing", WORSE),
-    Sentence("particle filters need too many particles in many dimensions", "particle@full", "sapso@full", "cost"),
-    Sentence("a swarm moves a filter's particles to better ones", "particle@pca", "psopf@pca", "cost"),
-    Sentence("hierarchical swarms in all angles converge slowly", "hpso@full", "sapso@full", "cost"),
-    Sentence("hierarchical swarms in all angles do not assure quality", "hpso@full", "sapso@pca", WORSE),
-    Sentence("generative methods are more accurate than regression", "regression", "sapso@pca", WORSE),
+    Sentence(
+        "local search in layers ends in local optima", "local@pca", "sapso@pca", "cost"
+    ),
+    Sentence(
+        "smoothing makes a particle filter more accurate",
+        "filtered",
+        "smoothing",
+        WORSE,
+    ),
+    Sentence(
+        "particle filters need too many particles in many dimensions",
+        "particle@full",
+        "sapso@full",
+        "cost",
+    ),
+    Sentence(
+        "a swarm moves a filter's particles to better ones",
+        "particle@pca",
+        "psopf@pca",
+        "cost",
+    ),
+    Sentence(
+        "hierarchical swarms in all angles converge slowly",
+        "hpso@full",
+        "sapso@full",
+        "cost",
+    ),
+    Sentence(
+        "hierarchical swarms in all angles do not assure quality",
+        "hpso@full",
+        "sapso@pca",
+        WORSE,
+    ),
+    Sentence(
+        "generative methods are more accurate than regression",
+        "regression",
+        "sapso@pca",
+        WORSE,
+    ),
 )
 
 
@@ -61,9 +107,15 @@ def name_of(row: Row) -> str:
 
 def condition_of(row: Row) -> Condition:
     """Return the motion, the cameras, and whether yaw and masks are undisturbed."""
-    spec, view = row["spec"], row["spec"].get("view_degrees", 0)
+    spec = row["spec"]
+    view = row["spec"].get("view_degrees", 0)
     cameras = len(view) if isinstance(view, list | tuple) else 1
-    return str(spec["motion"]), cameras, not spec.get("yaw_off_degrees"), not spec.get("corruption")
+    return (
+        str(spec["motion"]),
+        cameras,
+        not spec.get("yaw_off_degrees"),
+        not spec.get("corruption"),
+    )
 
 
 def methods(rows: Sequence[Row]) -> Iterator[str]:
@@ -76,7 +128,9 @@ def methods(rows: Sequence[Row]) -> Iterator[str]:
     cells = []
     for name in dict.fromkeys(map(name_of, rows)):
         mine = [row for row in rows if name_of(row) == name]
-        split: dict[tuple[bool, bool], list[float]] = {part: [] for part in parts.values()}
+        split: dict[tuple[bool, bool], list[float]] = {
+            part: [] for part in parts.values()
+        }
         for row in mine:
             _, cameras, _, clean = condition_of(row)
             split[cameras == 1, clean].append(row[WORSE])
@@ -85,7 +139,10 @@ def methods(rows: Sequence[Row]) -> Iterator[str]:
             *(np.median(some) if some else None for some in split.values()),
         ]
         lost = percent(float(np.mean([row["lost_rate"] for row in mine])))
-        figures = [number(WORSE, None if median is None else float(median)) for median in medians]
+        figures = [
+            number(WORSE, None if median is None else float(median))
+            for median in medians
+        ]
         cpu = number(SLOWER, float(np.median([row[SLOWER] for row in mine])))
         cells.append([f"`{name}`", figures[0], lost, *figures[1:], cpu])
     cells.sort(key=lambda cell: float(cell[1].replace(",", "")))
@@ -93,12 +150,16 @@ def methods(rows: Sequence[Row]) -> Iterator[str]:
     yield from markdown(heads, cells)
 
 
-def paired(rows: Sequence[Row], method: str, reference: str, figure: str) -> dict[tuple[Condition, int], float]:
+def paired(
+    rows: Sequence[Row], method: str, reference: str, figure: str
+) -> dict[tuple[Condition, int], float]:
     """Return the differences of a figure, by condition and seed, between the cells of two methods."""
     values: dict[str, dict[tuple[Condition, int], float]] = {method: {}, reference: {}}
     for row in rows:
         if name_of(row) in values:
-            values[name_of(row)][condition_of(row), row["spec"].get("seed", 0)] = float(row[figure])
+            values[name_of(row)][condition_of(row), row["spec"].get("seed", 0)] = float(
+                row[figure]
+            )
     shared = [cell for cell in values[method] if cell in values[reference]]
     return {cell: values[method][cell] - values[reference][cell] for cell in shared}
 
@@ -106,24 +167,44 @@ def paired(rows: Sequence[Row], method: str, reference: str, figure: str) -> dic
 def winners(rows: Sequence[Row]) -> Iterator[str]:
     """Yield the table of who wins where, by the mean MPJPE; "or" names the next one where it is not surely behind."""
     lines: dict[tuple[str, int], list[str]] = {}
-    for condition in sorted(set(map(condition_of, rows)), key=lambda at: (at[0], at[1], not at[2], not at[3])):
+    for condition in sorted(
+        set(map(condition_of, rows)),
+        key=lambda at: (at[0], at[1], not at[2], not at[3]),
+    ):
         mine = [row for row in rows if condition_of(row) == condition]
-        means = {name: np.mean([row[WORSE] for row in mine if name_of(row) == name]) for name in map(name_of, mine)}
+        means = {
+            name: np.mean([row[WORSE] for row in mine if name_of(row) == name])
+            for name in map(name_of, mine)
+        }
         first, *others = sorted(means, key=lambda name: means[name])
         cell = f"`{first}` {number(WORSE, float(means[first]))}"
         pairs = paired(mine, others[0], first, WORSE) if others else {}
-        if pairs and difference(list(pairs.values()), [""] * len(pairs), list(pairs))[2] != "holds":
+        if (
+            pairs
+            and difference(list(pairs.values()), [""] * len(pairs), list(pairs))[2]
+            != "holds"
+        ):
             cell += f" or `{others[0]}`"
         lines.setdefault(condition[:2], []).append(cell)
     heads = [
         "motion",
         "cameras",
-        *(f"{yaw} yaw, {masks}" for yaw in ("known", "unknown") for masks in ("clean", "damaged")),
+        *(
+            f"{yaw} yaw, {masks}"
+            for yaw in ("known", "unknown")
+            for masks in ("clean", "damaged")
+        ),
     ]
-    yield from markdown(heads, [[motion, str(count), *cells] for (motion, count), cells in lines.items()], words=6)
+    yield from markdown(
+        heads,
+        [[motion, str(count), *cells] for (motion, count), cells in lines.items()],
+        words=6,
+    )
 
 
-def difference(values: Sequence[float], strata: Sequence[object], clusters: Sequence[object]) -> tuple[str, str, str]:
+def difference(
+    values: Sequence[float], strata: Sequence[object], clusters: Sequence[object]
+) -> tuple[str, str, str]:
     """Return a mean, its interval and the verdict on a mean above 0, in words; open where there is no interval."""
     mean = mean_interval(values, list(map(str, strata)), list(map(str, clusters)))
     if not np.isfinite(mean.low):
@@ -140,8 +221,12 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
         cell = "open"
         if pairs:
             strata = [condition[0] for condition, _ in pairs]
-            values = [MEASURES[sentence.figure].factor * value for value in pairs.values()]
-            mean, interval, verdict = difference(values, strata, [condition for condition, _ in pairs])
+            values = [
+                MEASURES[sentence.figure].factor * value for value in pairs.values()
+            ]
+            mean, interval, verdict = difference(
+                values, strata, [condition for condition, _ in pairs]
+            )
             cell = f"**{verdict}** {mean} ({interval})"
         lines.append([sentence.says, what, str(len(pairs)), cell])
     heads = ["the paper says", "compared, above 0 if so", "n", "verdict"]
@@ -154,12 +239,23 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
 def main(ledger: Path, out: Path) -> None:
     rows = list(Ledger(ledger).rows())
     if not rows:
-        raise InputError(f"{ledger}: expected finished cells of docs/studies/related.toml, got none")
+        raise InputError(
+            f"{ledger}: expected finished cells of docs/studies/related.toml, got none"
+        )
     out.mkdir(parents=True, exist_ok=True)
-    for name, table in (("methods", methods), ("winners", winners), ("sentences", verdicts)):
+    for name, table in (
+        ("methods", methods),
+        ("winners", winners),
+        ("sentences", verdicts),
+    ):
         (out / f"{name}.md").write_text("\n".join(table(rows)) + "\n", encoding="utf-8")
-    conditions, seeds = (len(set(map(of, rows))) for of in (condition_of, lambda row: row["spec"]["seed"]))
-    click.echo(f"{out}: {len(rows):,} tracks, {conditions} conditions, {seeds} seeds, {Ledger(ledger).version}")
+    conditions, seeds = (
+        len(set(map(of, rows)))
+        for of in (condition_of, lambda row: row["spec"]["seed"])
+    )
+    click.echo(
+        f"{out}: {len(rows):,} tracks, {conditions} conditions, {seeds} seeds, {Ledger(ledger).version}"
+    )
 
 
 if __name__ == "__main__":

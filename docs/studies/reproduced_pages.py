@@ -25,10 +25,14 @@ def filled(text: str, name: str, folder: Path) -> str:
     def table(match: re.Match[str]) -> str:
         path = folder / f"{match[1]}.md"
         if not path.is_file():
-            raise InputError(f"{path}: expected a table of posefit reproduce or a study, got none")
+            raise InputError(
+                f"{path}: expected a table of posefit reproduce or a study, got none"
+            )
         return f"<!-- {name}: {match[1]} -->\n\n{path.read_text('utf-8').strip()}\n\n<!-- end -->"
 
-    return re.sub(rf"<!-- {name}: ([\w-]+) -->.*?<!-- end -->", table, text, flags=re.DOTALL)
+    return re.sub(
+        rf"<!-- {name}: ([\w-]+) -->.*?<!-- end -->", table, text, flags=re.DOTALL
+    )
 
 
 @click.command(cls=Command)
@@ -39,8 +43,12 @@ def main(folders: tuple[str, ...]) -> None:
         text = page.read_text("utf-8")
         for name, _, out in (item.partition("=") for item in folders):
             text = filled(text, name, Path(out))
-            for picture in sorted(set(re.findall(rf"\(\.\./pictures/{name}-([\w.-]+)\)", text))):
-                shutil.copyfile(Path(out) / picture, DOCS / "pictures" / f"{name}-{picture}")
+            for picture in sorted(
+                set(re.findall(rf"\(\.\./pictures/{name}-([\w.-]+)\)", text))
+            ):
+                shutil.copyfile(
+                    Path(out) / picture, DOCS / "pictures" / f"{name}-{picture}"
+                )
         page.write_text(text, encoding="utf-8")
 
 

@@ -12,8 +12,10 @@ from posefit.fitting.box import draw_population
 from posefit_reproduce.bench.kernel import bench_problem, fastest
 
 POSES = 400
-WIDTHS, VIEWS = (80, 160, 320, 640, 1280), (1, 2, 4, 8)
-COMPONENTS, POPULATIONS = (3, 6, 12, 24, 48), (1, 4, 10, 40, 400)
+WIDTHS = (80, 160, 320, 640, 1280)
+VIEWS = (1, 2, 4, 8)
+COMPONENTS = (3, 6, 12, 24, 48)
+POPULATIONS = (1, 4, 10, 40, 400)
 
 
 @click.command()
@@ -29,12 +31,19 @@ def main() -> None:
     for name, problems in curves.items():
         counts = {x: x if name == "population" else POSES for x in problems}
         jobs = {
-            str(x): partial(own.evaluate, draw_population(own.space, np.random.default_rng(0), counts[x]))
+            str(x): partial(
+                own.evaluate,
+                draw_population(own.space, np.random.default_rng(0), counts[x]),
+            )
             for x, own in problems.items()
         }
         took = fastest(jobs)
         costs = {x: 1e6 * took[str(x)] / counts[x] for x in problems}
-        click.echo(f"| {name} | " + " | ".join(f"{x}: {cost:.3g}" for x, cost in costs.items()) + " |")
+        click.echo(
+            f"| {name} | "
+            + " | ".join(f"{x}: {cost:.3g}" for x, cost in costs.items())
+            + " |"
+        )
 
 
 if __name__ == "__main__":

@@ -28,7 +28,8 @@ LIMBS = {"thigh": ("lfemur",), "forearm": ("lradius", "lwrist")}
 def seed_row(film: str, how: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """Return the figures of a film tracked with a seed, and its joints in millimetres."""
     result = track(film, seed=seed, progress=QUIET, **how)
-    usable, skeleton = result.table["usable"] > 0.0, result.motion.skeleton
+    usable = result.table["usable"] > 0.0
+    skeleton = result.motion.skeleton
     lengths = dict(zip(BONES, skeleton.lengths, strict=True))
     return {
         "seed": seed,
@@ -36,20 +37,33 @@ def seed_row(film: str, how: Mapping[str, Any], seed: int) -> dict[str, Any]:
         "unknown": float((result.table["unknown_sides"][usable] == 1.0).mean()),
         "iou": result.measures.iou,
         "grade": None if result.trust is None else result.trust.grade,
-        **{f"{name}_mm": 1e3 * sum(lengths[bone] for bone in bones) for name, bones in LIMBS.items()},
+        **{
+            f"{name}_mm": 1e3 * sum(lengths[bone] for bone in bones)
+            for name, bones in LIMBS.items()
+        },
         "joints_mm": (1e3 * result.motion.joints).round().astype(int).tolist(),
     }
 
 
 def median_distance(tracks: Sequence[Array]) -> float:
     """Return the median distance of joints (T, 27, 3) between two tracks, over all pairs, frames and joints."""
-    distances = [np.linalg.norm(first - second, axis=2) for first, second in combinations(tracks, 2)]
+    distances = [
+        np.linalg.norm(first - second, axis=2)
+        for first, second in combinations(tracks, 2)
+    ]
     return float(np.median(distances)) if distances else 0.0
 
 
 def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the table of all seeds, and how far their joints are apart."""
-    heads = ["seed", "lost %", "unknown %", "IoU", "verdict", *(f"{name} mm" for name in LIMBS)]
+    heads = [
+        "seed",
+        "lost %",
+        "unknown %",
+        "IoU",
+        "verdict",
+        *(f"{name} mm" for name in LIMBS),
+    ]
     cells = [
         [
             str(row["seed"]),
@@ -61,14 +75,21 @@ def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     ]
     yield from markdown(heads, cells, 1)
     tracks = [np.array(row["joints_mm"]) for row in rows]
-    apart, about_root = median_distance(tracks), median_distance([joints - joints[:, :1] for joints in tracks])
+    apart = median_distance(tracks)
+    about_root = median_distance([joints - joints[:, :1] for joints in tracks])
     yield f"joints of two seeds are {apart:.0f} mm apart, median; about the root {about_root:.0f}"
 
 
 @click.command(cls=Command, help=__doc__)
 @click.argument("film")
-@click.option("--seeds", type=click.IntRange(1), default=4, show_default=True, help="From 0 on.")
-@click.option("--rows", metavar="FILE", help="Of a row a line as they come; what it holds is not measured again.")
+@click.option(
+    "--seeds", type=click.IntRange(1), default=4, show_default=True, help="From 0 on."
+)
+@click.option(
+    "--rows",
+    metavar="FILE",
+    help="Of a row a line as they come; what it holds is not measured again.",
+)
 @WORKERS
 @options((FRAMES, *track_flags("height"), *EXTRACTION))
 def main(
@@ -80,9 +101,15 @@ def main(
     height: float | None,
     **options: Any,
 ) -> None:
-    how = {"frames": frames, "height": height, "extraction": extraction_of(options, "video")}
+    how = {
+        "frames": frames,
+        "height": height,
+        "extraction": extraction_of(options, "video"),
+    }
     jobs = {seed: partial(seed_row, film, how, seed) for seed in range(seeds)}
-    for line in seeds_lines([*measured(jobs, rows, lambda row: int(row["seed"]), workers).values()]):
+    for line in seeds_lines(
+        [*measured(jobs, rows, lambda row: int(row["seed"]), workers).values()]
+    ):
         click.echo(line)
 
 

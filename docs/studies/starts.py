@@ -41,11 +41,16 @@ from posefit.uncertainty.modes import other_modes
 from posefit_exemplars.lookup import Lookup
 from table import markdown, percent
 
-SIZE, FOCAL = (320, 240), 260.0
+SIZE = (320, 240)
+FOCAL = 260.0
 MODES = (1, 2, 3, 8)
 MARKS = (40, 200, 2440)  # evaluations
-RIGHT_DEGREES, WRONG_DEGREES = 45.0, 60.0
-LOOKED, SEARCHED, FITTED = 4, 3, 2  # images of a clip in each study
+RIGHT_DEGREES = 45.0
+WRONG_DEGREES = 60.0
+# images of a clip in each study
+LOOKED = 4
+SEARCHED = 3
+FITTED = 2
 FRAMES = 20  # of a clip that is tracked
 
 
@@ -80,14 +85,24 @@ def images(group: str, each: int) -> Iterator[Image]:
             pose = motion.poses[rng.integers(len(motion))].copy()
             pose[0] = rng.uniform(-np.pi, np.pi)
             away = np.array([rng.uniform(-0.8, 0.8), 0.0, rng.uniform(3.5, 5.0)])
-            camera = posefit.Camera(*SIZE, np.full(2, FOCAL), np.array(SIZE) / 2.0, np.diag([1.0, -1.0, -1.0]), away)
+            camera = posefit.Camera(
+                *SIZE,
+                np.full(2, FOCAL),
+                np.array(SIZE) / 2.0,
+                np.diag([1.0, -1.0, -1.0]),
+                away,
+            )
             place = -motion.skeleton.joints(pose[None])[0].mean(axis=0)
-            yield Image(clip, camera, body, pose, posefit.project(body, camera, pose, place))
+            yield Image(
+                clip, camera, body, pose, posefit.project(body, camera, pose, place)
+            )
 
 
 def training_of(clip: Clip, only: str = "") -> list[Motion]:
     """Return the motions of all other people, or those of one group."""
-    names = [each.name for each in GROUPS.get(only, ()) if each.subject != clip.subject] or [clip.library]
+    names = [
+        each.name for each in GROUPS.get(only, ()) if each.subject != clip.subject
+    ] or [clip.library]
     return training_motions(training_clips(names), 30.0)
 
 
@@ -96,7 +111,13 @@ def task_of(image: Image, training: list[Motion]) -> Task:
     average = posefit.Body.of(average_skeleton())
     share = image.body.stature / average.stature
     return Task(
-        average.scaled(share, share), [image.camera], MARKS[-1], None, np.zeros(3), "aligned", training=training
+        average.scaled(share, share),
+        [image.camera],
+        MARKS[-1],
+        None,
+        np.zeros(3),
+        "aligned",
+        training=training,
     )
 
 
@@ -117,13 +138,27 @@ def look() -> None:
         right = []
         for image in images(group, LOOKED):
             task = task_of(image, training_of(image.clip))
-            posterior = Lookup(task).posterior(Observation([posefit.Silhouette.of(image.mask)]))
+            posterior = Lookup(task).posterior(
+                Observation([posefit.Silhouette.of(image.mask)])
+            )
             if posterior is not None:
                 modes = modes_apart(task.body.skeleton, posterior)
-                turned = image.turned_degrees(np.array([mode.poses[0] for _, mode in modes]))
+                turned = image.turned_degrees(
+                    np.array([mode.poses[0] for _, mode in modes])
+                )
                 right.append([turned[:count].min() <= RIGHT_DEGREES for count in MODES])
-        cells.append([group, str(len(right)), *(percent(share, 0) for share in np.mean(right, axis=0))])
-    printed(["faces within 45 degrees, %", "images", *(f"of {count}" for count in MODES)], cells, 1)
+        cells.append(
+            [
+                group,
+                str(len(right)),
+                *(percent(share, 0) for share in np.mean(right, axis=0)),
+            ]
+        )
+    printed(
+        ["faces within 45 degrees, %", "images", *(f"of {count}" for count in MODES)],
+        cells,
+        1,
+    )
 
 
 @main.command()
@@ -134,24 +169,43 @@ def evaluations() -> None:
     for seed, image in enumerate(images(WALKS, SEARCHED)):
         task = task_of(image, training_of(image.clip, WALKS))
         if image.clip.subject not in priors:
-            priors[image.clip.subject] = posefit.prior("pca")().fit(task.angles, task.body.skeleton)
+            priors[image.clip.subject] = posefit.prior("pca")().fit(
+                task.angles, task.body.skeleton
+            )
         reach = np.radians([180.0, 15.0, 15.0])
-        space = SearchSpace(priors[image.clip.subject], np.zeros(3), reach, np.zeros(3), "aligned")
+        space = SearchSpace(
+            priors[image.clip.subject], np.zeros(3), reach, np.zeros(3), "aligned"
+        )
         observation = Observation([posefit.Silhouette.of(image.mask)])
         posterior = Lookup(task).posterior(observation)
         spaces = {"blind": space, "from the start": space}
         if posterior is not None:
-            problem = posefit.PoseProblem(task.body, task.cameras, observation.silhouettes, space)
+            problem = posefit.PoseProblem(
+                task.body, task.cameras, observation.silhouettes, space
+            )
             start = start_in(problem, modes_apart(task.body.skeleton, posterior))
             spaces["from the start"] = replace(space, start=start)
         for optimiser, (kind, searched) in product(("sapso", "cma"), spaces.items()):
-            problem = posefit.PoseProblem(task.body, task.cameras, observation.silhouettes, searched)
+            problem = posefit.PoseProblem(
+                task.body, task.cameras, observation.silhouettes, searched
+            )
             made = posefit.optimiser(optimiser)(searched, np.random.default_rng(seed))
-            best = posefit.minimise(problem.evaluate, made, MARKS[-1], budget_known=True)
+            best = posefit.minimise(
+                problem.evaluate, made, MARKS[-1], budget_known=True
+            )
             rows = np.searchsorted(best.trace[:, 0], MARKS, "right") - 1
-            costs.setdefault(f"{optimiser}, {kind}", []).append(best.trace[np.maximum(rows, 0), 1])
-    cells = [[name, *(f"{cost:.1f}" for cost in np.mean(rows, axis=0))] for name, rows in costs.items()]
-    printed(["walks, mean cost after evaluations", *(f"{mark:,}" for mark in MARKS)], cells, 1)
+            costs.setdefault(f"{optimiser}, {kind}", []).append(
+                best.trace[np.maximum(rows, 0), 1]
+            )
+    cells = [
+        [name, *(f"{cost:.1f}" for cost in np.mean(rows, axis=0))]
+        for name, rows in costs.items()
+    ]
+    printed(
+        ["walks, mean cost after evaluations", *(f"{mark:,}" for mark in MARKS)],
+        cells,
+        1,
+    )
 
 
 # what is fitted, by which method, and the groups whose clips, of other people, a prior learns from
@@ -169,9 +223,15 @@ def single_images() -> None:
     """Print the errors of single images, and those of the best of the poses shown."""
     cells = []
     for group, method, learned in IMAGES:
-        off, turned = [], []
+        off = []
+        turned = []
         for image in images(group, FITTED):
-            others = [clip.name for name in learned for clip in GROUPS[name] if clip.subject != image.clip.subject]
+            others = [
+                clip.name
+                for name in learned
+                for clip in GROUPS[name]
+                if clip.subject != image.clip.subject
+            ]
             fit = posefit.fit(
                 image.mask,
                 method=method,
@@ -183,16 +243,27 @@ def single_images() -> None:
                 train=others if "@" in method else [image.clip.library],
             )
             skeleton = fit.track.motion.skeleton
-            shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[:ALTERNATIVES]
+            shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[
+                :ALTERNATIVES
+            ]
             poses = np.array([fit.pose, *(mode.pose for mode in shown)])
-            errors, angles = image.errors_mm(skeleton.joints(poses)), image.turned_degrees(poses)
+            errors = image.errors_mm(skeleton.joints(poses))
+            angles = image.turned_degrees(poses)
             off.append((errors[0], errors.min()))
             turned.append((angles[0], angles.min()))
         figures = [f"{mean:.0f}" for mean in np.mean(off, axis=0)]
         for values, limit in ((off, LOST_MM), (turned, WRONG_DEGREES)):
-            figures += [percent(share, 0) for share in (np.array(values) > limit).mean(axis=0)]
-        cells.append([group, method, " and ".join(learned) or "default", str(len(off)), *figures])
-    heads = [f"{head}{best}" for head in ("mm", "beyond 150 mm, %", "facing wrong, %") for best in ("", "; best")]
+            figures += [
+                percent(share, 0) for share in (np.array(values) > limit).mean(axis=0)
+            ]
+        cells.append(
+            [group, method, " and ".join(learned) or "default", str(len(off)), *figures]
+        )
+    heads = [
+        f"{head}{best}"
+        for head in ("mm", "beyond 150 mm, %", "facing wrong, %")
+        for best in ("", "; best")
+    ]
     printed(["images of", "method", "learns from", "images", *heads], cells, 3)
 
 
@@ -201,9 +272,15 @@ def tracks() -> None:
     """Print how many tracks of walks and turns go wrong whose first yaw and place are unknown."""
     errors = []
     for clip, view in product((*GROUPS[WALKS], *GROUPS["turns"]), SIDES):
-        cell = cell_of(cell_fields(clip, view, FRAMES, translation="aligned", yaw_off_degrees=ALL_AROUND))
+        cell = cell_of(
+            cell_fields(
+                clip, view, FRAMES, translation="aligned", yaw_off_degrees=ALL_AROUND
+            )
+        )
         errors.append(float(track_of(cell, cell_scene(cell)).table["mpjpe_mm"].mean()))
-    click.echo(f"{sum(error > LOST_MM for error in errors)} of {len(errors)} tracks go wrong")
+    click.echo(
+        f"{sum(error > LOST_MM for error in errors)} of {len(errors)} tracks go wrong"
+    )
 
 
 if __name__ == "__main__":

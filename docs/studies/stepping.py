@@ -20,21 +20,33 @@ from table import markdown
 
 NAME = "posefit_envs:posefit/FitImage-v0"
 COUNTS = (1, 64, 1024)
-CALLS, STEPS, TURNS = 18, 16, 5  # of each environment in a turn: two episodes, each with a reset; turns of each kind
+# of each environment in a turn: two episodes, each with a reset; turns of each kind
+CALLS = 18
+STEPS = 16
+TURNS = 5
 
 
 def steps_per_second(kind: str, count: int) -> Iterator[float]:
     """Yield the steps in a second of vector environments, turn by turn, resets included."""
-    env: Any = gym.make_vec(NAME, count, None if kind == "native" else kind, errors=False)
+    env: Any = gym.make_vec(
+        NAME, count, None if kind == "native" else kind, errors=False
+    )
     env.reset(seed=0)
     processes = [psutil.Process(worker.pid) for worker in getattr(env, "processes", [])]
-    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (CALLS, *env.action_space.shape)).astype(np.float32)
+    actions = (
+        np.random.default_rng(0)
+        .uniform(-1.0, 1.0, (CALLS, *env.action_space.shape))
+        .astype(np.float32)
+    )
 
     def seconds() -> float:
-        return process_time() + sum(sum(process.cpu_times()[:2]) for process in processes)
+        return process_time() + sum(
+            sum(process.cpu_times()[:2]) for process in processes
+        )
 
     while True:
-        start, repeats = seconds(), max(1, 256 // count)
+        start = seconds()
+        repeats = max(1, 256 // count)
         for _ in range(repeats):
             for action in actions:
                 env.step(action)
@@ -50,9 +62,16 @@ def main() -> None:
     for count in COUNTS:
         names = ("native", "sync", "async") if count == 1 else ("native", "sync")
         kinds = {name: steps_per_second(name, count) for name in names}
-        turns = [{kind: next(rates) for kind, rates in kinds.items()} for _ in range(TURNS)]
+        turns = [
+            {kind: next(rates) for kind, rates in kinds.items()} for _ in range(TURNS)
+        ]
         best = {kind: f"{max(turn[kind] for turn in turns):,.0f}" for kind in kinds}
-        lines.append([f"{count:,}", *(best.get(kind, "") for kind in ("native", "sync", "async"))])
+        lines.append(
+            [
+                f"{count:,}",
+                *(best.get(kind, "") for kind in ("native", "sync", "async")),
+            ]
+        )
     for line in markdown(["environments", "native", "Sync", "Async"], lines, 0):
         click.echo(line)
 

@@ -33,8 +33,17 @@ from posefit_reproduce.jobs import each
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
 SHARES = ("lost_rate", "swap_rate")
-WORKERS = click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; one a core by default.")
-LEDGER = click.option("--ledger", metavar="DIR", help="Folder of finished rows: the same command continues there.")
+WORKERS = click.option(
+    "--workers",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Processes; one a core by default.",
+)
+LEDGER = click.option(
+    "--ledger",
+    metavar="DIR",
+    help="Folder of finished rows: the same command continues there.",
+)
 bar = partial(progress, unit="run")
 
 
@@ -58,10 +67,15 @@ def earlier(path: str | None, key: Callable[[Row], K]) -> dict[K, Row]:
     """Return the rows of a file, each under its key; none where there is no file."""
     if path is None or not Path(path).exists():
         return {}
-    return {key(row): row for row in map(json.loads, Path(path).read_text("utf-8").splitlines())}
+    return {
+        key(row): row
+        for row in map(json.loads, Path(path).read_text("utf-8").splitlines())
+    }
 
 
-def kept(path: str | None, ended: Iterator[tuple[K, Row]], count: int) -> Iterator[tuple[K, Row]]:
+def kept(
+    path: str | None, ended: Iterator[tuple[K, Row]], count: int
+) -> Iterator[tuple[K, Row]]:
     """Yield rows under their keys as they come, each written to a file at once where one is named."""
     for key, row in bar(ended, count):
         if path is not None:
@@ -100,7 +114,9 @@ def number(name: str, value: float | None) -> str:
     return MEASURES[name].number(value)
 
 
-def markdown(heads: Sequence[str], cells: Sequence[Sequence[str]], words: int = 1) -> Iterator[str]:
+def markdown(
+    heads: Sequence[str], cells: Sequence[Sequence[str]], words: int = 1
+) -> Iterator[str]:
     """Yield the lines of a table whose first columns are words and whose others are numbers."""
     yield f"| {' | '.join(heads)} |"
     yield "|" + "---|" * words + "---:|" * (len(heads) - words)
@@ -123,25 +139,49 @@ def drawn_means(values: Array) -> Array:
     rng = np.random.default_rng(0)
     columns = rng.integers(values.shape[1], size=(RESAMPLES, values.shape[1]))
     seeds = rng.integers(len(values), size=(RESAMPLES, len(values)))
-    return np.array([values[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)])
+    return np.array(
+        [values[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)]
+    )
 
 
 def interval(values: Array, clusters: Sequence[object]) -> tuple[float, float]:
     """Return the 95 % interval of the median of values (n,), by a bootstrap over the clusters that they are of."""
     rng = np.random.default_rng(0)
-    groups = [values[[k for k, name in enumerate(clusters) if name == one]] for one in dict.fromkeys(clusters)]
+    groups = [
+        values[[k for k, name in enumerate(clusters) if name == one]]
+        for one in dict.fromkeys(clusters)
+    ]
     drawn = rng.integers(len(groups), size=(RESAMPLES, len(groups)))
-    return quantiles(np.array([np.median(np.concatenate([groups[k] for k in rows])) for rows in drawn]))
+    return quantiles(
+        np.array(
+            [np.median(np.concatenate([groups[k] for k in rows])) for rows in drawn]
+        )
+    )
 
 
-def grouped(found: Sequence[Row], labels: Callable[[Row], Sequence[str]], names: Sequence[str]) -> Iterator[str]:
+def grouped(
+    found: Sequence[Row], labels: Callable[[Row], Sequence[str]], names: Sequence[str]
+) -> Iterator[str]:
     """Yield the table of rows: a line for each of `labels`, in the order of the rows; `names` are the labels' heads."""
     groups: dict[tuple[str, ...], list[Row]] = {}
     for row in found:
         groups.setdefault(tuple(labels(row)), []).append(row)
-    heads = [*names, "tracks", head_of("error_degrees", "median"), "worst", head_of("mpjpe_mm", "median")]
-    heads += ["95 % interval, mm", *map(head_of, SHARES), "mean pose, degrees", "closest training pose, mm"]
-    yield from markdown(heads, [[*key, *_cells(mine)] for key, mine in groups.items()], len(names))
+    heads = [
+        *names,
+        "tracks",
+        head_of("error_degrees", "median"),
+        "worst",
+        head_of("mpjpe_mm", "median"),
+    ]
+    heads += [
+        "95 % interval, mm",
+        *map(head_of, SHARES),
+        "mean pose, degrees",
+        "closest training pose, mm",
+    ]
+    yield from markdown(
+        heads, [[*key, *_cells(mine)] for key, mine in groups.items()], len(names)
+    )
 
 
 def _cells(mine: Sequence[Row]) -> list[str]:
@@ -154,7 +194,9 @@ def _cells(mine: Sequence[Row]) -> list[str]:
         number("error_degrees", float(np.median(errors))),
         number("error_degrees", float(errors.max())),
         number("mpjpe_mm", float(np.median(distances))),
-        f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}" if len(set(motions)) > 1 else "",
+        f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}"
+        if len(set(motions)) > 1
+        else "",
         *(percent(float(np.mean([row[name] for row in mine]))) for name in SHARES),
         f"{np.median([row['baselines_degrees']['mean_pose'] for row in mine]):.1f}",
         f"{np.median([row['baselines_mm']['nearest'] for row in mine]):.0f}",
@@ -166,10 +208,13 @@ def field_text(row: Row, field: str) -> str:
     value = row["spec"].get(field)
     if isinstance(value, Mapping) and value:
         return ", ".join(
-            f"{name} {one:g}" if isinstance(one, float) else f"{name} {one}" for name, one in value.items()
+            f"{name} {one:g}" if isinstance(one, float) else f"{name} {one}"
+            for name, one in value.items()
         )
     if isinstance(value, list | tuple):
-        return ", ".join(Path(one).stem if isinstance(one, str) else f"{one:g}" for one in value)
+        return ", ".join(
+            Path(one).stem if isinstance(one, str) else f"{one:g}" for one in value
+        )
     if isinstance(value, str) and value:
         return Path(value).stem
     return f"{value:g}" if isinstance(value, int | float) else "-"
@@ -177,17 +222,36 @@ def field_text(row: Row, field: str) -> str:
 
 @click.command(cls=Command, help=__doc__)
 @click.argument("plan", type=click.Path(exists=True, dir_okay=False))
-@click.option("--by", multiple=True, metavar="FIELD", help="A field of cells to group by. Again for more.")
-@click.option("--clips", envvar="POSEFIT_CMU", metavar="DIR", help="Folder of CMU clips that the plan's paths are in.")
+@click.option(
+    "--by",
+    multiple=True,
+    metavar="FIELD",
+    help="A field of cells to group by. Again for more.",
+)
+@click.option(
+    "--clips",
+    envvar="POSEFIT_CMU",
+    metavar="DIR",
+    help="Folder of CMU clips that the plan's paths are in.",
+)
 @LEDGER
 @WORKERS
-def main(plan: str, by: tuple[str, ...], clips: str | None, ledger: str | None, workers: int | None) -> None:
-    path, folder = Path(plan).resolve(), ledger and str(Path(ledger).resolve())
+def main(
+    plan: str,
+    by: tuple[str, ...],
+    clips: str | None,
+    ledger: str | None,
+    workers: int | None,
+) -> None:
+    path = Path(plan).resolve()
+    folder = ledger and str(Path(ledger).resolve())
     if clips:
         os.chdir(clips)
     names = by or ("method", "motion")
     found = rows(Plan.read(path), workers, folder)
-    for line in grouped(found, lambda row: [field_text(row, name) for name in names], names):
+    for line in grouped(
+        found, lambda row: [field_text(row, name) for name in names], names
+    ):
         click.echo(line)
 
 

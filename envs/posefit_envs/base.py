@@ -21,7 +21,15 @@ from posefit.fitting.dlpack import as_numpy
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted, suggestion
-from posefit_envs.instance import ArgumentError, Episode, Instance, World, checked, instance_number, world_of
+from posefit_envs.instance import (
+    ArgumentError,
+    Episode,
+    Instance,
+    World,
+    checked,
+    instance_number,
+    world_of,
+)
 from posefit_envs.rendering import MODES, Picture, check_mode
 from posefit_envs.stage import Rows, Stage, values_of
 
@@ -31,7 +39,9 @@ Number = TypeVar("Number", float, Array)
 
 LOG_HIGHEST_COST = np.log1p(100.0)
 NOT_BEGUN = "reset must come before anything else"
-_ONE, _NONE, _FIRST = np.ones(1, dtype=bool), np.zeros(1, dtype=bool), np.zeros(1, dtype=np.int64)
+_ONE = np.ones(1, dtype=bool)
+_NONE = np.zeros(1, dtype=bool)
+_FIRST = np.zeros(1, dtype=np.int64)
 ENDED = "the episode has ended: reset before the next step"
 
 
@@ -79,14 +89,23 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     ) -> None:
         checked(whole, "num_envs", num_envs, 1)
         parameters = inspect.signature(type(self)).parameters.values()
-        self.world = world_of([each.name for each in parameters if each.kind is each.KEYWORD_ONLY], **arguments)
+        self.world = world_of(
+            [each.name for each in parameters if each.kind is each.KEYWORD_ONLY],
+            **arguments,
+        )
         checked(lambda: self.world.learned)  # names motions and priors that are unknown
         check_mode(render_mode)
         mode = getattr(autoreset_mode, "value", autoreset_mode)
-        checked(one_of, "autoreset_mode", mode, [AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value])
+        checked(
+            one_of,
+            "autoreset_mode",
+            mode,
+            [AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value],
+        )
         self._same_step = mode == AutoresetMode.SAME_STEP.value
         self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(mode)}
-        self.num_envs, self.render_mode = num_envs, render_mode
+        self.num_envs = num_envs
+        self.render_mode = render_mode
         self._stage = Stage(self.world, num_envs, checked(whole, "threads", threads, 1))
         self.single_action_space, self.single_observation_space = spaces(self.world)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -94,11 +113,13 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._shape = self.action_space.shape or ()
         self._warned = False  # that an action is clipped
         self._longest = np.inf if max_episode_steps is None else max_episode_steps
-        self._generators: dict[int, tuple[np.random.Generator, int]] = {}  # with their seeds
+        # with their seeds
+        self._generators: dict[int, tuple[np.random.Generator, int]] = {}
         self._ended = np.zeros(num_envs, dtype=bool)
         self._numbers = np.zeros(num_envs, dtype=np.int64)
         self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._episodes: dict[int, Episode | partial[Episode]] = {}  # those that nobody asked for are not made
+        # those that nobody asked for are not made
+        self._episodes: dict[int, Episode | partial[Episode]] = {}
         self._truths = np.empty((num_envs, ANGLES))
 
     @property  # type: ignore[misc]
@@ -127,10 +148,15 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
         if self.render_mode is None:
             return None
-        return tuple(self._render_row(i, episode) for i, episode in enumerate(self.episodes))
+        return tuple(
+            self._render_row(i, episode) for i, episode in enumerate(self.episodes)
+        )
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Any, Infos]:
         """Begin with an instance each; `options={"instance": 17}` chooses one for all, [17, 18, ...] one for each.
 
@@ -138,7 +164,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """
         check_options(options, ("instance", "reset_mask"))
         running = len(self._episodes) == self.num_envs
-        seeds, mask = _seeds(seed, self.num_envs), _reset_mask(options, self.num_envs, running)
+        seeds = _seeds(seed, self.num_envs)
+        mask = _reset_mask(options, self.num_envs, running)
         numbers = _chosen_instances(options, self.num_envs)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
@@ -159,12 +186,17 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         # the time limit of Gymnasium cuts an episode that ends by itself, too
         truncated = stepping & (outcome.truncated | (self._steps >= self._longest))
         ended = outcome.terminated | truncated
-        observations, going, begun_infos = outcome.observations, stepping, outcome.reset_infos
+        observations = outcome.observations
+        going = stepping
+        begun_infos = outcome.reset_infos
         final: Infos = {}
         if self._same_step and ended.any():
             going = ~ended
             for i in np.flatnonzero(ended).tolist():
-                last = {"final_obs": observations[i].copy(), "final_info": outcome.infos_of(i)}
+                last = {
+                    "final_obs": observations[i].copy(),
+                    "final_info": outcome.infos_of(i),
+                }
                 final = self._add_info(final, last, i)
                 self._begin(i, None)
             fresh, begun_infos = self._opened(ended)
@@ -176,7 +208,13 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             if going[i]:
                 infos = self._add_info(infos, row, i)
         rewards = np.where(stepping, outcome.rewards, 0.0)
-        return observations, rewards, outcome.terminated, truncated, self._with_started(infos, ~going)
+        return (
+            observations,
+            rewards,
+            outcome.terminated,
+            truncated,
+            self._with_started(infos, ~going),
+        )
 
     def _checked(self, actions: object, shape: tuple[int, ...]) -> Array:
         """Return actions of that shape as float64, which does not round them; what is not in [-1, 1] is clipped.
@@ -186,20 +224,28 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         try:
             values = np.array(as_numpy("actions", actions)[0], dtype=np.float64)
         except (TypeError, ValueError) as mistake:
-            raise error.InvalidAction(f"an action must be {shape[-1]} numbers, got {actions!r}") from mistake
+            raise error.InvalidAction(
+                f"an action must be {shape[-1]} numbers, got {actions!r}"
+            ) from mistake
         if values.shape != shape:
-            raise error.InvalidAction(f"actions must have shape {shape}, got {values.shape}")
+            raise error.InvalidAction(
+                f"actions must have shape {shape}, got {values.shape}"
+            )
         largest = np.abs(values).max(initial=0.0)
         if not np.isfinite(largest):
             raise error.InvalidAction("actions must be finite, got nan or infinity")
         if largest > 1.0 and not self._warned:
-            logger.warn(f"actions must lie in [-1, 1], got {largest:.6g} from 0; it is clipped, as all others will be")
+            logger.warn(
+                f"actions must lie in [-1, 1], got {largest:.6g} from 0; it is clipped, as all others will be"
+            )
             self._warned = True
         return np.clip(values, -1.0, 1.0, out=values) if largest > 1.0 else values
 
     def _begin(self, i: int, chosen: int | None) -> None:
         """Begin the next episode of environment i, with a chosen instance or another."""
-        number = self.world.next_instance(self._generator(i)) if chosen is None else chosen
+        number = (
+            self.world.next_instance(self._generator(i)) if chosen is None else chosen
+        )
         self._numbers[i], self._steps[i], self._ended[i] = number, 0, False
         self._begin_search(i, number)
 
@@ -224,11 +270,23 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._stage.set_values(i, values_of(episode.problem))
         self._truths[i] = episode.instance.truth.poses[episode.frame]
 
-    def _progress(self, best: Array, evaluations: NDArray[np.int64], poses: Array, **more: NDArray[Any]) -> Infos:
+    def _progress(
+        self,
+        best: Array,
+        evaluations: NDArray[np.int64],
+        poses: Array,
+        **more: NDArray[Any],
+    ) -> Infos:
         """Return the infos that all searches have, beside an environment's own; poses (n, 66) are compared."""
-        infos = more | {"best_cost": best.copy(), "evaluations": evaluations.copy(), "instance": self._numbers.copy()}
+        infos = more | {
+            "best_cost": best.copy(),
+            "evaluations": evaluations.copy(),
+            "instance": self._numbers.copy(),
+        }
         if self.world.errors:
-            infos["error_degrees"] = np.degrees(np.abs(wrapped(self._truths - poses))).mean(axis=1)
+            infos["error_degrees"] = np.degrees(
+                np.abs(wrapped(self._truths - poses))
+            ).mean(axis=1)
         return infos
 
     def _with_started(self, infos: Infos, started: Flags) -> Infos:
@@ -286,7 +344,9 @@ class SearchEnv(Env[Any, Any]):
         """The problem that proposals are evaluated on. Raises gymnasium.error.ResetNeeded before the first reset."""
         return self._vector.episodes[0].problem
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Infos]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, Infos]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         check_options(options, ("instance",))
         super().reset(seed=seed)
@@ -306,14 +366,20 @@ class SearchEnv(Env[Any, Any]):
         action = vector._checked(action, self._shape)
         vector._steps += 1
         outcome = vector._advance(action[None], _ONE, _FIRST)
-        terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
+        terminated = bool(outcome.terminated[0])
+        truncated = bool(outcome.truncated[0])
         vector._ended[0] = terminated or truncated
-        reward, infos = float(outcome.rewards[0]), outcome.infos_of(0)
+        reward = float(outcome.rewards[0])
+        infos = outcome.infos_of(0)
         return outcome.observations[0], reward, terminated, truncated, infos
 
     def render(self) -> Any:
         """Return the picture (height, width, 3) where `render_mode` is "rgb_array"."""
-        return None if self.render_mode is None else self._vector._render_row(0, self._vector.episodes[0])
+        return (
+            None
+            if self.render_mode is None
+            else self._vector._render_row(0, self._vector.episodes[0])
+        )
 
 
 def image_spaces(world: World) -> tuple[Box, Box]:
@@ -332,7 +398,10 @@ def mixed(mask: Flags, chosen: NDArray[Any], others: NDArray[Any]) -> NDArray[An
 
 def _infos_of(infos: Infos, i: int) -> Infos:
     """Return the infos of environment i, of infos (n, ...) by name."""
-    return {name: values[i].item() if values.ndim == 1 else values[i].copy() for name, values in infos.items()}
+    return {
+        name: values[i].item() if values.ndim == 1 else values[i].copy()
+        for name, values in infos.items()
+    }
 
 
 def check_options(options: Mapping[str, Any] | None, known: Sequence[str]) -> None:
@@ -340,7 +409,9 @@ def check_options(options: Mapping[str, Any] | None, known: Sequence[str]) -> No
     for name in options or {}:
         if name not in known:
             came = f"{quoted(name)}{suggestion(str(name), known)}"
-            raise ArgumentError(f"an option of reset must be one of {', '.join(known)}, got {came}")
+            raise ArgumentError(
+                f"an option of reset must be one of {', '.join(known)}, got {came}"
+            )
 
 
 def _masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
@@ -348,7 +419,8 @@ def _masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
 
     A name that `others` has too has those values where the mask is false.
     """
-    everywhere, somewhere = bool(mask.all()), bool(mask.any())
+    everywhere = bool(mask.all())
+    somewhere = bool(mask.any())
     infos: Infos = {}
     for name, value in values.items():
         if name not in others and not somewhere:
@@ -373,7 +445,9 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
     return list(seed)
 
 
-def _chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int | None]:
+def _chosen_instances(
+    options: Mapping[str, Any] | None, count: int
+) -> list[int | None]:
     """Return the instance that a reset's options choose for each environment, None where they choose none.
 
     One number is for all. Raises ArgumentError where the count is wrong, or there is no such instance.
@@ -384,7 +458,9 @@ def _chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int
     if not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
         return [instance_number(chosen)] * count
     if (isinstance(chosen, np.ndarray) and chosen.ndim != 1) or len(chosen) != count:
-        raise ArgumentError(f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}")
+        raise ArgumentError(
+            f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}"
+        )
     return [instance_number(number) for number in chosen]
 
 
@@ -398,7 +474,9 @@ def _reset_mask(options: Mapping[str, Any] | None, count: int, running: bool) ->
         return np.ones(count, dtype=bool)
     mask = np.asarray(options["reset_mask"])
     if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
-        raise error.Error(f"reset_mask must be {count} booleans, at least one of them true, got {mask!r}")
+        raise error.Error(
+            f"reset_mask must be {count} booleans, at least one of them true, got {mask!r}"
+        )
     if not running and not mask.all():
         raise error.ResetNeeded("the first reset must be of all environments")
     return mask

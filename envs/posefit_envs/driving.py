@@ -30,23 +30,35 @@ class EnvObjective:
     def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any]) -> None:
         bare = env.unwrapped
         if not isinstance(bare, FitImageEnv | FitImageVectorEnv):
-            raise error.Error(f"env must be posefit/FitImage-v0, got {type(bare).__name__}")
-        self._env, self._bare = env, bare
+            raise error.Error(
+                f"env must be posefit/FitImage-v0, got {type(bare).__name__}"
+            )
+        self._env = env
+        self._bare = bare
         self._vector = isinstance(env, VectorEnv)
         self._count = env.num_envs if isinstance(env, VectorEnv) else 1
         self._instances: Any = None
 
-    def begin(self, seed: int, instance: int | Sequence[int] | None) -> tuple[list[SearchSpace], list[int]]:
+    def begin(
+        self, seed: int, instance: int | Sequence[int] | None
+    ) -> tuple[list[SearchSpace], list[int]]:
         """Reset with an instance for all or each, or with random ones; return what each searches, and their numbers."""
-        self._instances = self._env.reset(seed=seed, options={"instance": instance})[1]["instance"]
+        self._instances = self._env.reset(seed=seed, options={"instance": instance})[1][
+            "instance"
+        ]
         bare = self._bare
         problems = [bare.problem] if isinstance(bare, FitImageEnv) else bare.problems
-        return [problem.space for problem in problems], np.atleast_1d(self._instances).tolist()
+        return [problem.space for problem in problems], np.atleast_1d(
+            self._instances
+        ).tolist()
 
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
-        _, _, terminated, truncated, infos = self._env.step(proposals if self._vector else proposals[0])
-        costs, done = np.array(infos["cost"]), np.logical_or(terminated, truncated)
+        _, _, terminated, truncated, infos = self._env.step(
+            proposals if self._vector else proposals[0]
+        )
+        costs = np.array(infos["cost"])
+        done = np.logical_or(terminated, truncated)
         if done.any():
             mask = {"reset_mask": done} if self._vector else {}
             self._env.reset(options={"instance": self._instances, **mask})
@@ -55,7 +67,9 @@ class EnvObjective:
     def costs(self, proposals: Array) -> Array:
         """Return the costs (m,) of any number of proposals (m, d), in environments of one instance."""
         filling = np.repeat(proposals[-1:], -len(proposals) % self._count, axis=0)
-        turns = np.concatenate([proposals, filling]).reshape(-1, self._count, proposals.shape[1])
+        turns = np.concatenate([proposals, filling]).reshape(
+            -1, self._count, proposals.shape[1]
+        )
         return np.concatenate([self.step(turn) for turn in turns])[: len(proposals)]
 
 
@@ -79,7 +93,9 @@ def drive(
     objective = EnvObjective(env)
     (space, *_), numbers = objective.begin(seed, instance)
     if len(set(numbers)) > 1:
-        raise error.Error(f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each")
+        raise error.Error(
+            f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each"
+        )
     if isinstance(optimiser, str):
         optimiser = _optimiser(space, optimiser, seed, evaluations, settings)
     try:
@@ -105,7 +121,9 @@ def drive_each(
     """
     objective = EnvObjective(env)
     searches = [
-        _stepwise(_optimiser(space, optimiser, seed + i, evaluations, settings), evaluations)
+        _stepwise(
+            _optimiser(space, optimiser, seed + i, evaluations, settings), evaluations
+        )
         for i, space in enumerate(objective.begin(seed, instances)[0])
     ]
     proposals = np.stack([next(search) for search in searches])
@@ -123,7 +141,12 @@ def drive_each(
 
 
 def track_reference(
-    env: Env[Any, Any], tracker: str = "exemplars", *, seed: int = 0, train: Sequence[str] = (), **settings: Any
+    env: Env[Any, Any],
+    tracker: str = "exemplars",
+    *,
+    seed: int = 0,
+    train: Sequence[str] = (),
+    **settings: Any,
 ) -> list[dict[str, Any]]:
     """Return the infos of what a tracker would commit in each frame of the current episode of `posefit/Track-v0`.
 
@@ -136,21 +159,31 @@ def track_reference(
     bare = env.unwrapped
     if not isinstance(bare, TrackEnv):
         raise error.Error(f"env must be posefit/Track-v0, got {type(bare).__name__}")
-    instance, world = bare.instance, bare.world
+    instance = bare.instance
+    world = bare.world
     motions = training_motions(
-        training_clips(train or world.training, followed=world.motion_of(instance.number)), instance.task.fps
+        training_clips(
+            train or world.training, followed=world.motion_of(instance.number)
+        ),
+        instance.task.fps,
     )
     task = replace(instance.task, training=motions)
-    tracker_settings = {f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()}
+    tracker_settings = {
+        f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()
+    }
     method = prepare(TrackOptions(method=tracker, settings=tracker_settings), task)
     frames = method.follow(task, instance.observations, np.random.default_rng(seed))
     return [
-        committed_infos(instance, k, frame.pose, frame.translation, frame.cost, errors=True)
+        committed_infos(
+            instance, k, frame.pose, frame.translation, frame.cost, errors=True
+        )
         for k, frame in enumerate(frames)
     ]
 
 
-def _stepwise(optimiser: Optimiser, evaluations: int) -> Generator[Array, float, Minimum]:
+def _stepwise(
+    optimiser: Optimiser, evaluations: int
+) -> Generator[Array, float, Minimum]:
     """Yield the proposals (d,) of an optimiser, each to be sent its cost, and return the minimum.
 
     Only whole populations are evaluated. Raises gymnasium.error.Error where the budget does not hold one.
@@ -165,12 +198,20 @@ def _stepwise(optimiser: Optimiser, evaluations: int) -> Generator[Array, float,
         populations.append((asked, costs))
         optimiser.tell(asked, costs)
     if not populations:
-        raise error.Error(f"evaluations must hold one population of {len(asked)}, got {evaluations}")
+        raise error.Error(
+            f"evaluations must hold one population of {len(asked)}, got {evaluations}"
+        )
     return minimum_of(populations)
 
 
-def _optimiser(space: SearchSpace, name: str, seed: int, evaluations: int, settings: dict[str, Any]) -> Optimiser:
+def _optimiser(
+    space: SearchSpace, name: str, seed: int, evaluations: int, settings: dict[str, Any]
+) -> Optimiser:
     offer = registry().offer("optimiser", name)
-    all_settings = planned(offer.factory, check(offer.name, offer.factory, settings), evaluations)
-    optimiser: Optimiser = offer.factory(space, np.random.default_rng(seed), **all_settings)
+    all_settings = planned(
+        offer.factory, check(offer.name, offer.factory, settings), evaluations
+    )
+    optimiser: Optimiser = offer.factory(
+        space, np.random.default_rng(seed), **all_settings
+    )
     return optimiser

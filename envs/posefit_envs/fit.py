@@ -7,7 +7,14 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
+from posefit_envs.base import (
+    Flags,
+    Infos,
+    Outcome,
+    SearchEnv,
+    SearchVectorEnv,
+    image_spaces,
+)
 from posefit_envs.instance import Episode, Image, checked, first_episode, is_held_out
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Evaluation, Rows, prepared
@@ -18,7 +25,13 @@ MAX_EVALUATIONS = 8
 class FitImageVectorEnv(SearchVectorEnv):
     """`num_envs` environments as FitImageEnv."""
 
-    def __init__(self, num_envs: int = 1, *, max_evaluations: int = MAX_EVALUATIONS, **arguments: Any) -> None:
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_evaluations: int = MAX_EVALUATIONS,
+        **arguments: Any,
+    ) -> None:
         checked(whole, "max_evaluations", max_evaluations, 1)
         super().__init__(num_envs, image_spaces, **arguments)
         self._budget = int(max_evaluations)
@@ -42,14 +55,25 @@ class FitImageVectorEnv(SearchVectorEnv):
         last = self._last = self._stage.evaluate(actions, rows)
         np.minimum(self._best, last.costs, out=self._best, where=stepping)
         truncated = stepping & (self._steps >= self._budget)
-        infos = self._progress(self._best, self._steps, last.poses, cost=last.costs, areas=last.areas)
+        infos = self._progress(
+            self._best, self._steps, last.poses, cost=last.costs, areas=last.areas
+        )
         common = {"instance": self._numbers}
-        return Outcome(last.pictures, -np.log1p(last.costs), np.zeros_like(truncated), infos, common, truncated)
+        return Outcome(
+            last.pictures,
+            -np.log1p(last.costs),
+            np.zeros_like(truncated),
+            infos,
+            common,
+            truncated,
+        )
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
         last = self._last
         if not self._steps[i] or last is None:
-            return render_frame(episode.problem, None, None, f"instance {episode.instance.number}")
+            return render_frame(
+                episode.problem, None, None, f"instance {episode.instance.number}"
+            )
         label = f"cost {last.costs[i]:.1f}, best {self._best[i]:.1f}, {self._steps[i]} evaluations"
         return render_frame(episode.problem, last.poses[i], last.translations[i], label)
 

@@ -13,7 +13,16 @@ import numpy as np
 from gymnasium import error, logger
 from numpy.typing import NDArray
 
-from posefit import Body, Camera, Motion, Observation, PoseProblem, SearchSpace, Silhouette, Task
+from posefit import (
+    Body,
+    Camera,
+    Motion,
+    Observation,
+    PoseProblem,
+    SearchSpace,
+    Silhouette,
+    Task,
+)
 from posefit.arrays import Array
 from posefit.fitting.check import between, finite_number, one_of, pair
 from posefit.fitting.prior import Prior
@@ -27,18 +36,26 @@ from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
 
-SPLITS = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out
+# instance numbers; those of the test split are held out
+SPLITS = {"train": (0, 10_000), "test": (10_000, 20_000)}
 YAWS = ("guessed", "unknown")
 RNG_STREAM = 2012  # part of the seed of noise, yaw, place and build of an instance
 FPS = 30.0
-YAW_DEGREES = 20.0  # largest difference between the middle of the searched yaw and the truth
-ANY_YAW_DEGREES = (180.0, *ROOT_RANGE_DEGREES[1:])  # how far the root is searched where the yaw is unknown
-MIDDLE_METRES = 0.25  # largest difference between the middle of the searched translation and the truth
-DISTANCE, HEIGHT = 3.5, 0.9  # metres from camera to person; of the camera above the ground
-BODY = 0xFF00 if sys.byteorder == "little" else 0x00FF  # the byte of a pixel's pair that shows the body
+# largest difference between the middle of the searched yaw and the truth
+YAW_DEGREES = 20.0
+# how far the root is searched where the yaw is unknown
+ANY_YAW_DEGREES = (180.0, *ROOT_RANGE_DEGREES[1:])
+# largest difference between the middle of the searched translation and the truth
+MIDDLE_METRES = 0.25
+# metres from camera to person; of the camera above the ground
+DISTANCE = 3.5
+HEIGHT = 0.9
+# the byte of a pixel's pair that shows the body
+BODY = 0xFF00 if sys.byteorder == "little" else 0x00FF
 OBSERVED = 0xFFFF ^ BODY
 
-Image = NDArray[np.uint8]  # (height, width, 2 views): observed, body, observed, body, ...
+# (height, width, 2 views): observed, body, observed, body, ...
+Image = NDArray[np.uint8]
 
 
 class ArgumentError(error.Error, ValueError):
@@ -74,9 +91,19 @@ class World:
         if self.train:
             return self.train
         if self.held_out_people:
-            return tuple(style for kind in self.motion for style in built_in.other_styles(kind)[:-1])
-        names = [motion if motion in built_in.names() else "walk" for motion in self.motion]
-        return tuple(dict.fromkeys(style for name in names for style in built_in.other_styles(name)))
+            return tuple(
+                style
+                for kind in self.motion
+                for style in built_in.other_styles(kind)[:-1]
+            )
+        names = [
+            motion if motion in built_in.names() else "walk" for motion in self.motion
+        ]
+        return tuple(
+            dict.fromkeys(
+                style for name in names for style in built_in.other_styles(name)
+            )
+        )
 
     @property
     def dimensions(self) -> int:
@@ -94,7 +121,11 @@ class World:
 
     def next_instance(self, generator: np.random.Generator) -> int:
         """Return the number of the next instance: the fixed one, or a random one of the split."""
-        return int(generator.integers(*SPLITS[self.split])) if self.instance is None else self.instance
+        return (
+            int(generator.integers(*SPLITS[self.split]))
+            if self.instance is None
+            else self.instance
+        )
 
 
 def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
@@ -118,12 +149,18 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     held_out_people = flag("held_out_people", world.held_out_people)
     what = "(width, height) of 36 to 4096 pixels"
     sides = checked(pair, "size", world.size, what)
-    if not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
+    if not all(
+        isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides
+    ):
         raise ArgumentError(f"size must be {what}, got {quoted(world.size)}")
     mismatch = checked(finite_number, "mismatch_percent", world.mismatch_percent)
     checked(between, "mismatch_percent", mismatch, 0.0, 50.0)
-    if isinstance(world.train, str) or not all(isinstance(name, str) for name in world.train or ()):
-        raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(world.train)}")
+    if isinstance(world.train, str) or not all(
+        isinstance(name, str) for name in world.train or ()
+    ):
+        raise ArgumentError(
+            f"train must be a list of motions such as ['walk-a'], got {quoted(world.train)}"
+        )
     return replace(
         world,
         motion=_motions(world.motion, held_out_people),
@@ -155,10 +192,20 @@ def flag(name: str, value: object) -> bool:
 
 def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
     """Return the motions of an argument: one name, several built-in ones, or "all" kinds of these."""
-    kinds = tuple(dict.fromkeys(built_in.activity_of(name) for name in built_in.names()))
-    names = kinds if motion == "all" else (motion,) if isinstance(motion, str) else motion
-    if not isinstance(names, Sequence) or not names or not all(isinstance(name, str) for name in names):
-        raise ArgumentError(f"motion must be a name, several, or 'all', got {quoted(motion)}")
+    kinds = tuple(
+        dict.fromkeys(built_in.activity_of(name) for name in built_in.names())
+    )
+    names = (
+        kinds if motion == "all" else (motion,) if isinstance(motion, str) else motion
+    )
+    if (
+        not isinstance(names, Sequence)
+        or not names
+        or not all(isinstance(name, str) for name in names)
+    ):
+        raise ArgumentError(
+            f"motion must be a name, several, or 'all', got {quoted(motion)}"
+        )
     known = kinds if held_out_people else built_in.names()
     if held_out_people or len(names) > 1:
         for name in names:
@@ -167,25 +214,38 @@ def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
 
 
 def _views(view_degrees: Any) -> tuple[float, ...]:
-    several = isinstance(view_degrees, Sequence | np.ndarray) and not isinstance(view_degrees, str)
+    several = isinstance(view_degrees, Sequence | np.ndarray) and not isinstance(
+        view_degrees, str
+    )
     try:
-        views = tuple(finite_number("view_degrees", view) for view in (view_degrees if several else [view_degrees]))
+        views = tuple(
+            finite_number("view_degrees", view)
+            for view in (view_degrees if several else [view_degrees])
+        )
     except ValueError:
         views = ()
     if not views:
-        raise ArgumentError(f"view_degrees must be a finite number or several, got {quoted(view_degrees)}")
+        raise ArgumentError(
+            f"view_degrees must be a finite number or several, got {quoted(view_degrees)}"
+        )
     return views
 
 
 def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     strengths = noise or {}
     if not isinstance(strengths, Mapping):
-        raise ArgumentError(f"noise must be strengths such as {{'holes': 0.3}}, got {quoted(noise)}")
+        raise ArgumentError(
+            f"noise must be strengths such as {{'holes': 0.3}}, got {quoted(noise)}"
+        )
     for name, strength in strengths.items():
         if name not in CORRUPTIONS:
-            raise ArgumentError(f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}")
+            raise ArgumentError(
+                f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}"
+            )
         if not 0.0 <= checked(finite_number, f"noise {name}", strength) <= 1.0:
-            raise ArgumentError(f"noise {name} must have a strength of 0 to 1, got {strength}")
+            raise ArgumentError(
+                f"noise {name} must have a strength of 0 to 1, got {strength}"
+            )
     return tuple(sorted(strengths.items()))
 
 
@@ -193,9 +253,13 @@ def instance_number(number: Any) -> int:
     """Return the number of an instance as an int. Raises ArgumentError where there is no such instance."""
     last = SPLITS["test"][1] - 1
     if isinstance(number, bool) or not isinstance(number, int | np.integer):
-        raise ArgumentError(f"instance must be a whole number from 0 to {last}, got {quoted(number)}")
+        raise ArgumentError(
+            f"instance must be a whole number from 0 to {last}, got {quoted(number)}"
+        )
     if not 0 <= number <= last:
-        raise ArgumentError(f"instance must lie in 0 to {last}, got {quoted(int(number))}")
+        raise ArgumentError(
+            f"instance must lie in 0 to {last}, got {quoted(int(number))}"
+        )
     return int(number)
 
 
@@ -221,7 +285,9 @@ def body_of(motion: str) -> Body:
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
     skeleton = _source(motion).skeleton
-    angles = np.concatenate([load_motion(name, FPS).about_axes_of(skeleton).poses[:, 3:] for name in train])
+    angles = np.concatenate(
+        [load_motion(name, FPS).about_axes_of(skeleton).poses[:, 3:] for name in train]
+    )
     fitted: Prior = registry().prior(prior)().fit(angles, skeleton)
     return fitted
 
@@ -238,7 +304,13 @@ class Instance:
     def episode(self, frame: int, space: SearchSpace) -> "Episode":
         """Return the search for the pose of a frame in a space."""
         silhouettes = self.observations[frame].silhouettes
-        return Episode(self, frame, PoseProblem(self.task.body, self.task.cameras, silhouettes, space, blank=True))
+        return Episode(
+            self,
+            frame,
+            PoseProblem(
+                self.task.body, self.task.cameras, silhouettes, space, blank=True
+            ),
+        )
 
     @cached_property
     def joints(self) -> Array:
@@ -257,7 +329,8 @@ class Episode:
     @property
     def truth(self) -> Array:
         """The proposal (d,) of the truth, the nearest in the box: what its prior cannot say is lost."""
-        pose, place = self.instance.truth.poses[self.frame], self.instance.truth.translations[self.frame]
+        pose = self.instance.truth.poses[self.frame]
+        place = self.instance.truth.translations[self.frame]
         space = self.problem.space
         searched = place if space.translation == "searched" else place[:0]
         latents = space.prior.transform(pose[None, 3:])[0]
@@ -269,7 +342,9 @@ def first_episode(world: World, number: int, evaluations: int) -> Episode:
     made = instance(world, number, 1, evaluations)
     task = made.task
     centre = np.array([task.yaw, 0.0, 0.0])
-    reach = np.radians(ROOT_RANGE_DEGREES if world.yaw == "guessed" else ANY_YAW_DEGREES)
+    reach = np.radians(
+        ROOT_RANGE_DEGREES if world.yaw == "guessed" else ANY_YAW_DEGREES
+    )
     space = SearchSpace(world.learned, centre, reach, task.anchor, task.translation)
     return made.episode(0, space)
 
@@ -283,19 +358,31 @@ def instance(world: World, number: int, frames: int, evaluations: int) -> Instan
         truth = motion_of_instance(source, number, frames=frames, fps=FPS)
     except ValueError as mistake:  # a file that is too short
         raise error.Error(str(mistake)) from None
-    rng = np.random.default_rng([RNG_STREAM, number])  # of noise, yaw and build alone: motion and views are a sweep's
-    body, facing = body_of(motion), float(truth.poses[0, 0])
+    # of noise, yaw and build alone: motion and views are a sweep's
+    rng = np.random.default_rng([RNG_STREAM, number])
+    body = body_of(motion)
+    facing = float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
     middle[1] = HEIGHT
     reach = DISTANCE + 0.5 * float(np.ptp(truth.translations[:, [0, 2]], axis=0).max())
     turn = rng.uniform(-180.0, 180.0) if world.yaw == "unknown" else 0.0
-    azimuths = [facing + np.radians(view + turn) for view in variation(number).views(world.view_degrees)]
-    cameras = [Camera.around(middle, azimuth, reach, world.size) for azimuth in azimuths]
+    azimuths = [
+        facing + np.radians(view + turn)
+        for view in variation(number).views(world.view_degrees)
+    ]
+    cameras = [
+        Camera.around(middle, azimuth, reach, world.size) for azimuth in azimuths
+    ]
     noise = dict(world.noise)
     observations = []
     for pose, place in zip(truth.poses, truth.translations, strict=True):
-        masks = [corrupted(project(body, camera, pose, place), noise, rng) for camera in cameras]
-        observations.append(Observation([Silhouette.of(mask) for mask in masks], place.copy()))
+        masks = [
+            corrupted(project(body, camera, pose, place), noise, rng)
+            for camera in cameras
+        ]
+        observations.append(
+            Observation([Silhouette.of(mask) for mask in masks], place.copy())
+        )
     yaw = facing + float(np.radians(rng.uniform(-YAW_DEGREES, YAW_DEGREES)))
     if world.yaw == "unknown":
         yaw = azimuths[0]  # facing the camera

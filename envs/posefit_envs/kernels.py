@@ -10,9 +10,22 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, Bits, jit
 from posefit.fitting.kernels import move_to_borders, unpack_proposals
-from posefit.geometry.kernels import LANES, empty_lanes, place_lanes, read_joints, set_offsets, set_rows
+from posefit.geometry.kernels import (
+    LANES,
+    empty_lanes,
+    place_lanes,
+    read_joints,
+    set_offsets,
+    set_rows,
+)
 from posefit.silhouette.kernels import count, paint_bits
-from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
+from posefit.silhouette.rasteriser import (
+    View,
+    fill_pose,
+    outline_poses,
+    scratch,
+    set_scene,
+)
 
 
 class Scenes(NamedTuple):
@@ -33,10 +46,18 @@ class Scenes(NamedTuple):
 @jit
 def unpack_scenes(proposals, centres, halves, anchors, poses, translations, latents):
     """Write root angles, translations and latents of proposals (n, k, d); return whether all of them are finite."""
-    finite, upright = True, np.zeros((3 + latents.shape[2], 2))
+    finite = True
+    upright = np.zeros((3 + latents.shape[2], 2))
     for i in range(proposals.shape[0]):
         finite &= unpack_proposals(
-            proposals[i], centres[i], halves[i], anchors[i], upright, poses[i], translations[i], latents[i]
+            proposals[i],
+            centres[i],
+            halves[i],
+            anchors[i],
+            upright,
+            poses[i],
+            translations[i],
+            latents[i],
         )
     return finite
 
@@ -44,8 +65,11 @@ def unpack_scenes(proposals, centres, halves, anchors, poses, translations, late
 @jit
 def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations):
     """Move translations (n, k, 3) of some rows to where poses (n, k, 66) fill the borders (n, views, 4)."""
-    many, block, lanes = poses.shape[1], np.empty(LANES, np.int64), empty_lanes()
-    joints, origins = np.empty((many, joint_radii.shape[1], 3)), np.zeros((many, 3))
+    many = poses.shape[1]
+    block = np.empty(LANES, np.int64)
+    lanes = empty_lanes()
+    joints = np.empty((many, joint_radii.shape[1], 3))
+    origins = np.zeros((many, 3))
     for i in rows:
         set_offsets(lanes, 0, LANES, scenes.offsets[i])
         for first in range(0, many, LANES):
@@ -72,14 +96,19 @@ def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures
     Where there are `pictures` (n, height, width, views), and k is 1, they become the backdrops with `value` in the
     pixels of each body; those of other rows stay as they are.
     """
-    views, many, total = scenes.places.shape[1], poses.shape[1], rows.size * poses.shape[1]
+    views = scenes.places.shape[1]
+    many = poses.shape[1]
+    total = rows.size * poses.shape[1]
     height, width = scenes.backdrops.shape[1:3]
-    flat, places = poses.reshape(-1, poses.shape[2]), translations.reshape(-1, 3)
+    flat = poses.reshape(-1, poses.shape[2])
+    places = translations.reshape(-1, 3)
     work = scratch(scenes.observed.shape[2], scenes.observed.shape[3])
-    block, drawn = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
+    block = np.empty(LANES, np.int64)
+    drawn = np.empty(LANES, np.int64)
     if pictures.size:
         for i in rows:
-            pixels, backdrop = pictures[i].reshape(-1), scenes.backdrops[i].reshape(-1)
+            pixels = pictures[i].reshape(-1)
+            backdrop = scenes.backdrops[i].reshape(-1)
             for p in range(pixels.size):
                 pixels[p] = backdrop[p]
     for v in range(views):
@@ -90,17 +119,30 @@ def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures
                 i = rows[at // many]
                 block[lane] = many * i + at % many
                 if i != drawn[lane]:
-                    rotation, place = scenes.rotations[i, v], scenes.places[i, v]
-                    view = View(rotation, place, scenes.focals[i, v], scenes.centres[i, v], width, height)
-                    set_scene(work, lane, lane + 1, scenes.offsets[i], scenes.radii[i], view)
+                    rotation = scenes.rotations[i, v]
+                    place = scenes.places[i, v]
+                    view = View(
+                        rotation,
+                        place,
+                        scenes.focals[i, v],
+                        scenes.centres[i, v],
+                        width,
+                        height,
+                    )
+                    set_scene(
+                        work, lane, lane + 1, scenes.offsets[i], scenes.radii[i], view
+                    )
                     drawn[lane] = i
             outline_poses(chain, flat, places, block, width, height, work)
             for lane in range(min(LANES, total - first)):
-                i, k = block[lane] // many, block[lane] % many
+                i = block[lane] // many
+                k = block[lane] % many
                 image, box = fill_pose(lane, work)
                 if pictures.size:
                     paint_bits(image, box, value, pictures[i, :, :, v])
-                body, overlap = count(image, scenes.observed[i, v], scenes.valid[i, v], box)
+                body, overlap = count(
+                    image, scenes.observed[i, v], scenes.valid[i, v], box
+                )
                 areas[v, i, k, 0] = np.uint64(scenes.totals[i, v]) - overlap
                 areas[v, i, k, 1] = body - overlap
                 areas[v, i, k, 2] = overlap

@@ -15,11 +15,15 @@ from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES
 Policy = Callable[[Any, int], Array]
 
 
-def rollout(env: gym.Env[Any, Any], policy: Policy, instance: int, seed: int) -> dict[str, Any]:
+def rollout(
+    env: gym.Env[Any, Any], policy: Policy, instance: int, seed: int
+) -> dict[str, Any]:
     """Return the last info of an episode of a policy on an instance, with its `actions` (k, d) and `rewards` (k,)."""
     observation, info = env.reset(seed=seed, options={"instance": instance})
     actions: list[Array] = []
-    rewards, ended, cut = [], False, False
+    rewards = []
+    ended = False
+    cut = False
     while not (ended or cut):
         actions.append(policy(observation, len(actions)))
         observation, reward, ended, cut, info = env.step(actions[-1])
@@ -34,7 +38,9 @@ def race_features(observation: Any) -> tuple[Array, Array]:
     """
     shown = np.asarray(observation, dtype=np.float64)
     each = shown[..., :-COMMON_FEATURES]
-    features = each.reshape(*shown.shape[:-1], SEARCH_FEATURES, each.shape[-1] // SEARCH_FEATURES)
+    features = each.reshape(
+        *shown.shape[:-1], SEARCH_FEATURES, each.shape[-1] // SEARCH_FEATURES
+    )
     return features.swapaxes(-1, -2), shown[..., -COMMON_FEATURES:]
 
 

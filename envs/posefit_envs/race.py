@@ -13,18 +13,31 @@ from posefit.fitting.check import pair, whole
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import planned, settings_of
-from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, log_cost, log_improvement
+from posefit_envs.base import (
+    Flags,
+    Infos,
+    Outcome,
+    SearchEnv,
+    SearchVectorEnv,
+    log_cost,
+    log_improvement,
+)
 from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Rows
 
 OPTIMISER = "pso"
-SEARCHES, POPULATION_SIZE = 8, 8
+SEARCHES = 8
+POPULATION_SIZE = 8
 GENERATIONS = (100, 220)  # the least and the most that an episode has
-SEARCH_FEATURES, COMMON_FEATURES = 4, 3
+SEARCH_FEATURES = 4
+COMMON_FEATURES = 3
 SMOOTHING = 0.2  # weight of the last generation in a slope
-MAX_SLOPE = 0.1  # in ln(1 + cost) a generation, that shows as 1, and that a search begins with
-MIN_SPREAD, MAX_SPREAD = 1e-3, 1.0  # in half-ranges, that show as 0 and 1
+# in ln(1 + cost) a generation, that shows as 1, and that a search begins with
+MAX_SLOPE = 0.1
+# in half-ranges, that show as 0 and 1
+MIN_SPREAD = 1e-3
+MAX_SPREAD = 1.0
 
 
 class RaceVectorEnv(SearchVectorEnv):
@@ -41,39 +54,71 @@ class RaceVectorEnv(SearchVectorEnv):
         **arguments: Any,
     ) -> None:
         k = int(checked(whole, "searches", searches, 2))
-        self.population_size = int(checked(whole, "population_size", population_size, 2))
+        self.population_size = int(
+            checked(whole, "population_size", population_size, 2)
+        )
         self._least, self._most = _bounds(generations)
-        self._optimiser, self._factory = optimiser, checked(registry().optimiser, optimiser)
+        self._optimiser, self._factory = (
+            optimiser,
+            checked(registry().optimiser, optimiser),
+        )
         size = {"population_size": self.population_size}
         sized = any(setting.name in size for setting in settings_of(self._factory))
-        self._settings = planned(self._factory, size if sized else {}, self.population_size * (self._most + 1))
+        self._settings = planned(
+            self._factory,
+            size if sized else {},
+            self.population_size * (self._most + 1),
+        )
 
         def race_spaces(_: World) -> tuple[spaces.Box, spaces.Box]:
             features = SEARCH_FEATURES * k + COMMON_FEATURES
-            return spaces.Box(-1.0, 1.0, (k + 1,), np.float32), spaces.Box(0.0, 1.0, (features,), np.float32)
+            return spaces.Box(-1.0, 1.0, (k + 1,), np.float32), spaces.Box(
+                0.0, 1.0, (features,), np.float32
+            )
 
         super().__init__(num_envs, race_spaces, **arguments)
-        n, m, d = num_envs, self.population_size, self.world.dimensions
+        n = num_envs
+        m = self.population_size
+        d = self.world.dimensions
         self._rngs = [np.random.default_rng(0)] * n
         self._budgets, self._left, self._evaluations = np.zeros((3, n), dtype=np.int64)
-        self._best, self._leaders = np.full(n, np.inf), np.zeros((n, d))  # of all searches, those that ended too
+        # of all searches, those that ended too
+        self._best, self._leaders = np.full(n, np.inf), np.zeros((n, d))
         self._searches: list[dict[int, Optimiser]] = [{} for _ in range(n)]
-        self._bests, self._best_costs = np.zeros((n, k, m, d)), np.full((n, k, m), np.inf)  # of each particle
+        # of each particle
+        self._bests, self._best_costs = (
+            np.zeros((n, k, m, d)),
+            np.full((n, k, m), np.inf),
+        )
         self._costs, self._slopes, self._spreads = np.zeros((3, n, k))  # of each search
         self._used = np.zeros((n, k), dtype=np.int64)
 
     def _begin_search(self, i: int, number: int) -> None:
-        self._enter(i, first_episode(self.world, number, self.population_size * (self._most + self._used.shape[1])))
-        self._rngs[i] = rng = np.random.default_rng(int(self._generator(i).integers(2**63)))
-        self._budgets[i] = self._left[i] = rng.integers(self._least, self._most, endpoint=True)
+        self._enter(
+            i,
+            first_episode(
+                self.world,
+                number,
+                self.population_size * (self._most + self._used.shape[1]),
+            ),
+        )
+        self._rngs[i] = rng = np.random.default_rng(
+            int(self._generator(i).integers(2**63))
+        )
+        self._budgets[i] = self._left[i] = rng.integers(
+            self._least, self._most, endpoint=True
+        )
         self._best[i], self._evaluations[i] = np.inf, 0
         for search in range(self._used.shape[1]):
             self._begin_another(i, search)
 
     def _begin_another(self, i: int, search: int) -> None:
         """Begin another search in the place of one of an environment's."""
-        space, rng = self._episode(i).problem.space, np.random.default_rng(int(self._rngs[i].integers(2**63)))
-        self._searches[i][search] = checked(lambda: self._factory(space, rng, **self._settings))
+        space = self._episode(i).problem.space
+        rng = np.random.default_rng(int(self._rngs[i].integers(2**63)))
+        self._searches[i][search] = checked(
+            lambda: self._factory(space, rng, **self._settings)
+        )
         self._best_costs[i, search] = self._costs[i, search] = np.inf
         self._slopes[i, search], self._used[i, search] = MAX_SLOPE, 0
 
@@ -89,7 +134,8 @@ class RaceVectorEnv(SearchVectorEnv):
     def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
         if len(rows) < self.num_envs:
             self._evaluate_first(np.flatnonzero(~stepping))
-        before, searches = self._best.copy(), self._used.shape[1]
+        before = self._best.copy()
+        searches = self._used.shape[1]
         chosen = actions.argmax(axis=1)
         for i in np.flatnonzero(stepping & (chosen == searches)).tolist():
             chosen[i] = self._costs[i].argmax()
@@ -98,12 +144,19 @@ class RaceVectorEnv(SearchVectorEnv):
         self._left[rows] -= 1
         infos = self._infos()
         rewards = log_improvement(before, self._best)
-        return Outcome(self._states(), rewards, stepping & (self._left == 0), infos, infos)
+        return Outcome(
+            self._states(), rewards, stepping & (self._left == 0), infos, infos
+        )
 
     def _advance_searches(self, rows: Rows, chosen: NDArray[np.int64]) -> None:
         """Make one generation of the chosen search (k,) of some environments (k,)."""
-        proposals = np.zeros((self.num_envs, self.population_size, self.world.dimensions))
-        searches = [(i, self._searches[i][search]) for i, search in zip(rows.tolist(), chosen.tolist(), strict=True)]
+        proposals = np.zeros(
+            (self.num_envs, self.population_size, self.world.dimensions)
+        )
+        searches = [
+            (i, self._searches[i][search])
+            for i, search in zip(rows.tolist(), chosen.tolist(), strict=True)
+        ]
         for i, search in searches:
             asked = search.ask()
             if asked.shape != proposals[i].shape:
@@ -118,33 +171,61 @@ class RaceVectorEnv(SearchVectorEnv):
         self._evaluations[rows] += self.population_size
         self._remember(rows, chosen, proposals[rows], costs[rows])
 
-    def _remember(self, rows: Rows, chosen: NDArray[np.int64], proposals: Array, costs: Array) -> None:
+    def _remember(
+        self, rows: Rows, chosen: NDArray[np.int64], proposals: Array, costs: Array
+    ) -> None:
         """Update what is observed of chosen searches (k,) by their proposals (k, m, d) and costs (k, m)."""
-        at, each = (rows, chosen), np.arange(len(rows))
-        before, searched = self._costs[at], self._used[at] > 0
-        bests, best_costs = self._bests[at], self._best_costs[at]
+        at = (rows, chosen)
+        each = np.arange(len(rows))
+        before = self._costs[at]
+        searched = self._used[at] > 0
+        bests = self._bests[at]
+        best_costs = self._best_costs[at]
         better = costs < best_costs
         bests[better], best_costs[better] = proposals[better], costs[better]
-        after, leaders = best_costs.min(axis=1), bests[each, best_costs.argmin(axis=1)]
+        after = best_costs.min(axis=1)
+        leaders = bests[each, best_costs.argmin(axis=1)]
         falls = log_improvement(np.where(searched, before, after), after)
         slopes = self._slopes[at] + SMOOTHING * (falls - self._slopes[at])
-        self._bests[at], self._best_costs[at], self._costs[at] = bests, best_costs, after
+        self._bests[at], self._best_costs[at], self._costs[at] = (
+            bests,
+            best_costs,
+            after,
+        )
         self._slopes[at] = np.where(searched, slopes, MAX_SLOPE)
         self._spreads[at] = bests.std(axis=1).mean(axis=1)
         self._used[at] += 1
         better = after < self._best[rows]
-        self._best[rows[better]], self._leaders[rows[better]] = after[better], leaders[better]
+        self._best[rows[better]], self._leaders[rows[better]] = (
+            after[better],
+            leaders[better],
+        )
 
     def _states(self) -> NDArray[np.float32]:
         budgets = self._budgets[:, None]
-        spreads = np.log(np.maximum(self._spreads / MIN_SPREAD, 1.0)) / np.log(MAX_SPREAD / MIN_SPREAD)
-        each = log_cost(self._costs), self._slopes / MAX_SLOPE, spreads, self._used / budgets
-        common = log_cost(self._best)[:, None], self._left[:, None] / budgets, budgets / self._most
-        return np.asarray(np.minimum(np.concatenate([*each, *common], axis=1), 1.0), dtype=np.float32)
+        spreads = np.log(np.maximum(self._spreads / MIN_SPREAD, 1.0)) / np.log(
+            MAX_SPREAD / MIN_SPREAD
+        )
+        each = (
+            log_cost(self._costs),
+            self._slopes / MAX_SLOPE,
+            spreads,
+            self._used / budgets,
+        )
+        common = (
+            log_cost(self._best)[:, None],
+            self._left[:, None] / budgets,
+            budgets / self._most,
+        )
+        return np.asarray(
+            np.minimum(np.concatenate([*each, *common], axis=1), 1.0), dtype=np.float32
+        )
 
     def _infos(self) -> Infos:
         poses = self._stage.poses(self._leaders)
-        return self._progress(self._best, self._evaluations, poses, proposal=self._leaders.copy())
+        return self._progress(
+            self._best, self._evaluations, poses, proposal=self._leaders.copy()
+        )
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
         poses, places = episode.problem.decode(self._leaders[i : i + 1])
@@ -217,8 +298,12 @@ class RaceEnv(SearchEnv):
 
 def _bounds(generations: Any) -> tuple[int, int]:
     """Return the least and the largest budget. Raises ArgumentError where they are not two numbers in this order."""
-    ends = checked(pair, "generations", generations, "two whole numbers such as (100, 220)")
+    ends = checked(
+        pair, "generations", generations, "two whole numbers such as (100, 220)"
+    )
     least, most = (checked(whole, "generations", number, 1) for number in ends)
     if least > most:
-        raise ArgumentError(f"generations must be the least and the largest, got {least} and {most}")
+        raise ArgumentError(
+            f"generations must be the least and the largest, got {least} and {most}"
+        )
     return least, most

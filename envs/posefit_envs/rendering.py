@@ -20,10 +20,14 @@ Picture = NDArray[np.uint8]  # (height, width, 3) red, green, blue
 def check_mode(mode: str | None) -> None:
     """Raise gymnasium.error.UnsupportedMode for an unknown render mode."""
     if mode is not None and mode not in MODES:
-        raise error.UnsupportedMode(f"render_mode must be one of {', '.join(MODES)}, got {mode!r}")
+        raise error.UnsupportedMode(
+            f"render_mode must be one of {', '.join(MODES)}, got {mode!r}"
+        )
 
 
-def render_frame(problem: PoseProblem, pose: Array | None, translation: Array | None, label: str) -> Picture:
+def render_frame(
+    problem: PoseProblem, pose: Array | None, translation: Array | None, label: str
+) -> Picture:
     """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side."""
     panels = []
     for camera, silhouette in zip(problem.cameras, problem.silhouettes, strict=True):
@@ -31,9 +35,17 @@ def render_frame(problem: PoseProblem, pose: Array | None, translation: Array | 
         body = np.zeros_like(mask)
         if pose is not None and translation is not None:
             body = project(problem.body, camera, pose, translation)
-        panels.append(OVERLAP[panel_of(mask.view(np.uint8) + 2 * body.view(np.uint8), HEIGHT, sharp=True)])
+        panels.append(
+            OVERLAP[
+                panel_of(
+                    mask.view(np.uint8) + 2 * body.view(np.uint8), HEIGHT, sharp=True
+                )
+            ]
+        )
     if pose is not None and translation is not None:
-        panels.append(side_view(problem.body, problem.cameras[0], pose, translation, HEIGHT))
+        panels.append(
+            side_view(problem.body, problem.cameras[0], pose, translation, HEIGHT)
+        )
     else:
         panels.append(blank(HEIGHT, HEIGHT))
     image = np.hstack(panels)

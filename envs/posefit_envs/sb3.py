@@ -30,7 +30,9 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             "to_sb3_vec_env needs Stable-Baselines3: python -m pip install stable-baselines3"
         ) from None
     if vector.metadata.get("autoreset_mode") != AutoresetMode.NEXT_STEP:
-        raise error.Error(f"autoreset_mode must be NEXT_STEP, got {vector.metadata.get('autoreset_mode')}")
+        raise error.Error(
+            f"autoreset_mode must be NEXT_STEP, got {vector.metadata.get('autoreset_mode')}"
+        )
 
     rows_of: Any = DictInfoToList(vector)
 
@@ -38,11 +40,19 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
         def __init__(self) -> None:
             self._actions: Any = None
             self._seeds: Any = None
-            super().__init__(vector.num_envs, vector.single_observation_space, vector.single_action_space)
+            super().__init__(
+                vector.num_envs,
+                vector.single_observation_space,
+                vector.single_action_space,
+            )
 
         def reset(self) -> Any:
-            seeds: Any = None if all(seed is None for seed in self._seeds) else list(self._seeds)
-            observations, self.reset_infos = rows_of.reset(seed=seeds, options=self._options[0] or None)
+            seeds: Any = (
+                None if all(seed is None for seed in self._seeds) else list(self._seeds)
+            )
+            observations, self.reset_infos = rows_of.reset(
+                seed=seeds, options=self._options[0] or None
+            )
             self._reset_seeds()
             self._reset_options()
             return observations
@@ -51,12 +61,16 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             self._actions = actions
 
         def step_wait(self) -> Any:
-            observations, rewards, terminated, truncated, rows = rows_of.step(self._actions)
+            observations, rewards, terminated, truncated, rows = rows_of.step(
+                self._actions
+            )
             done = terminated | truncated
             if done.any():
                 for i in np.flatnonzero(done):
                     rows[i]["terminal_observation"] = observations[i].copy()
-                    rows[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
+                    rows[i]["TimeLimit.truncated"] = bool(
+                        truncated[i] and not terminated[i]
+                    )
                 fresh, fresh_rows = rows_of.reset(options={"reset_mask": done})
                 observations = mixed(done, fresh, observations)
                 for i in np.flatnonzero(done):
@@ -73,7 +87,9 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             self._check_all(indices)
             setattr(vector, attr_name, value)
 
-        def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **named: Any) -> list[Any]:
+        def env_method(
+            self, method_name: str, *arguments: Any, indices: Any = None, **named: Any
+        ) -> list[Any]:
             self._check_all(indices)
             return [getattr(vector, method_name)(*arguments, **named)] * self.num_envs
 
@@ -86,6 +102,8 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
         def _check_all(self, indices: Any) -> None:
             chosen = sorted(set(self._get_indices(indices)))
             if chosen != list(range(self.num_envs)):
-                raise error.Error(f"indices must be all of the {self.num_envs} environments, got {chosen}")
+                raise error.Error(
+                    f"indices must be all of the {self.num_envs} environments, got {chosen}"
+                )
 
     return Adapted()

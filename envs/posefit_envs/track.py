@@ -8,7 +8,14 @@ from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.fitting.metrics import mpjpe_mm, pose_error_degrees
 from posefit.fitting.tracker import Prediction, Predictor
-from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
+from posefit_envs.base import (
+    Flags,
+    Infos,
+    Outcome,
+    SearchEnv,
+    SearchVectorEnv,
+    image_spaces,
+)
 from posefit_envs.instance import Episode, Image, Instance, checked, instance
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Evaluation, Rows
@@ -35,29 +42,42 @@ class TrackVectorEnv(SearchVectorEnv):
         super().__init__(num_envs, image_spaces, **arguments)
         self._frame_count, self._budget = int(frames), int(evaluations_per_frame)
         self._predictors: dict[int, Predictor] = {}
-        self._frames, self._used = np.zeros((2, num_envs), dtype=np.int64)  # used: of the current frame
+        # used: of the current frame
+        self._frames, self._used = np.zeros((2, num_envs), dtype=np.int64)
         self._best, self._best_proposals = np.empty(num_envs), np.empty(self._shape)
         self._last: Evaluation | None = None
 
     def _begin_search(self, i: int, number: int) -> None:
         made = instance(self.world, number, self._frame_count, self._budget)
-        self._predictors[i] = Predictor(made.task, self.world.learned, Prediction(tilt="box"))
+        self._predictors[i] = Predictor(
+            made.task, self.world.learned, Prediction(tilt="box")
+        )
         self._begin_frame(i, made, 0)
 
     def _begin_frame(self, i: int, made: Instance, frame: int) -> None:
-        self._enter(i, made.episode(frame, self._predictors[i].space(made.observations[frame])))
+        self._enter(
+            i, made.episode(frame, self._predictors[i].space(made.observations[frame]))
+        )
         self._frames[i], self._used[i], self._best[i] = frame, 0, np.inf
 
     def _opened(self, started: Flags) -> tuple[Image, Infos]:
-        return self._stage.pictures(), {"instance": self._numbers.copy(), "frame": np.zeros_like(self._frames)}
+        return self._stage.pictures(), {
+            "instance": self._numbers.copy(),
+            "frame": np.zeros_like(self._frames),
+        }
 
     def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
         last = self._last = self._stage.evaluate(actions, rows)
         self._used += stepping
         better = (stepping & (last.costs < self._best)).nonzero()[0]
         if better.size:
-            self._best[better], self._best_proposals[better] = last.costs[better], actions[better]
-        infos = self._progress(self._best, self._used, last.poses, cost=last.costs, areas=last.areas)
+            self._best[better], self._best_proposals[better] = (
+                last.costs[better],
+                actions[better],
+            )
+        infos = self._progress(
+            self._best, self._used, last.poses, cost=last.costs, areas=last.areas
+        )
         terminated = full = stepping & (self._used >= self._budget)
         committed: dict[int, Infos] = {}
         if full.any():
@@ -65,21 +85,38 @@ class TrackVectorEnv(SearchVectorEnv):
             committed = self._commit(full.nonzero()[0], last)
         infos["frame"] = self._frames.copy()
         common = {"instance": self._numbers, "frame": infos["frame"]}
-        return Outcome(last.pictures, -np.log1p(last.costs), terminated, infos, common, row_infos=committed)
+        return Outcome(
+            last.pictures,
+            -np.log1p(last.costs),
+            terminated,
+            infos,
+            common,
+            row_infos=committed,
+        )
 
     def _commit(self, rows: Rows, last: Evaluation) -> dict[int, Infos]:
         """Commit the best proposals of some environments, begin their next frames, and return their infos by row."""
         poses, places = self._stage.decode(self._best_proposals[:, None], rows)
         last.poses[rows], last.translations[rows] = poses[rows, 0], places[rows, 0]
-        infos, entered = {}, []
+        infos = {}
+        entered = []
         for i in rows.tolist():
-            made, frame, best = self._episode(i).instance, int(self._frames[i]), float(self._best[i])
-            infos[i] = committed_infos(made, frame, poses[i, 0], places[i, 0], best, self.world.errors)
+            made = self._episode(i).instance
+            frame = int(self._frames[i])
+            best = float(self._best[i])
+            infos[i] = committed_infos(
+                made, frame, poses[i, 0], places[i, 0], best, self.world.errors
+            )
             self._predictors[i].commit(self._best_proposals[i])
             if frame + 1 < self._frame_count:
                 self._begin_frame(i, made, frame + 1)
                 entered.append(i)
-        self._stage.redraw(last.poses, last.translations, np.array(entered, dtype=np.int64), last.pictures)
+        self._stage.redraw(
+            last.poses,
+            last.translations,
+            np.array(entered, dtype=np.int64),
+            last.pictures,
+        )
         return infos
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
@@ -136,9 +173,17 @@ def committed_infos(
     instance: Instance, frame: int, pose: Array, place: Array, cost: float, errors: bool
 ) -> dict[str, Any]:
     """Return the infos of the pose that is committed in a frame of an instance."""
-    infos = {"committed_frame": frame, "committed_cost": cost, "committed_pose": pose.copy()}
+    infos = {
+        "committed_frame": frame,
+        "committed_cost": cost,
+        "committed_pose": pose.copy(),
+    }
     if errors:
         joints = instance.task.body.skeleton.joints(pose[None], place[None])
-        infos["committed_error_degrees"] = float(pose_error_degrees(instance.truth.poses[frame][None], pose[None])[0])
-        infos["committed_mpjpe_mm"] = float(mpjpe_mm(instance.joints[frame][None], joints)[0])
+        infos["committed_error_degrees"] = float(
+            pose_error_degrees(instance.truth.poses[frame][None], pose[None])[0]
+        )
+        infos["committed_mpjpe_mm"] = float(
+            mpjpe_mm(instance.joints[frame][None], joints)[0]
+        )
     return infos

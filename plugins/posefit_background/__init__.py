@@ -17,7 +17,12 @@ from posefit.hooks import RegisterSegmenter
 @hookimpl
 def posefit_register_segmenters(register: RegisterSegmenter) -> None:
     """Register `mixture`, `median`, `mean` and `masks`."""
-    from posefit_background.segmenters import given_masks, given_mean, learned_median, learned_mixture
+    from posefit_background.segmenters import (
+        given_masks,
+        given_mean,
+        learned_median,
+        learned_mixture,
+    )
 
     register("mixture", learned_mixture)
     register("median", learned_median)

@@ -15,7 +15,9 @@ from posefit.silhouette.foreground import (
 )
 
 
-def learned_mixture(film: Film, *, history: int = HISTORY, threshold: float = THRESHOLD) -> Mixture:
+def learned_mixture(
+    film: Film, *, history: int = HISTORY, threshold: float = THRESHOLD
+) -> Mixture:
     """Each pixel's background is an adaptive mixture of Gaussians, learned from the whole video: OpenCV's MOG2.
 
     Settings:
@@ -35,7 +37,12 @@ def learned_median(film: Film, *, samples: int = SAMPLES) -> Still:
     """
     at_least("samples", samples, 1)
     step = max(1, len(film) // samples)
-    return median_background([image for image, _ in zip(film.frames(step=step), range(samples), strict=False)])
+    return median_background(
+        [
+            image
+            for image, _ in zip(film.frames(step=step), range(samples), strict=False)
+        ]
+    )
 
 
 def given_mean(film: Film, *, background: str) -> Still:
@@ -46,7 +53,9 @@ def given_mean(film: Film, *, background: str) -> Still:
     """
     start, colon, stop = background.partition(":")
     if colon and (start + stop).isdigit() and stop:
-        return mean_background(film.frames(*span((int(start or 0), int(stop)), len(film))))
+        return mean_background(
+            film.frames(*span((int(start or 0), int(stop)), len(film)))
+        )
     return mean_background([film.picture(background)])
 
 

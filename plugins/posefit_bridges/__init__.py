@@ -12,7 +12,14 @@ from posefit.hooks import RegisterOptimiser
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
     """Register the optimisers of each library: `pycma`, and those of a family such as `optuna:SAMPLER`."""
-    from posefit_bridges.optimisers import bridge, nevergrad, optuna, pycma, pymoo, scipy
+    from posefit_bridges.optimisers import (
+        bridge,
+        nevergrad,
+        optuna,
+        pycma,
+        pymoo,
+        scipy,
+    )
 
     register("nevergrad", bridge(nevergrad), needs=("nevergrad", "posefit[nevergrad]"))
     register("optuna", bridge(optuna), needs=("optuna", "posefit[optuna]"))

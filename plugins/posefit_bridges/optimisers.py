@@ -27,15 +27,32 @@ from typing import Any, Literal, final
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.plugin import Adapter, Array, Space, at_least, choices, draw_population, positive
+from posefit.plugin import (
+    Adapter,
+    Array,
+    Space,
+    at_least,
+    choices,
+    draw_population,
+    positive,
+)
 from posefit.reading import quoted
 
-LEAVE_SECONDS = 5.0  # how long to wait for a library to leave when its search is dropped
+# how long to wait for a library to leave when its search is dropped
+LEAVE_SECONDS = 5.0
 
-Proposals = Generator[Array, Array, None]  # yields proposals (n, d), and is sent their costs (n,)
+# yields proposals (n, d), and is sent their costs (n,)
+Proposals = Generator[Array, Array, None]
 Library = Callable[[Space, np.random.Generator], Proposals]
 Objective = Callable[[Array], Array]
-Sampler = Literal["TPESampler", "CmaEsSampler", "GPSampler", "NSGAIISampler", "QMCSampler", "RandomSampler"]
+Sampler = Literal[
+    "TPESampler",
+    "CmaEsSampler",
+    "GPSampler",
+    "NSGAIISampler",
+    "QMCSampler",
+    "RandomSampler",
+]
 Algorithm = Literal["DE", "PSO", "GA", "ES", "SRES", "ISRES"]
 Minimiser = Literal["differential_evolution", "dual_annealing"]
 
@@ -48,7 +65,9 @@ class Bridge(Adapter):
     the same every time, and has to be picklable for a pickle.
     """
 
-    def __init__(self, space: Space, rng: np.random.Generator, library: Library) -> None:
+    def __init__(
+        self, space: Space, rng: np.random.Generator, library: Library
+    ) -> None:
         super().__init__(space, draw_population(space, rng, 1)[0])
         self._library, self._seed = library, int(rng.integers(2**63))
         self._costs: list[Array] = []  # of all populations so far
@@ -75,7 +94,12 @@ class Bridge(Adapter):
         self._costs.append(costs)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_proposals": None, "_population": None, "_asked": None}
+        return {
+            **self.__dict__,
+            "_proposals": None,
+            "_population": None,
+            "_asked": None,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -119,10 +143,14 @@ def nevergrad(
     numpy_random = GlobalRandom(int(rng.integers(2**31)))
     spread = 0.5 if space.start is None else np.clip(space.start.spread, 1e-6, 0.5)
     with numpy_random:
-        box = ng.p.Array(init=draw_population(space, rng, 1)[0]).set_mutation(sigma=spread)
+        box = ng.p.Array(init=draw_population(space, rng, 1)[0]).set_mutation(
+            sigma=spread
+        )
         box = box.set_bounds(-1.0, 1.0, method="clipping")
         box.random_state = np.random.RandomState(int(rng.integers(2**31)))
-        optimiser: Any = known[variant](box, budget=evaluations, num_workers=population_size)
+        optimiser: Any = known[variant](
+            box, budget=evaluations, num_workers=population_size
+        )
         for proposal in draw_population(space, rng, population_size):
             optimiser.suggest(proposal)
     while True:
@@ -150,7 +178,11 @@ class GlobalRandom:
 
 
 def optuna(
-    space: Space, rng: np.random.Generator, *, variant: Sampler = "NSGAIISampler", population_size: int = 10
+    space: Space,
+    rng: np.random.Generator,
+    *,
+    variant: Sampler = "NSGAIISampler",
+    population_size: int = 10,
 ) -> Proposals:
     """A study of Optuna with that sampler, asked for `population_size` proposals at a time, at first from the start.
 
@@ -166,15 +198,21 @@ def optuna(
 
     at_least("population_size", population_size, 1)
     choices(optuna, locals())
-    box: Any = {f"x{k:03}": FloatDistribution(-1.0, 1.0) for k in range(space.dimensions)}
+    box: Any = {
+        f"x{k:03}": FloatDistribution(-1.0, 1.0) for k in range(space.dimensions)
+    }
     with _quiet_optuna():
-        study = create_study(sampler=getattr(samplers, variant)(seed=int(rng.integers(2**31))))
+        study = create_study(
+            sampler=getattr(samplers, variant)(seed=int(rng.integers(2**31)))
+        )
     for proposal in draw_population(space, rng, population_size).tolist():
         study.enqueue_trial(dict(zip(box, proposal, strict=True)))
     while True:
         with _quiet_optuna():
             trials = [study.ask(box) for _ in range(population_size)]
-        costs = yield np.array([[trial.params[name] for name in box] for trial in trials])
+        costs = yield np.array(
+            [[trial.params[name] for name in box] for trial in trials]
+        )
         with _quiet_optuna():
             for trial, cost in zip(trials, costs.tolist(), strict=True):
                 study.tell(trial, cost)
@@ -193,7 +231,13 @@ def _quiet_optuna() -> Iterator[None]:
         logging.set_verbosity(before)
 
 
-def pycma(space: Space, rng: np.random.Generator, *, population_size: int = 0, spread: float = 0.5) -> Proposals:
+def pycma(
+    space: Space,
+    rng: np.random.Generator,
+    *,
+    population_size: int = 0,
+    spread: float = 0.5,
+) -> Proposals:
     """pycma's evolution strategy with its own handling of the box.
 
     It starts around the prediction with its spread, or anywhere with `spread`, and again where it has stopped.
@@ -209,21 +253,37 @@ def pycma(space: Space, rng: np.random.Generator, *, population_size: int = 0, s
     positive("spread", spread)
     d = space.dimensions
     spare = np.zeros(1 if d == 1 else 0)  # pycma cannot search a single dimension
-    spreads = np.full(d, spread) if space.start is None else np.maximum(space.start.spread, 1e-6)
-    options = {"bounds": [-1, 1], "CMA_stds": np.append(spreads, spare + spread), "verbose": -9}
+    spreads = (
+        np.full(d, spread)
+        if space.start is None
+        else np.maximum(space.start.spread, 1e-6)
+    )
+    options = {
+        "bounds": [-1, 1],
+        "CMA_stds": np.append(spreads, spare + spread),
+        "verbose": -9,
+    }
     # without a seed, and with our generator, it leaves numpy's global one alone
     options |= {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
     if population_size:
         options["popsize"] = population_size
     while True:
-        strategy = CMAEvolutionStrategy(np.append(draw_population(space, rng, 1)[0], spare), 1.0, options)
+        strategy = CMAEvolutionStrategy(
+            np.append(draw_population(space, rng, 1)[0], spare), 1.0, options
+        )
         while not strategy.stop():
             population = strategy.ask()
             costs = yield np.array(population)[:, :d]
             strategy.tell(population, costs.tolist())
 
 
-def pymoo(space: Space, rng: np.random.Generator, *, variant: Algorithm = "DE", population_size: int = 40) -> Proposals:
+def pymoo(
+    space: Space,
+    rng: np.random.Generator,
+    *,
+    variant: Algorithm = "DE",
+    population_size: int = 40,
+) -> Proposals:
     """An algorithm of pymoo, whose first population is drawn from the start.
 
     Settings:
@@ -239,13 +299,18 @@ def pymoo(space: Space, rng: np.random.Generator, *, variant: Algorithm = "DE", 
     at_least("population_size", population_size, 5)
     choices(pymoo, locals())
     hinted = Config.warnings["not_compiled"]
-    Config.warnings["not_compiled"] = False  # a hint that is printed when functions are loaded, once
+    # a hint that is printed when functions are loaded, once
+    Config.warnings["not_compiled"] = False
     try:
         FunctionLoader.get_instance()
     finally:
         Config.warnings["not_compiled"] = hinted
-    kind = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{variant.lower()}"), variant)
-    algorithm = kind(pop_size=population_size, sampling=draw_population(space, rng, population_size))
+    kind = getattr(
+        import_module(f"pymoo.algorithms.soo.nonconvex.{variant.lower()}"), variant
+    )
+    algorithm = kind(
+        pop_size=population_size, sampling=draw_population(space, rng, population_size)
+    )
     problem = Problem(n_var=space.dimensions, n_obj=1, xl=-1.0, xu=1.0)
     algorithm.setup(problem, termination=NoTermination(), seed=int(rng.integers(2**31)))
     while True:
@@ -256,7 +321,11 @@ def pymoo(space: Space, rng: np.random.Generator, *, variant: Algorithm = "DE", 
 
 
 def scipy(
-    space: Space, rng: np.random.Generator, *, variant: Minimiser = "differential_evolution", population_size: int = 40
+    space: Space,
+    rng: np.random.Generator,
+    *,
+    variant: Minimiser = "differential_evolution",
+    population_size: int = 40,
 ) -> Proposals:
     """SciPy's differential evolution, or its dual annealing, which proposes one at a time.
 
@@ -268,19 +337,33 @@ def scipy(
     """
     at_least("population_size", population_size, 5)
     choices(scipy, locals())
-    run = partial(_evolve, population_size) if variant == "differential_evolution" else _anneal
+    run = (
+        partial(_evolve, population_size)
+        if variant == "differential_evolution"
+        else _anneal
+    )
     return called_back(run, space, rng)
 
 
-def _evolve(population_size: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+def _evolve(
+    population_size: int, space: Space, rng: np.random.Generator, objective: Objective
+) -> None:
     from scipy import optimize
 
     evolve: Any = optimize.differential_evolution
     box = [(-1.0, 1.0)] * space.dimensions
-    settings = {"vectorized": True, "updating": "deferred", "polish": False, "maxiter": 10**9, "tol": 0.0}
+    settings = {
+        "vectorized": True,
+        "updating": "deferred",
+        "polish": False,
+        "maxiter": 10**9,
+        "tol": 0.0,
+    }
     while True:
         first = draw_population(space, rng, population_size)
-        evolve(lambda columns: objective(columns.T), box, init=first, rng=rng, **settings)
+        evolve(
+            lambda columns: objective(columns.T), box, init=first, rng=rng, **settings
+        )
 
 
 def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> None:
@@ -290,7 +373,13 @@ def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> Non
     box = [(-1.0, 1.0)] * space.dimensions
     while True:
         first = draw_population(space, rng, 1)[0]
-        anneal(lambda row: float(objective(row[None])[0]), box, x0=first, rng=rng, no_local_search=True)
+        anneal(
+            lambda row: float(objective(row[None])[0]),
+            box,
+            x0=first,
+            rng=rng,
+            no_local_search=True,
+        )
 
 
 class _DroppedError(BaseException):
@@ -298,7 +387,9 @@ class _DroppedError(BaseException):
 
 
 def called_back(
-    run: Callable[[Space, np.random.Generator, Objective], None], space: Space, rng: np.random.Generator
+    run: Callable[[Space, np.random.Generator, Objective], None],
+    space: Space,
+    rng: np.random.Generator,
 ) -> Proposals:
     """Yield what a library passes to an objective that it calls itself; the library runs in a thread.
 
@@ -328,7 +419,9 @@ def called_back(
     try:
         while (population := populations.get()) is not None:
             if isinstance(population, BaseException):
-                raise RuntimeError(f"the library failed: {type(population).__name__}: {population}") from population
+                raise RuntimeError(
+                    f"the library failed: {type(population).__name__}: {population}"
+                ) from population
             answers.put((yield population))
     finally:
         answers.put(None)

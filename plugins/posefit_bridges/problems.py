@@ -22,7 +22,8 @@ from posefit.arrays import Array
 from posefit.suites.functions import SUITE
 from posefit.suites.problem import Infeasible, Problem, suite
 
-FIRST_IOH_ID = 26_300  # function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
+# function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
+FIRST_IOH_ID = 26_300
 
 
 def ioh_problem(problem: Problem) -> Any:
@@ -34,13 +35,24 @@ def ioh_problem(problem: Problem) -> Any:
     from ioh import problem as problems
     from ioh.iohcpp import RealBounds, RealSolution
 
-    d, name = problem.dimension, f"{problem.suite}_{problem.function.name.replace(' ', '_')}"
+    d = problem.dimension
+    name = f"{problem.suite}_{problem.function.name.replace(' ', '_')}"
     known = problem.optimum is not None
-    optimum = RealSolution(problem.made.truth, problem.truth_cost) if known else RealSolution([], float("nan"))
+    optimum = (
+        RealSolution(problem.made.truth, problem.truth_cost)
+        if known
+        else RealSolution([], float("nan"))
+    )
 
     class IOHProblem(problems.RealSingleObjective):
         def __init__(self) -> None:
-            super().__init__(name, d, problem.instance, bounds=RealBounds(d, -1.0, 1.0), optimum=optimum)
+            super().__init__(
+                name,
+                d,
+                problem.instance,
+                bounds=RealBounds(d, -1.0, 1.0),
+                optimum=optimum,
+            )
             self.set_id(FIRST_IOH_ID + problem.id_function)
             self.problem = problem
 
@@ -67,7 +79,8 @@ def optunahub_problem(problem: Problem) -> Any:
     box: Any = {f"x{k}": FloatDistribution(-1.0, 1.0) for k in range(problem.dimension)}
 
     class OptunaHubProblem(BaseProblem):
-        search_space, directions = box, [StudyDirection.MINIMIZE]
+        search_space = box
+        directions = [StudyDirection.MINIMIZE]  # noqa: RUF012, as OptunaHub has it
 
         def __init__(self) -> None:
             self.problem = problem
@@ -87,10 +100,14 @@ def pymoo_problem(problem: Problem) -> Any:
 
     class SilhouetteProblem(PymooProblem):
         def __init__(self) -> None:
-            super().__init__(n_var=problem.dimension, n_obj=1, xl=-1.0, xu=1.0, vtype=float)
+            super().__init__(
+                n_var=problem.dimension, n_obj=1, xl=-1.0, xu=1.0, vtype=float
+            )
             self.problem = problem
 
-        def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        def _evaluate(
+            self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any
+        ) -> None:
             out["F"] = problem.evaluate(x)
 
         def _calc_pareto_front(self, *args: Any, **kwargs: Any) -> list[float] | None:
@@ -100,7 +117,10 @@ def pymoo_problem(problem: Problem) -> Any:
 
 
 def nevergrad_function(
-    function: int = 1, instance: int = 0, dimension: int = 9, infeasible: Infeasible = "repair"
+    function: int = 1,
+    instance: int = 0,
+    dimension: int = 9,
+    infeasible: Infeasible = "repair",
 ) -> Any:
     """Return a problem of the suite, by its numbers, as a function of Nevergrad: each copy of it counts for itself.
 
@@ -110,8 +130,12 @@ def nevergrad_function(
     from nevergrad.functions import ExperimentFunction
 
     class SilhouetteFunction(ExperimentFunction):
-        def __init__(self, function: int, instance: int, dimension: int, infeasible: Infeasible) -> None:
-            self.problem = suite(SUITE, function, instance, dimension, infeasible=infeasible)
+        def __init__(
+            self, function: int, instance: int, dimension: int, infeasible: Infeasible
+        ) -> None:
+            self.problem = suite(
+                SUITE, function, instance, dimension, infeasible=infeasible
+            )
             box = ng.p.Array(init=self.problem.initial_solution, lower=-1.0, upper=1.0)
             super().__init__(self.problem, box.set_name(""))
 

@@ -19,15 +19,20 @@ from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 YAW_BINS = 36  # of a full turn: two states of one pose in one bin are one
 CLIP_SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
 RECORDED_SPEED = CLIP_SPEEDS.index(1.0)
-CANDIDATE_TURN = np.radians(7.0)  # of a candidate away from its clip, to either side, or not at all
-BEAM_SHARES = 20  # similar poses with similar yaws have at most one of so many shares of a beam
+# of a candidate away from its clip, to either side, or not at all
+CANDIDATE_TURN = np.radians(7.0)
+# similar poses with similar yaws have at most one of so many shares of a beam
+BEAM_SHARES = 20
 YAW_SHARES = 4  # and one yaw's candidates at most one of so many
 JUMP_COST = 12.0  # of a step to any other pose, in units of cost over the temperature
 MAX_EXCESS_COST = 8.0  # beyond the cost of a jump; steps that cost more are left out
-TURN_SPREAD = np.radians(4.0)  # standard deviation of turns away from the clip, for a thirtieth of a second
-ROOT_SPREAD = 0.01  # metres that an aligned root is off where its clip continues, to the side or up
+# standard deviation of turns away from the clip, for a thirtieth of a second
+TURN_SPREAD = np.radians(4.0)
+# metres that an aligned root is off where its clip continues, to the side or up
+ROOT_SPREAD = 0.01
 DEPTH_SPREAD = 0.03  # metres, the same along the line of sight of a single camera
-KNOWN_ROOT_SPREAD = 0.008  # metres that a known root is off where its clip continues, in a thirtieth of a second
+# metres that a known root is off where its clip continues, in a thirtieth of a second
+KNOWN_ROOT_SPREAD = 0.008
 FAST_TURN_COST = 100.0  # of each radian beyond the fastest possible turn
 
 
@@ -35,7 +40,8 @@ class Step(NamedTuple):
     """From one frame to the next: the time between them, and which differences are usual in it."""
 
     seconds: float  # negative where a track goes back in time
-    pose: float  # metres, root mean square over joints, that a pose is off where its clip continues
+    # metres, root mean square over joints, that a pose is off where its clip continues
+    pose: float
     turn: float = TURN_SPREAD
     known_root: float = KNOWN_ROOT_SPREAD
     max_turn: float = math.inf  # radians: the fastest possible turn
@@ -43,9 +49,19 @@ class Step(NamedTuple):
     @classmethod
     def of(cls, task: Task, spread: float) -> Self:
         """Return a step of a track; `spread` is that of poses in a thirtieth of a second."""
-        seconds, intervals = (-1.0 if task.backwards else 1.0) / task.fps, 30.0 / task.fps
-        max_turn, slack = math.inf if task.fastest_turn is None else task.fastest_turn / task.fps, math.sqrt(intervals)
-        return cls(seconds, spread * slack, TURN_SPREAD * slack, KNOWN_ROOT_SPREAD * intervals, max_turn)
+        seconds = (-1.0 if task.backwards else 1.0) / task.fps
+        intervals = 30.0 / task.fps
+        max_turn = (
+            math.inf if task.fastest_turn is None else task.fastest_turn / task.fps
+        )
+        slack = math.sqrt(intervals)
+        return cls(
+            seconds,
+            spread * slack,
+            TURN_SPREAD * slack,
+            KNOWN_ROOT_SPREAD * intervals,
+            max_turn,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +78,9 @@ class Beam:
 
     def rows(self, rows: Rows) -> "Beam":
         """Return some of the states."""
-        return Beam(self.states[rows], self.yaws[rows], self.totals[rows], self.places[rows])
+        return Beam(
+            self.states[rows], self.yaws[rows], self.totals[rows], self.places[rows]
+        )
 
 
 def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, count: int) -> Rows:
@@ -73,14 +91,19 @@ def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, count: int) ->
     kinds = exemplars.coarse_groups[beam.states] * YAW_BINS + yaw_bins(beam.yaws)
     order = np.lexsort((totals, kinds))
     starts = np.flatnonzero(np.diff(kinds[order], prepend=-1))
-    ranks = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
+    ranks = np.arange(len(order)) - np.repeat(
+        starts, np.diff(np.append(starts, len(order)))
+    )
     retained = order[ranks < max(count // BEAM_SHARES, 1)]
     return retained[np.argsort(totals[retained], kind="stable")[:count]]
 
 
 def merged(*beams: Beam) -> Beam:
     """Return the states of all beams; of several of one pose in one bin of yaw the one of least total."""
-    arrays = zip(*((beam.states, beam.yaws, beam.totals, beam.places) for beam in beams), strict=True)
+    arrays = zip(
+        *((beam.states, beam.yaws, beam.totals, beam.places) for beam in beams),
+        strict=True,
+    )
     joined = Beam(*map(np.concatenate, arrays))
     keys = joined.states * YAW_BINS + yaw_bins(joined.yaws)
     order = np.lexsort((joined.totals, keys))
@@ -101,20 +124,39 @@ class Continuations(NamedTuple):
     places: Array  # (n, 3) at the recorded speed
 
     @classmethod
-    def of(cls, exemplars: Exemplars, beam: Beam, step: Step, root: Array | None) -> Self:
+    def of(
+        cls, exemplars: Exemplars, beam: Beam, step: Step, root: Array | None
+    ) -> Self:
         """Return where clips are a step later, and the costs of their distances from a known `root` (3,)."""
         codes, turns, displacements = zip(
-            *(exemplars.continuation(beam.states, step.seconds * speed) for speed in CLIP_SPEEDS), strict=True
+            *(
+                exemplars.continuation(beam.states, step.seconds * speed)
+                for speed in CLIP_SPEEDS
+            ),
+            strict=True,
         )
-        places = [beam.places + about_vertical(displacement, beam.yaws) for displacement in displacements]
+        places = [
+            beam.places + about_vertical(displacement, beam.yaws)
+            for displacement in displacements
+        ]
         costs = np.zeros((len(CLIP_SPEEDS), len(beam)))
         if root is not None:
-            squares = ((np.array(places) - root) ** 2).sum(axis=2) / (2.0 * step.known_root**2)
-            costs = np.minimum(np.log1p(squares), JUMP_COST)  # or nothing might be within reach
-        return cls(np.stack(codes), costs, beam.yaws + turns[RECORDED_SPEED], places[RECORDED_SPEED])
+            squares = ((np.array(places) - root) ** 2).sum(axis=2) / (
+                2.0 * step.known_root**2
+            )
+            # or nothing might be within reach
+            costs = np.minimum(np.log1p(squares), JUMP_COST)
+        return cls(
+            np.stack(codes),
+            costs,
+            beam.yaws + turns[RECORDED_SPEED],
+            places[RECORDED_SPEED],
+        )
 
 
-def next_states(exemplars: Exemplars, beam: Beam, step: Step, count: int, root: Array | None = None) -> Beam:
+def next_states(
+    exemplars: Exemplars, beam: Beam, step: Step, count: int, root: Array | None = None
+) -> Beam:
     """Return the states that those of a beam may reach in a step, each at its cheapest; at most `count`.
 
     A pose costs half the square of its distance, over its spread, from what its parent's clip did next at one of the
@@ -123,28 +165,49 @@ def next_states(exemplars: Exemplars, beam: Beam, step: Step, count: int, root: 
     """
     continued = Continuations.of(exemplars, beam, step, root)
     groups = exemplars.near_groups(continued.codes[RECORDED_SPEED])
-    limit, scale = beam.totals.min() + JUMP_COST + MAX_EXCESS_COST, 1.0 / (2.0 * step.pose**2)
-    costs, bins = continued.displacement_costs, yaw_bins(continued.yaws)
+    limit = beam.totals.min() + JUMP_COST + MAX_EXCESS_COST
+    scale = 1.0 / (2.0 * step.pose**2)
+    costs = continued.displacement_costs
+    bins = yaw_bins(continued.yaws)
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
         rows = np.flatnonzero(bins == number)
         states, parents, totals = kernels.cheapest_steps(
-            continued.codes, costs, beam.totals, rows, groups, exemplars.tiles, scale, limit
+            continued.codes,
+            costs,
+            beam.totals,
+            rows,
+            groups,
+            exemplars.tiles,
+            scale,
+            limit,
         )
         if len(states) > count // YAW_SHARES:
             best = np.argpartition(totals, count // YAW_SHARES)[: count // YAW_SHARES]
-            states, parents, totals = states[best], parents[best], totals[best]
+            states = states[best]
+            parents = parents[best]
+            totals = totals[best]
         by_bin.append((states, parents, totals))
-    states, parents, totals = (np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True))
+    states, parents, totals = (
+        np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True)
+    )
     turns = np.repeat([0.0, -CANDIDATE_TURN, CANDIDATE_TURN], len(states) // 3)
     totals = totals + 0.5 * (turns / step.turn) ** 2
-    candidates = merged(Beam(states, continued.yaws[parents] + turns, totals, continued.places[parents]))
-    return candidates.rows(diverse_best(exemplars, candidates, candidates.totals, count))
+    candidates = merged(
+        Beam(states, continued.yaws[parents] + turns, totals, continued.places[parents])
+    )
+    return candidates.rows(
+        diverse_best(exemplars, candidates, candidates.totals, count)
+    )
 
 
 def squared_distances(codes: Codes, others: Codes) -> Codes:
     """Return the squared distances (n, m) of codes."""
-    squares = (codes**2).sum(axis=1)[:, None] - 2.0 * (codes @ others.T) + (others**2).sum(axis=1)
+    squares = (
+        (codes**2).sum(axis=1)[:, None]
+        - 2.0 * (codes @ others.T)
+        + (others**2).sum(axis=1)
+    )
     return np.asarray(np.maximum(squares, 0.0))
 
 
@@ -153,18 +216,28 @@ def root_deviation_costs(places: Array, expected: Array, camera: Array | None) -
 
     `camera` (3,) is the position of the only camera: a silhouette says little about how far away from it a body is.
     """
-    x, y, z = (places[..., axis] - expected[..., axis] for axis in range(3))  # sums over axes of 3 take far longer
+    # sums over axes of 3 take far longer
+    x, y, z = (places[..., axis] - expected[..., axis] for axis in range(3))
     along: Array | float = 0.0
     if camera is not None:
         sights = places - camera
-        sights /= np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        sights /= np.maximum(
+            np.linalg.norm(sights, axis=1, keepdims=True), np.finfo(np.float64).tiny
+        )
         along = (x * sights[:, 0] + y * sights[:, 1] + z * sights[:, 2]) ** 2
     across = x**2 + y**2 + z**2 - along
-    return np.asarray(np.log1p(0.5 * (across / ROOT_SPREAD**2 + along / DEPTH_SPREAD**2)))
+    return np.asarray(
+        np.log1p(0.5 * (across / ROOT_SPREAD**2 + along / DEPTH_SPREAD**2))
+    )
 
 
 def transition_costs(
-    exemplars: Exemplars, before: Beam, after: Beam, step: Step, root: Array | None = None, camera: Array | None = None
+    exemplars: Exemplars,
+    before: Beam,
+    after: Beam,
+    step: Step,
+    root: Array | None = None,
+    camera: Array | None = None,
 ) -> Array:
     """Return the costs (n, m) of steps from each state of one frame to each of the next.
 
@@ -172,11 +245,16 @@ def transition_costs(
     frame, if it is known, and `camera` (3,) the position of the only camera.
     """
     continued = Continuations.of(exemplars, before, step, root)
-    codes, double = exemplars.codes[after.states], 2.0 * step.pose**2
+    codes = exemplars.codes[after.states]
+    double = 2.0 * step.pose**2
     speeds = zip(continued.codes, continued.displacement_costs, strict=True)
-    squares = [squared_distances(code, codes) / double + cost[:, None] for code, cost in speeds]
+    squares = [
+        squared_distances(code, codes) / double + cost[:, None] for code, cost in speeds
+    ]
     costs: Array = np.minimum.reduce(squares)  # TOYAMA2001 (dynamics)
-    costs = costs + 0.5 * (wrapped(after.yaws - continued.yaws[:, None]) / step.turn) ** 2
+    costs = (
+        costs + 0.5 * (wrapped(after.yaws - continued.yaws[:, None]) / step.turn) ** 2
+    )
     if root is None:
         costs += root_deviation_costs(after.places, continued.places[:, None], camera)
     costs = np.minimum(costs, JUMP_COST)

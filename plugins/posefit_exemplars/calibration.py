@@ -21,14 +21,28 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate
 
-MIN_COST, MIN_SPREAD = 0.1, 0.002  # per cent, and metres
+# per cent, and metres
+MIN_COST = 0.1
+MIN_SPREAD = 0.002
 
 
-def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int) -> Array:
+def evidence(
+    skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int
+) -> Array:
     """Return the predictors (4,) of the error of a pose (66,): 1, logarithms of cost and spread, several cameras."""
-    joints, reported = skeleton.joints(posterior.poses), skeleton.joints(pose)
-    spread = float(posterior.weights @ np.linalg.norm(joints - reported, axis=2).mean(axis=1))
-    return np.array([1.0, math.log(max(cost, MIN_COST)), math.log(max(spread, MIN_SPREAD)), float(cameras > 1)])
+    joints = skeleton.joints(posterior.poses)
+    reported = skeleton.joints(pose)
+    spread = float(
+        posterior.weights @ np.linalg.norm(joints - reported, axis=2).mean(axis=1)
+    )
+    return np.array(
+        [
+            1.0,
+            math.log(max(cost, MIN_COST)),
+            math.log(max(spread, MIN_SPREAD)),
+            float(cameras > 1),
+        ]
+    )
 
 
 def none_features(log: float) -> Array:
@@ -57,35 +71,63 @@ class Calibration:
         """Return the recalibration of a frame, from the logarithm of its expected error."""
         spreads = math.exp(log) * self.joint_spreads, math.exp(log) * self.angle_spreads
         none = float(logistic(self.none @ none_features(log)))
-        return Recalibration(*spreads, self.joint_factors, self.angle_factors, sharpness=self.sharpness, none=none)
+        return Recalibration(
+            *spreads,
+            self.joint_factors,
+            self.angle_factors,
+            sharpness=self.sharpness,
+            none=none,
+        )
 
 
 @cache
 def stored_calibration() -> Calibration:
     """Return the calibration that was fitted on the library's own people by `docs/studies/posterior.py`."""
-    stored = json.loads(files("posefit_exemplars").joinpath("calibration.json").read_text("utf-8"))
+    stored = json.loads(
+        files("posefit_exemplars").joinpath("calibration.json").read_text("utf-8")
+    )
     (low, high), sharpness = stored.pop("range"), stored.pop("sharpness")
-    arrays = {name: np.array(values) for name, values in stored.items() if name != "temperature"}
+    arrays = {
+        name: np.array(values)
+        for name, values in stored.items()
+        if name != "temperature"
+    }
     return Calibration(range=(low, high), sharpness=sharpness, **arrays)
 
 
-def recalibrated(posterior: Posterior, pose: Array, cost: float, frame_costs: FrameCosts) -> Posterior:
+def recalibrated(
+    posterior: Posterior, pose: Array, cost: float, frame_costs: FrameCosts
+) -> Posterior:
     """Return the posterior around a reported pose (66,) and its cost, recalibrated; the cost of nothing is infinite."""
     calibration = stored_calibration()
     cost = cost if frame_costs.usable else math.inf
-    values = evidence(frame_costs.skeleton, posterior, pose, cost, frame_costs.camera_count)
-    return replace(posterior, recalibration=calibration.recalibration(calibration.log(values)))
+    values = evidence(
+        frame_costs.skeleton, posterior, pose, cost, frame_costs.camera_count
+    )
+    return replace(
+        posterior, recalibration=calibration.recalibration(calibration.log(values))
+    )
 
 
 def reported(estimate: Estimate) -> Frame:
     """Return the frame of an estimate: its cost, its posterior, and what shows whether it is lost or exchanged."""
     assert estimate.paths is not None
-    pose, place, frame_costs = estimate.pose, estimate.place, estimate.frame_costs
+    pose = estimate.pose
+    place = estimate.place
+    frame_costs = estimate.frame_costs
     cost, areas = frame_costs.cost_and_areas(pose, place)
-    mirror_costs = frame_costs.mirror_costs(pose, place) if frame_costs.usable else np.empty(0)
+    mirror_costs = (
+        frame_costs.mirror_costs(pose, place) if frame_costs.usable else np.empty(0)
+    )
     sides = frame_costs.side_odds(pose, place)
-    details = {"usable": frame_costs.usable, "sides": sides, "mirror_costs": mirror_costs}
+    details = {
+        "usable": frame_costs.usable,
+        "sides": sides,
+        "mirror_costs": mirror_costs,
+    }
     posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, frame_costs)
     evaluations = int(np.ceil(estimate.evaluations)) + 1 + len(mirror_costs)
     trace = np.array([[evaluations, cost]])
-    return Frame(pose, place, cost, areas, evaluations, trace, posterior, details=details)
+    return Frame(
+        pose, place, cost, areas, evaluations, trace, posterior, details=details
+    )

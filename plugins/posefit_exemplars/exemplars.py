@@ -19,10 +19,12 @@ from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars import kernels
 
-Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joints of their poses, root mean square
+# (n, D): two of them are as far apart as the joints of their poses, root mean square
+Codes = NDArray[np.float32]
 Rows = NDArray[np.int64]
 
-MIN_FRAME_DISTANCE = 0.02  # metres between the codes of two frames of a clip, or of the centres of two groups
+# metres between the codes of two frames of a clip, or of the centres of two groups
+MIN_FRAME_DISTANCE = 0.02
 GROUPS = 1000  # of similar poses; fewer where there are fewer poses
 COARSE_GROUPS = 40
 NEAR_GROUPS = 4  # that are searched for the poses nearest to another one
@@ -38,13 +40,21 @@ class Coding(NamedTuple):
     @classmethod
     def of(cls, skeleton: Skeleton, clips: Iterable[Codes]) -> Self:
         """Return the components of the `facing_joints` (K, 81) of all clips, one after the other."""
-        count, total, squares = 0, np.zeros(3 * len(JOINTS)), np.zeros((3 * len(JOINTS), 3 * len(JOINTS)))
+        count = 0
+        total = np.zeros(3 * len(JOINTS))
+        squares = np.zeros((3 * len(JOINTS), 3 * len(JOINTS)))
         for clip in clips:
             joints = clip.astype(np.float64)
-            count, total, squares = count + len(joints), total + joints.sum(axis=0), squares + joints.T @ joints
+            count = count + len(joints)
+            total = total + joints.sum(axis=0)
+            squares = squares + joints.T @ joints
         mean = total / count
         _, axes = np.linalg.eigh(squares - count * np.outer(mean, mean))
-        return cls(skeleton, mean, axes[:, : -kernels.DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)))
+        return cls(
+            skeleton,
+            mean,
+            axes[:, : -kernels.DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)),
+        )
 
     def of_joints(self, joints: Codes) -> Codes:
         """Return the codes (K, D) of `facing_joints` (K, 81)."""
@@ -69,7 +79,8 @@ def farthest_first(codes: Codes, max_groups: int) -> tuple[Rows, Rows]:
     """
     lengths = (codes**2).sum(axis=1)
     nearest = np.full(len(codes), np.inf, dtype=np.float32)
-    groups, centres = np.zeros(len(codes), dtype=np.int64), [0]
+    groups = np.zeros(len(codes), dtype=np.int64)
+    centres = [0]
     while True:
         squares = lengths - 2.0 * (codes @ codes[centres[-1]]) + lengths[centres[-1]]
         nearer = squares < nearest
@@ -90,13 +101,22 @@ class Tiles(NamedTuple):
     @classmethod
     def of(cls, codes: Codes, members: Rows, starts: Rows) -> Self:
         """Return the tiles of the codes of `members` (K,), in groups that begin at `starts` (G + 1,)."""
-        sizes, lanes = np.diff(starts), kernels.LANES
+        sizes = np.diff(starts)
+        lanes = kernels.LANES
         tiles = np.append(0, np.cumsum(-(-sizes // lanes)))
-        places = np.arange(len(members)) + np.repeat(lanes * tiles[:-1] - starts[:-1], sizes)
+        places = np.arange(len(members)) + np.repeat(
+            lanes * tiles[:-1] - starts[:-1], sizes
+        )
         states = np.zeros(lanes * tiles[-1], np.int64)
         filled = np.full((len(states), codes.shape[1]), np.inf, codes.dtype)
         states[places], filled[places] = members, codes[members]
-        return cls(np.ascontiguousarray(filled.reshape(-1, lanes, codes.shape[1]).transpose(0, 2, 1)), states, tiles)
+        return cls(
+            np.ascontiguousarray(
+                filled.reshape(-1, lanes, codes.shape[1]).transpose(0, 2, 1)
+            ),
+            states,
+            tiles,
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,34 +139,53 @@ class Exemplars:
     coding: Coding
 
     @classmethod
-    def of(cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False) -> Self:
+    def of(
+        cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False
+    ) -> Self:
         """Return the states of motions as the person with this skeleton would move, and of their mirror images."""
         if not motions:
             raise InputError("exemplars must have motions to learn from, got none")
         for motion in motions:
             if len(motion) < 2:
-                raise InputError(f"{motion.name} must have at least 2 frames to be followed, got 1")
+                raise InputError(
+                    f"{motion.name} must have at least 2 frames to be followed, got 1"
+                )
         joints = [facing_joints(skeleton, motion.poses) for motion in motions]
         if mirrored:
-            joints += [facing_joints(skeleton, mirror_image(motion).poses) for motion in motions]
+            joints += [
+                facing_joints(skeleton, mirror_image(motion).poses)
+                for motion in motions
+            ]
         coding = Coding.of(skeleton, joints)
         thinned: list[tuple[Array, Codes, Array, Array]] = []
         for number, clip_joints in enumerate(joints):
-            codes, motion = coding.of_joints(clip_joints), motions[number % len(motions)]
+            codes = coding.of_joints(clip_joints)
+            motion = motions[number % len(motions)]
             rows = kernels.frames_apart(codes, np.float32(MIN_FRAME_DISTANCE**2))
-            clip = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
+            clip = replace(
+                motion, poses=motion.poses[rows], translations=motion.translations[rows]
+            )
             clip = clip if number < len(motions) else mirror_image(clip)
-            thinned.append((clip.poses, codes[rows], clip.translations, rows / clip.fps))
-        poses, codes, places, times = (np.concatenate(parts) for parts in zip(*thinned, strict=True))
+            thinned.append(
+                (clip.poses, codes[rows], clip.translations, rows / clip.fps)
+            )
+        poses, codes, places, times = (
+            np.concatenate(parts) for parts in zip(*thinned, strict=True)
+        )
         ends = np.cumsum([len(frames) for frames, *_ in thinned])
         numbers = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
         centres, groups = farthest_first(codes, GROUPS)
         _, coarse_groups = farthest_first(codes, COARSE_GROUPS)
         members = np.argsort(groups, kind="stable")
         starts = np.searchsorted(groups[members], np.arange(len(centres) + 1))
-        tiles = Tiles.of(codes, members, starts), Tiles.of(codes, centres, np.array([0, len(centres)]))
+        tiles = (
+            Tiles.of(codes, members, starts),
+            Tiles.of(codes, centres, np.array([0, len(centres)])),
+        )
         states = poses, codes, places, times, numbers, ends - 1
-        return cls(*states, centres, groups, coarse_groups, members, starts, *tiles, coding)
+        return cls(
+            *states, centres, groups, coarse_groups, members, starts, *tiles, coding
+        )
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -173,9 +212,16 @@ class Exemplars:
         def interpolated(values: Array | Codes) -> Array:
             return np.asarray((1.0 - share) * values[before] + share * values[after])
 
-        yaws, first_yaws = interpolated(self.poses[:, :1])[:, 0], self.poses[states, 0]
-        displacements = about_vertical(interpolated(self.places) - self.places[states], -first_yaws)
-        return interpolated(self.codes).astype(np.float32), yaws - first_yaws, displacements
+        yaws = interpolated(self.poses[:, :1])[:, 0]
+        first_yaws = self.poses[states, 0]
+        displacements = about_vertical(
+            interpolated(self.places) - self.places[states], -first_yaws
+        )
+        return (
+            interpolated(self.codes).astype(np.float32),
+            yaws - first_yaws,
+            displacements,
+        )
 
     def draw(self, count: int, rng: np.random.Generator) -> Rows:
         """Return poses drawn at random, of a group in proportion to the square root of its size.
@@ -184,19 +230,28 @@ class Exemplars:
         """
         sizes = np.diff(self.starts)
         ends = np.cumsum(np.sqrt(sizes))
-        group = np.minimum(np.searchsorted(ends, rng.uniform(0.0, ends[-1], count), "right"), len(sizes) - 1)
-        return self.members[self.starts[group] + (rng.random(count) * sizes[group]).astype(np.int64)]
+        group = np.minimum(
+            np.searchsorted(ends, rng.uniform(0.0, ends[-1], count), "right"),
+            len(sizes) - 1,
+        )
+        return self.members[
+            self.starts[group] + (rng.random(count) * sizes[group]).astype(np.int64)
+        ]
 
     def nearest(self, poses: Array, count: int) -> tuple[Rows, Codes]:
         """Return the states nearest to `poses` (n, 66) in the groups near them; see `kernels.nearest_codes`."""
         codes = self.coding.of_poses(poses)
-        states, squares = kernels.nearest_codes(codes, self.near_groups(codes), self.tiles, count)
+        states, squares = kernels.nearest_codes(
+            codes, self.near_groups(codes), self.tiles, count
+        )
         return states, squares
 
     def near_groups(self, codes: Codes) -> Rows:
         """Return the few groups (n, g) whose centres are nearest to some codes (n, D)."""
         count = min(NEAR_GROUPS, len(self.centres))
-        states: Rows = kernels.nearest_codes(codes, np.zeros((len(codes), 1), np.int64), self.centre_tiles, count)[0]
+        states: Rows = kernels.nearest_codes(
+            codes, np.zeros((len(codes), 1), np.int64), self.centre_tiles, count
+        )[0]
         return self.groups[states]
 
     def nearby_mean(self, poses: Array, count: int, spread: float) -> Array:
@@ -225,7 +280,9 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton) -> Exemplars:
     The latest are cached.
     """
     global _latest
-    digest = hashlib.blake2b(repr([(motion.name, motion.fps, len(motion)) for motion in motions]).encode())
+    digest = hashlib.blake2b(
+        repr([(motion.name, motion.fps, len(motion)) for motion in motions]).encode()
+    )
     digest.update(skeleton.axes.tobytes())
     for motion in motions:
         for array in (motion.skeleton.axes, motion.poses, motion.translations):
@@ -240,7 +297,11 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton) -> Exemplars:
 
 def exemplars_for(task: Task) -> Exemplars:
     """Return the states that a task may learn from; one set of them serves both directions."""
-    training = [motion.reversed() for motion in task.training] if task.backwards else task.training
+    training = (
+        [motion.reversed() for motion in task.training]
+        if task.backwards
+        else task.training
+    )
     return exemplars_of(training, task.body.skeleton)
 
 
@@ -248,11 +309,14 @@ def mirror_image(motion: Motion) -> Motion:
     """Return a motion mirrored in the plane x = 0: left and right are exchanged."""
     poses = symmetry.mirrored_poses(motion.skeleton, motion.poses)
     poses[:, 0] *= -1.0
-    return replace(motion, poses=poses, translations=motion.translations * [-1.0, 1.0, 1.0])
+    return replace(
+        motion, poses=poses, translations=motion.translations * [-1.0, 1.0, 1.0]
+    )
 
 
 def about_vertical(vectors: Array, yaws: Array) -> Array:
     """Return vectors (n, 3) turned about the vertical by yaws (n,)."""
-    sine, cosine = np.sin(yaws), np.cos(yaws)
+    sine = np.sin(yaws)
+    cosine = np.cos(yaws)
     x, y, z = vectors.T
     return np.column_stack([cosine * x + sine * z, y, cosine * z - sine * x])

@@ -27,7 +27,8 @@ def lower_distances(distances, start, code, tile):
 def frames_apart(codes, min_square):
     """Return the first frame of a clip with codes (T, D), those far from the latest returned one, and the last."""
     frames = np.zeros(len(codes), np.int64)
-    count, last = 1, len(codes) - 1
+    count = 1
+    last = len(codes) - 1
     for k in range(1, len(codes)):
         square = np.float32(0.0)
         for d in range(codes.shape[1]):
@@ -54,9 +55,15 @@ def nearest_codes(codes, groups, tiles, count):
                     rank = count - 1
                     if distances[lane] < squares[i, rank]:
                         while rank > 0 and distances[lane] < squares[i, rank - 1]:
-                            squares[i, rank], states[i, rank] = squares[i, rank - 1], states[i, rank - 1]
+                            squares[i, rank], states[i, rank] = (
+                                squares[i, rank - 1],
+                                states[i, rank - 1],
+                            )
                             rank -= 1
-                        squares[i, rank], states[i, rank] = distances[lane], tiles.states[LANES * t + lane]
+                        squares[i, rank], states[i, rank] = (
+                            distances[lane],
+                            tiles.states[LANES * t + lane],
+                        )
     return states, squares
 
 
@@ -68,7 +75,8 @@ def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit
     (n, g) costs the squared distance times `scale`, at the cheapest speed. Totals (n,) with a step are below `limit`.
     """
     best = np.full(len(tiles.states), np.inf)
-    parents, reached = np.empty(len(best), np.int64), np.empty(len(best), np.int64)
+    parents = np.empty(len(best), np.int64)
+    reached = np.empty(len(best), np.int64)
     distances = np.empty(LANES, np.float32)
     count = 0
     for row in rows:
@@ -83,7 +91,8 @@ def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit
                     lower_distances(distances, start, codes[speed, row], tiles.codes[t])
                 for lane in range(LANES):
                     if distances[lane] < farthest:
-                        total, place = totals[row] + scale * distances[lane], LANES * t + lane
+                        total = totals[row] + scale * distances[lane]
+                        place = LANES * t + lane
                         if total < best[place]:
                             if best[place] == np.inf:
                                 reached[count] = place

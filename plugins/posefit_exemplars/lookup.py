@@ -34,11 +34,15 @@ YAW_STEP = 2.0 * np.pi / YAWS
 ELEVATION = np.radians(10.0)  # between the tables of cameras that look down, or up
 DISTANCE = 4.3  # metres from which a camera of the table sees the person
 FIELD_OF_VIEW = 0.85  # radians, of that camera
-PICTURE, SIDE = 64, 16  # pixels of its pictures, and of the small ones that codes are made of
+# pixels of its pictures, and of the small ones that codes are made of
+PICTURE = 64
+SIDE = 16
 DIMENSIONS = 64  # of a code
 CANDIDATES = 512  # that are nearest in the table, whose costs are counted
 TEMPERATURE = 4.0  # divides their costs
-MAX_DISTANCE = 16.0  # squared, of codes, to the nearest: 99 % of damaged silhouettes of unknown people are nearer
+# squared, of codes, to the nearest: 99 % of damaged silhouettes of unknown people are
+# nearer
+MAX_DISTANCE = 16.0
 YAW_TOLERANCE = np.radians(50.0)  # of a known yaw, to either side
 RNG_STREAM_TABLE = 61
 Codes = NDArray[np.float32]  # (n, DIMENSIONS)
@@ -59,12 +63,21 @@ class Table(NamedTuple):
         body = Body.of(exemplars.coding.skeleton)
         states = np.arange(len(exemplars))
         if len(states) > POSES:
-            states = np.unique(exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE)))
+            states = np.unique(
+                exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE))
+            )
         yaws = np.tile(YAW_STEP * np.arange(YAWS), len(states))
         poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
-        camera, small = looking_at(0.0, elevation), list[Codes]()
+        camera = looking_at(0.0, elevation)
+        small = list[Codes]()
         for part in np.array_split(poses, YAWS):  # pictures take memory
-            small.append(small_pictures(masks_of(body, camera, part, -body.skeleton.joints(part).mean(axis=1))))
+            small.append(
+                small_pictures(
+                    masks_of(
+                        body, camera, part, -body.skeleton.joints(part).mean(axis=1)
+                    )
+                )
+            )
         pixels = np.concatenate(small)
         mean = pixels.mean(axis=0)
         _, axes = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
@@ -84,10 +97,20 @@ _table = lru_cache(maxsize=4)(Table.of)
 
 def looking_at(azimuth: float, elevation: float) -> Camera:
     """Return the camera of the table: it looks at the origin from an azimuth and an elevation, radians."""
-    level = Camera.around(np.zeros(3), azimuth, DISTANCE, (PICTURE, PICTURE), FIELD_OF_VIEW)
-    sine, cosine = np.sin(elevation), np.cos(elevation)
+    level = Camera.around(
+        np.zeros(3), azimuth, DISTANCE, (PICTURE, PICTURE), FIELD_OF_VIEW
+    )
+    sine = np.sin(elevation)
+    cosine = np.cos(elevation)
     tilt = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
-    return Camera(PICTURE, PICTURE, level.focal, level.centre, tilt @ level.rotation, level.translation)
+    return Camera(
+        PICTURE,
+        PICTURE,
+        level.focal,
+        level.centre,
+        tilt @ level.rotation,
+        level.translation,
+    )
 
 
 def small_pictures(masks: Mask) -> Codes:
@@ -97,8 +120,11 @@ def small_pictures(masks: Mask) -> Codes:
         left, top, width, height = cv2.boundingRect(mask)
         side = max(width, height, 1)
         square = np.zeros((side, side), np.uint8)
-        row, column = (side - height) // 2, (side - width) // 2
-        square[row : row + height, column : column + width] = 255 * mask[top : top + height, left : left + width]
+        row = (side - height) // 2
+        column = (side - width) // 2
+        square[row : row + height, column : column + width] = (
+            255 * mask[top : top + height, left : left + width]
+        )
         cv2.resize(square, (SIDE, SIDE), dst=pixels, interpolation=cv2.INTER_AREA)
     return (small.reshape(len(masks), -1) / np.float32(255.0)).astype(np.float32)
 
@@ -110,20 +136,32 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
     """
     mask = without_small_pieces(silhouette.mask)
     left, top, right, bottom = box_of(mask)
-    corners = np.array([[left, top], [right, top], [left, bottom], [right, bottom]], dtype=np.float64)
-    rays = np.column_stack([(corners - camera.centre) / camera.focal, np.ones(4)]) @ camera.rotation
+    corners = np.array(
+        [[left, top], [right, top], [left, bottom], [right, bottom]], dtype=np.float64
+    )
+    rays = (
+        np.column_stack([(corners - camera.centre) / camera.focal, np.ones(4)])
+        @ camera.rotation
+    )
     rays /= np.linalg.norm(rays, axis=1)[:, None]
     x, y, z = ray = rays.sum(axis=0) / np.linalg.norm(rays.sum(axis=0))
-    azimuth, elevation = float(np.arctan2(-x, -z)), float(np.arcsin(-y))
+    azimuth = float(np.arctan2(-x, -z))
+    elevation = float(np.arcsin(-y))
     straight = looking_at(azimuth, elevation)
     half = float(np.arccos(np.clip(rays @ ray, -1.0, 1.0)).max())
     focal = 0.5 * PICTURE / np.tan(min(1.05 * half, 1.2))
     to_picture = pinhole_matrix([focal, focal], [PICTURE / 2.0, PICTURE / 2.0])
     from_image = np.linalg.inv(pinhole_matrix(camera.focal, camera.centre))
     homography = to_picture @ straight.rotation @ camera.rotation.T @ from_image
-    shift = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])  # OpenCV's pixel centres are whole numbers
+    # OpenCV's pixel centres are whole numbers
+    shift = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
     homography = np.linalg.inv(shift) @ homography @ shift
-    picture = cv2.warpPerspective(255 * mask.astype(np.uint8), homography, (PICTURE, PICTURE), flags=cv2.INTER_AREA)
+    picture = cv2.warpPerspective(
+        255 * mask.astype(np.uint8),
+        homography,
+        (PICTURE, PICTURE),
+        flags=cv2.INTER_AREA,
+    )
     return picture > 127, azimuth, elevation
 
 
@@ -141,12 +179,18 @@ class Lookup:
         The distance is squared, and the mean over the cameras that show the whole person; None where none does. Yaws
         are near a known one.
         """
-        total, views = np.zeros(1), list[tuple[Table, float]]()
-        for camera, silhouette in zip(self.task.cameras, observation.silhouettes, strict=True):
+        total = np.zeros(1)
+        views = list[tuple[Table, float]]()
+        for camera, silhouette in zip(
+            self.task.cameras, observation.silhouettes, strict=True
+        ):
             if np.isfinite(silhouette.extent).all():
                 picture, azimuth, elevation = straightened(camera, silhouette)
                 with uncounted():  # a table is learned, once a process
-                    table = _table(self.exemplars, float(np.round(elevation / ELEVATION) * ELEVATION))
+                    table = _table(
+                        self.exemplars,
+                        float(np.round(elevation / ELEVATION) * ELEVATION),
+                    )
                 views.append((table, azimuth))  # whose yaws count from the camera
                 turn = round((azimuth - views[0][1]) / YAW_STEP)
                 total = total + np.roll(table.distances(picture), turn, axis=1)
@@ -156,7 +200,8 @@ class Lookup:
         distances = total / len(views)
         if yaw is not None:
             distances[:, np.abs(wrapped(yaws - yaw)) > YAW_TOLERANCE] = np.inf
-        pairs = distances.reshape(len(distances), -1, 2)  # of two yaws side by side the better one is an alternative
+        # of two yaws side by side the better one is an alternative
+        pairs = distances.reshape(len(distances), -1, 2)
         better = pairs.argmin(axis=2)
         flat = pairs.min(axis=2).ravel()
         count = min(count, len(flat))
@@ -170,10 +215,15 @@ class Lookup:
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return the poses that a frame may show, with weights; None where its silhouettes are like none of them."""
         known = self.task.yaw if observation.yaw is None else observation.yaw
-        nearest = self.nearest(observation, CANDIDATES, known) if observation.usable else None
+        nearest = (
+            self.nearest(observation, CANDIDATES, known) if observation.usable else None
+        )
         if nearest is None or nearest[2] > MAX_DISTANCE:
             return None
-        frame_costs, poses = FrameCosts(self.task, observation), self.exemplars.with_yaws(*nearest[:2])
-        places = frame_costs.aligned(poses, np.repeat(self.task.anchor[None], len(poses), axis=0))
+        frame_costs = FrameCosts(self.task, observation)
+        poses = self.exemplars.with_yaws(*nearest[:2])
+        places = frame_costs.aligned(
+            poses, np.repeat(self.task.anchor[None], len(poses), axis=0)
+        )
         costs = frame_costs.small(poses, places)
         return Posterior(poses, places, np.exp((costs.min() - costs) / TEMPERATURE))

@@ -27,63 +27,107 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import second_side
 
 LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
-MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which one camera's landmarks tell left from right
+# the least mean logarithm of the odds at which one camera's landmarks tell left from
+# right
+MIN_SIDE_ODDS = 0.4
 MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # that the means reach back
 
 
 # The evidence of a frame, each with the scale on which it enters the models.
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
-    "cost": lambda value: math.log(max(value, 0.0) + 1.0),  # of the reported pose, where the person is visible
-    "reflected": math.log,  # the least cost of poses reflected along a line of sight, over the cost
+    # of the reported pose, where the person is visible
+    "cost": lambda value: math.log(max(value, 0.0) + 1.0),
+    # the least cost of poses reflected along a line of sight, over the cost
+    "reflected": math.log,
     "mirrored": math.log,  # the cost of the mirror image, over the cost
-    "farthest": lambda value: math.log(max(value, 0.0) + 0.01),  # metres to the farthest sampled track
+    # metres to the farthest sampled track
+    "farthest": lambda value: math.log(max(value, 0.0) + 0.01),
     "second": float,  # weight of the tracks that have left and right exchanged
     "ahead": float,  # metres a second that the root moves in the direction it faces
     "speed": float,  # metres a second that it moves in any direction
-    "across": float,  # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
-    "views": math.log2,  # cameras that show something of the person, at most `MAX_VIEWS`
+    # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
+    "across": float,
+    # cameras that show something of the person, at most `MAX_VIEWS`
+    "views": math.log2,
 }
-DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}  # before the first value; of other evidence 0
+# before the first value; of other evidence 0
+DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}
 MAX_VIEWS = 4  # nothing was fitted with more cameras
 MIRROR_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
 MOTION_SECONDS = 0.5  # over which the root's motion is measured
 MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence
-NAMES = (*EVIDENCE, *(f"{name}, {reach}" for reach in MEAN_SECONDS for name in EVIDENCE))  # of features
+# of features
+NAMES = (
+    *EVIDENCE,
+    *(f"{name}, {reach}" for reach in MEAN_SECONDS for name in EVIDENCE),
+)
 
 
-def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> dict[str, float]:
+def evidence_of(
+    skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]
+) -> dict[str, float]:
     """Return the values of `EVIDENCE` that a frame with a posterior has by itself."""
     assert frame.posterior is not None
-    distances = joint_distances(skeleton.joints(frame.posterior.poses), skeleton.joints(frame.pose))
-    visible = [camera for camera, counts in zip(cameras, frame.areas, strict=True) if counts.any()] or cameras
+    distances = joint_distances(
+        skeleton.joints(frame.posterior.poses), skeleton.joints(frame.pose)
+    )
+    visible = [
+        camera
+        for camera, counts in zip(cameras, frame.areas, strict=True)
+        if counts.any()
+    ] or cameras
     values = {
         "farthest": float(distances.mean(axis=1).max()),
         "second": second_side(skeleton, frame.posterior, frame.pose),
-        "across": abs(math.sin(frame.pose[0] - facing(visible[0], frame.translation))) if len(visible) == 1 else 0.0,
+        "across": abs(math.sin(frame.pose[0] - facing(visible[0], frame.translation)))
+        if len(visible) == 1
+        else 0.0,
         "views": float(min(len(visible), MAX_VIEWS)),
     }
     if frame.details["usable"]:
-        mirrored, *reflected = (frame.details["mirror_costs"] + MIRROR_COST_OFFSET) / (frame.cost + MIRROR_COST_OFFSET)
-        values |= {"cost": frame.cost, "reflected": float(min(reflected)), "mirrored": float(mirrored)}
+        mirrored, *reflected = (frame.details["mirror_costs"] + MIRROR_COST_OFFSET) / (
+            frame.cost + MIRROR_COST_OFFSET
+        )
+        values |= {
+            "cost": frame.cost,
+            "reflected": float(min(reflected)),
+            "mirrored": float(mirrored),
+        }
     return values
 
 
-def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False) -> dict[str, float]:
+def root_motion(
+    places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False
+) -> dict[str, float]:
     """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places."""
     if len(places) < 2:
         return {}
-    velocity = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
-    ahead, speed = float(velocity @ [math.sin(yaw), math.cos(yaw)]), float(np.linalg.norm(velocity))
-    return {"ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED), "speed": min(speed, MAX_SPEED)}
+    velocity = (
+        (places[-1] - places[0])[[0, 2]]
+        * fps
+        / (len(places) - 1)
+        * (-1.0 if backwards else 1.0)
+    )
+    ahead = float(velocity @ [math.sin(yaw), math.cos(yaw)])
+    speed = float(np.linalg.norm(velocity))
+    return {
+        "ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED),
+        "speed": min(speed, MAX_SPEED),
+    }
 
 
 class EvidenceMeans:
     """The evidence of the frames so far, and its exponentially weighted means."""
 
     def __init__(self, fps: float) -> None:
-        self._decays = np.exp([[-1.0 / (seconds * fps)] for seconds in MEAN_SECONDS.values()])
+        self._decays = np.exp(
+            [[-1.0 / (seconds * fps)] for seconds in MEAN_SECONDS.values()]
+        )
         self._latest: dict[str, float] = {}
-        self._sums, self._weight = np.zeros((len(MEAN_SECONDS), len(EVIDENCE))), np.zeros((len(MEAN_SECONDS), 1))
+        self._sums, self._weight = (
+            np.zeros((len(MEAN_SECONDS), len(EVIDENCE))),
+            np.zeros((len(MEAN_SECONDS), 1)),
+        )
 
     def features(self, values: Mapping[str, float]) -> Array:
         """Return the evidence of the next frame and its means so far (3 E,), on the scale that was fitted.
@@ -91,8 +135,14 @@ class EvidenceMeans:
         A missing value is that of the frame before, at first that of `DEFAULTS`.
         """
         self._latest |= values
-        now = np.array([scale(self._latest.get(name, DEFAULTS.get(name, 0.0))) for name, scale in EVIDENCE.items()])
-        self._sums, self._weight = self._sums * self._decays + now, self._weight * self._decays + 1.0
+        now = np.array(
+            [
+                scale(self._latest.get(name, DEFAULTS.get(name, 0.0)))
+                for name, scale in EVIDENCE.items()
+            ]
+        )
+        self._sums = self._sums * self._decays + now
+        self._weight = self._weight * self._decays + 1.0
         return np.concatenate([now, (self._sums / self._weight).ravel()])
 
 
@@ -111,7 +161,11 @@ class LogisticModel(NamedTuple):
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """Return the model that JSON holds."""
         rows = [NAMES.index(name) for name in stored["weights"]]
-        return cls(rows, np.array(list(stored["weights"].values()), dtype=np.float64), float(stored["bias"]))
+        return cls(
+            rows,
+            np.array(list(stored["weights"].values()), dtype=np.float64),
+            float(stored["bias"]),
+        )
 
 
 class FailureClassifier(NamedTuple):
@@ -124,7 +178,9 @@ class FailureClassifier(NamedTuple):
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """Return the models that JSON holds."""
-        lost, sides = (LogisticModel.from_dict(stored[name]) for name in ("lost", "sides"))
+        lost, sides = (
+            LogisticModel.from_dict(stored[name]) for name in ("lost", "sides")
+        )
         return cls(lost, sides, float(stored["unknown"]))
 
 
@@ -135,15 +191,21 @@ def stored_classifier() -> FailureClassifier:
     return FailureClassifier.from_dict(json.loads(stored))
 
 
-def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:
+def with_failure_probabilities(
+    frames: Iterable[Frame], task: Task, classifier: FailureClassifier
+) -> Iterator[Frame]:
     """Yield frames with the probabilities that they are lost, or have sides exchanged."""
-    means, side_sums, decay = EvidenceMeans(task.fps), np.zeros(3), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
+    means = EvidenceMeans(task.fps)
+    side_sums = np.zeros(3)
+    decay = math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         assert frame.posterior is not None
         places.append(frame.translation)
         evidence = evidence_of(task.body.skeleton, frame, task.cameras)
-        evidence |= root_motion(places, float(frame.pose[0]), task.fps, backwards=task.backwards)
+        evidence |= root_motion(
+            places, float(frame.pose[0]), task.fps, backwards=task.backwards
+        )
         features = means.features(evidence)
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
@@ -151,10 +213,15 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         if (odds := frame.details.get("sides")) is not None:
             side_sums = decay * side_sums + [*odds, 1.0]
             legs, arms, count = side_sums
-            if len(task.cameras) == 1:  # its landmarks are better evidence than its silhouettes
+            # its landmarks are better evidence than its silhouettes
+            if len(task.cameras) == 1:
                 known = legs + arms >= MIN_SIDE_ODDS * count
-            known = bool(known and legs >= 0.0)  # however many cameras agree: arms may have sides that legs have not
-        recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=float(known))
-        posterior, lost = replace(frame.posterior, recalibration=recalibration), classifier.lost.probability(features)
+            # however many cameras agree: arms may have sides that legs have not
+            known = bool(known and legs >= 0.0)
+        recalibration = replace(
+            frame.posterior.recalibration or Recalibration(), second_side=float(known)
+        )
+        posterior = replace(frame.posterior, recalibration=recalibration)
+        lost = classifier.lost.probability(features)
         details = {**frame.details, "evidence": evidence, "exchanged": exchanged}
         yield replace(frame, lost=lost, posterior=posterior, details=details)

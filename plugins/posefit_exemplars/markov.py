@@ -18,8 +18,11 @@ from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.exemplars import Rows
 
-MODE_DISTANCE = 0.12  # metres, root mean square over joints: samples that are nearer are of the reported pose's mode
-MAX_KERNEL_COST = 80.0  # of a step: beyond it the likelihood would be 0, and so the sum of all might be
+# metres, root mean square over joints: samples that are nearer are of the reported
+# pose's mode
+MODE_DISTANCE = 0.12
+# of a step: beyond it the likelihood would be 0, and so the sum of all might be
+MAX_KERNEL_COST = 80.0
 
 T = TypeVar("T")
 
@@ -30,22 +33,29 @@ class FrameStates(NamedTuple):
     totals: Array  # (n,) costs of the likeliest path to each
     parents: Rows  # (n,) the state of the frame before on that path, or -1
     likelihoods: Array  # (n,) of the silhouettes, the greatest 1
-    kernel: NDArray[np.float32] | None  # (m, n) likelihoods of steps from the frame before
+    # (m, n) likelihoods of steps from the frame before
+    kernel: NDArray[np.float32] | None
     forward: Array  # (n,) weights, which sum to 1
 
 
-def frame_states(costs: Array, before: FrameStates | None = None, steps: Array | None = None) -> FrameStates:
+def frame_states(
+    costs: Array, before: FrameStates | None = None, steps: Array | None = None
+) -> FrameStates:
     """Return a frame whose states cost (n,), to which steps from the frame before cost (m, n)."""
     likelihoods = np.exp(costs.min() - costs)  # TOYAMA2001 (likelihood)
     if before is None or steps is None:
         forward = likelihoods / likelihoods.sum()
-        return FrameStates(costs - costs.min(), np.full(len(costs), -1), likelihoods, None, forward)
+        return FrameStates(
+            costs - costs.min(), np.full(len(costs), -1), likelihoods, None, forward
+        )
     paths = before.totals[:, None] + steps
     parents = paths.argmin(axis=0)
     totals = paths[parents, np.arange(len(costs))] + costs  # RABINER1989 (Viterbi)
     kernel = np.exp(-np.minimum(steps, MAX_KERNEL_COST)).astype(np.float32)
     forward = (before.forward @ kernel) * likelihoods  # RABINER1989 (forward)
-    return FrameStates(totals - totals.min(), parents, likelihoods, kernel, forward / forward.sum())
+    return FrameStates(
+        totals - totals.min(), parents, likelihoods, kernel, forward / forward.sum()
+    )
 
 
 def windows(frames: Iterable[T], delay: int) -> Iterator[Sequence[T]]:
@@ -74,13 +84,16 @@ def state_weights(window: Sequence[FrameStates]) -> Array:
     backward = np.ones(len(window[-1].totals))
     for frame in window[:0:-1]:
         assert frame.kernel is not None
-        backward = frame.kernel @ (backward * frame.likelihoods)  # RABINER1989 (backward)
+        # RABINER1989 (backward)
+        backward = frame.kernel @ (backward * frame.likelihoods)
         backward /= backward.max()
     products = window[0].forward * backward
     return np.asarray(products / products.sum())
 
 
-def mean_near(row: int, weights: Array, squares: Array, poses: Array, places: Array) -> tuple[Array, Array]:
+def mean_near(
+    row: int, weights: Array, squares: Array, poses: Array, places: Array
+) -> tuple[Array, Array]:
     """Return the mean pose (66,) and place (3,) of the states similar to one of them, by weights (n,).
 
     `squares` (n,) are their squared distances from it, in standard deviations. The mean of all would be between a
@@ -89,7 +102,9 @@ def mean_near(row: int, weights: Array, squares: Array, poses: Array, places: Ar
     shares = weights * np.exp(-0.5 * squares)
     shares[row] += np.finfo(np.float64).tiny
     shares /= shares.sum()
-    return poses[row] + shares @ wrapped(poses - poses[row]), places[row] + shares @ (places - places[row])
+    return poses[row] + shares @ wrapped(poses - poses[row]), places[row] + shares @ (
+        places - places[row]
+    )
 
 
 def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
@@ -101,7 +116,8 @@ def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
     for frame in window[:0:-1]:
         assert frame.kernel is not None
         likelihoods = backward * frame.likelihoods**power
-        backward = frame.kernel @ (likelihoods / likelihoods.max()).astype(np.float32)  # GODSILL2004 (messages)
+        # GODSILL2004 (messages)
+        backward = frame.kernel @ (likelihoods / likelihoods.max()).astype(np.float32)
     return np.asarray(backward, dtype=np.float64)
 
 
@@ -113,14 +129,20 @@ class Sampling(NamedTuple):
 
 
 def sample_states(
-    window: Sequence[FrameStates], rows: Rows | None, sampling: Sampling, rng: np.random.Generator
+    window: Sequence[FrameStates],
+    rows: Rows | None,
+    sampling: Sampling,
+    rng: np.random.Generator,
 ) -> Rows:
     """Return states (K,) of the first frame, drawn given the states `rows` (K,) of the frame before it.
 
     Without `rows` paths begin there, independently.
     """
     first, (paths, power) = window[0], sampling
-    weights = np.broadcast_to(first.likelihoods**power * backward_messages(window, power), (paths, len(first.totals)))
+    weights = np.broadcast_to(
+        first.likelihoods**power * backward_messages(window, power),
+        (paths, len(first.totals)),
+    )
     if rows is not None and first.kernel is not None:
         weights = first.kernel[rows] * weights  # GODSILL2004 (step)
     ends = weights.cumsum(axis=1)
@@ -136,14 +158,17 @@ class SampledPaths(NamedTuple):
     similar: NDArray[np.bool_]  # (K,) which are of the reported pose's mode
 
     @classmethod
-    def of(cls, skeleton: Skeleton, poses: Array, places: Array, reported: Array) -> Self:
+    def of(
+        cls, skeleton: Skeleton, poses: Array, places: Array, reported: Array
+    ) -> Self:
         """Return sampled poses (K, 66) at places (K, 3), and which of them are similar to the reported one (66,)."""
         distances = joint_distances(skeleton.joints(poses), skeleton.joints(reported))
         return cls(poses, places, (distances**2).mean(axis=1) <= MODE_DISTANCE**2)
 
     def about(self, pose: Array, place: Array) -> Posterior:
         """Return the posterior in which the mean of the paths similar to the likeliest is the reported pose."""
-        poses, places = self.poses.copy(), self.places.copy()
+        poses = self.poses.copy()
+        places = self.places.copy()
         if self.similar.any():
             differences = wrapped(poses[self.similar] - pose)
             poses[self.similar] = pose + differences - differences.mean(axis=0)

@@ -22,25 +22,38 @@ class Estimate:
     place: Array  # (3,)
     frame_costs: FrameCosts = field(repr=False)
     evaluations: float
-    alternatives: tuple[Array, Array] = field(repr=False)  # poses (n, 66) and places of diverse other states
+    # poses (n, 66) and places of diverse other states
+    alternatives: tuple[Array, Array] = field(repr=False)
     paths: SampledPaths | None = None
 
 
-def smoothed(estimates: Iterable[Estimate], spread: float, ahead: int) -> Iterator[Estimate]:
+def smoothed(
+    estimates: Iterable[Estimate], spread: float, ahead: int
+) -> Iterator[Estimate]:
     """Yield each estimate as a mean of those up to `ahead` before and after it; the weights `spread` over some frames.
 
     A known root stays where it is.
     """
     before: deque[Estimate] = deque(maxlen=ahead)
     for window in windows(estimates, ahead):
-        near, estimate = [*before, *window], window[0]
-        poses, places = (np.array([getattr(other, name) for other in near]) for name in ("pose", "place"))
+        near = [*before, *window]
+        estimate = window[0]
+        poses, places = (
+            np.array([getattr(other, name) for other in near])
+            for name in ("pose", "place")
+        )
         pose, place = smoothed_pose(poses, places, len(before), spread)
-        yield replace(estimate, pose=pose, place=place if estimate.frame_costs.root is None else estimate.place)
+        yield replace(
+            estimate,
+            pose=pose,
+            place=place if estimate.frame_costs.root is None else estimate.place,
+        )
         before.append(estimate)
 
 
-def smoothed_pose(poses: Array, places: Array, k: int, spread: float) -> tuple[Array, Array]:
+def smoothed_pose(
+    poses: Array, places: Array, k: int, spread: float
+) -> tuple[Array, Array]:
     """Return the weighted mean pose (66,) and place (3,) of frames (n, 66), (n, 3) about frame k.
 
     As many frames before as after it count, so that the mean of a steady movement is where it is.

@@ -25,7 +25,8 @@ from posefit_filters.weighting import EVALUATIONS, sharpness
 
 LAYERS = 10
 SURVIVAL = 0.5  # alpha, the share of particles that survive a layer
-DIFFUSION = 0.35  # ours: the noise of a layer, as a multiple of the particles' own spread
+# ours: the noise of a layer, as a multiple of the particles' own spread
+DIFFUSION = 0.35
 NOISE = 0.1  # ours: P0, the motion from frame to frame, in half-ranges of the box
 
 
@@ -60,9 +61,12 @@ class Annealed:
         between("survival", survival, 0.0, 1.0, ends=False)
         positive("diffusion", diffusion)
         positive("noise", noise)
-        self._space, self._rng = space, rng
-        self._layers, self._survival = min(layers, evaluations), survival
-        self._diffusion, self._noise = diffusion, noise
+        self._space = space
+        self._rng = rng
+        self._layers = min(layers, evaluations)
+        self._survival = survival
+        self._diffusion = diffusion
+        self._noise = noise
         self._particles = draw_population(space, rng, evaluations // self._layers)
         self._costs = np.zeros(len(self._particles))
         self._layer = self._waiting = 0
@@ -75,8 +79,12 @@ class Annealed:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Weigh the particles, and unless this was the last layer, go on with the survivors."""
         check_tell(self._waiting, proposals, costs)
-        self._particles, self._costs = np.array(proposals), np.array(costs, dtype=np.float64)
-        self._layer, self._waiting = self._layer + 1, 0
+        self._particles, self._costs = (
+            np.array(proposals),
+            np.array(costs, dtype=np.float64),
+        )
+        self._layer = self._layer + 1
+        self._waiting = 0
         if self._layer < self._layers:
             self._descend()
 
@@ -85,8 +93,10 @@ class Annealed:
         rows = self._survivors()[0]
         moved = converted(space, self._particles[rows], self._space)
         spread = np.full(space.dimensions, self._noise)
-        self._particles = sample_normal(space, self._rng, moved, spread)  # DEUTSCHER2005 (next frame)
-        self._space, self._layer = space, 0
+        # DEUTSCHER2005 (next frame)
+        self._particles = sample_normal(space, self._rng, moved, spread)
+        self._space = space
+        self._layer = 0
 
     def _survivors(self) -> tuple[NDArray[np.int64], Array]:
         """Return which rows (n,) survive, and the weights (n,) of all."""
@@ -95,8 +105,12 @@ class Annealed:
 
     def _descend(self) -> None:
         rows, weights = self._survivors()
-        around = displacement(self._space, self._particles[weights.argmax()], self._particles)
+        around = displacement(
+            self._space, self._particles[weights.argmax()], self._particles
+        )
         mean = weights @ around
         spread = np.sqrt(weights @ (around - mean) ** 2)
         noise = self._diffusion * spread  # DEUTSCHER2005 (diffusion)
-        self._particles = sample_normal(self._space, self._rng, self._particles[rows], noise)
+        self._particles = sample_normal(
+            self._space, self._rng, self._particles[rows], noise
+        )

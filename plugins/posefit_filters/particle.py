@@ -21,7 +21,8 @@ from posefit.plugin import (
 from posefit_filters.weighting import EVALUATIONS
 
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost
-NOISE = 0.15  # standard deviation of the motion from frame to frame, in half-ranges of the box
+# standard deviation of the motion from frame to frame, in half-ranges of the box
+NOISE = 0.15
 
 
 class Particle:
@@ -49,11 +50,14 @@ class Particle:
         at_least("evaluations", evaluations, 1)
         positive("sharpness", sharpness)
         positive("noise", noise)
-        self._space, self._rng = space, rng
-        self._sharpness, self._noise = sharpness, noise
+        self._space = space
+        self._rng = rng
+        self._sharpness = sharpness
+        self._noise = noise
         self._particles = draw_population(space, rng, evaluations)
         self._weights = np.full(evaluations, 1.0 / evaluations)
-        self._due, self._waiting = True, 0
+        self._due = True
+        self._waiting = 0
 
     def ask(self) -> Array:
         """Return the particles (n, d) of this frame, once; then none."""
@@ -65,12 +69,16 @@ class Particle:
         check_tell(self._waiting, proposals, costs)
         self._particles = np.array(proposals)
         self._weights = weigh(np.array(costs, dtype=np.float64), self._sharpness)
-        self._due, self._waiting = False, 0
+        self._due = False
+        self._waiting = 0
 
     def advance(self, space: Space) -> None:
         """Let the particles survive by their weights, and move into the next frame."""
-        rows = systematic_rows(self._weights, self._rng.random(), len(self._weights))  # GORDON1993 (resampling)
+        # GORDON1993 (resampling)
+        rows = systematic_rows(self._weights, self._rng.random(), len(self._weights))
         moved = converted(space, self._particles[rows], self._space)
         spread = np.full(space.dimensions, self._noise)
-        self._particles = sample_normal(space, self._rng, moved, spread)  # GORDON1993 (motion)
-        self._space, self._due = space, True
+        # GORDON1993 (motion)
+        self._particles = sample_normal(space, self._rng, moved, spread)
+        self._space = space
+        self._due = True

@@ -3,8 +3,11 @@
 from posefit.plugin import Array, effective_sample_size, weigh
 
 EVALUATIONS = 2440  # of a frame, as many as SAPSO's N (C + 1)
-TOLERANCE, MAX_STEPS = 1e-9, 100  # ours: of the share that survives, and steps towards it
-MAX_SHARPNESS = 1e12  # ours: where more particles than wanted share the lowest cost, none is sharp enough
+# ours: of the share that survives, and steps towards it
+TOLERANCE = 1e-9
+MAX_STEPS = 100
+# ours: where more particles than wanted share the lowest cost, none is sharp enough
+MAX_SHARPNESS = 1e12
 
 
 def survival(costs: Array, beta: float) -> float:
@@ -12,7 +15,8 @@ def survival(costs: Array, beta: float) -> float:
 
     D is the effective sample size; the share is the survival diagnostic of MacCormick.
     """
-    return effective_sample_size(weigh(costs, beta)) / len(costs)  # DEUTSCHER2005 (survival)
+    # DEUTSCHER2005 (survival)
+    return effective_sample_size(weigh(costs, beta)) / len(costs)
 
 
 def sharpness(costs: Array, wanted: float) -> float:
@@ -22,18 +26,29 @@ def sharpness(costs: Array, wanted: float) -> float:
     """
     if survival(costs, 0.0) <= wanted:
         return 0.0
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     while survival(costs, high) > wanted:
-        low, high = high, 2.0 * high
+        low = high
+        high = 2.0 * high
         if high > MAX_SHARPNESS:
             return high
-    above, below, side, beta = survival(costs, low) - wanted, survival(costs, high) - wanted, 0, high
+    above = survival(costs, low) - wanted
+    below = survival(costs, high) - wanted
+    side = 0
+    beta = high
     for _ in range(MAX_STEPS):  # false position, by the Illinois rule
         beta = (low * below - high * above) / (below - above)  # DEUTSCHER2005 (beta)
         if abs(rest := survival(costs, beta) - wanted) < TOLERANCE:
             break
         if rest > 0.0:
-            low, above, below, side = beta, rest, below * (0.5 if side > 0 else 1.0), 1
+            low = beta
+            above = rest
+            below = below * (0.5 if side > 0 else 1.0)
+            side = 1
         else:
-            high, below, above, side = beta, rest, above * (0.5 if side < 0 else 1.0), -1
+            high = beta
+            below = rest
+            above = above * (0.5 if side < 0 else 1.0)
+            side = -1
     return beta

@@ -20,4 +20,9 @@ def posefit_register_segmenters(register: RegisterSegmenter) -> None:
     """Register `mediapipe`."""
     from posefit_mediapipe.segmenter import MediaPipe
 
-    register("mediapipe", MediaPipe, still_background=False, needs=("mediapipe", "posefit[mediapipe]"))
+    register(
+        "mediapipe",
+        MediaPipe,
+        still_background=False,
+        needs=("mediapipe", "posefit[mediapipe]"),
+    )

@@ -16,11 +16,25 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Film, Image
 from posefit.silhouette.mask import Mask
 
-LEFT, RIGHT = (11, 23), (12, 24)  # shoulder and hip, in the model's numbers; x goes to the right, and z away
+# shoulder and hip, in the model's numbers; x goes to the right, and z away
+LEFT = (11, 23)
+RIGHT = (12, 24)
 SIDES = (1.0, 1.0, -1.0, -1.0)
 # bones whose ends are joints of the model, in its numbers: those of the left, then 1 more for the right
-_LEFT_POINTS = {"clavicle": 11, "humerus": 13, "radius": 15, "hipjoint": 23, "femur": 25, "tibia": 27, "toes": 31}
-POINTS = {f"{side}{bone}": number + k for k, side in enumerate("lr") for bone, number in _LEFT_POINTS.items()}
+_LEFT_POINTS = {
+    "clavicle": 11,
+    "humerus": 13,
+    "radius": 15,
+    "hipjoint": 23,
+    "femur": 25,
+    "tibia": 27,
+    "toes": 31,
+}
+POINTS = {
+    f"{side}{bone}": number + k
+    for k, side in enumerate("lr")
+    for bone, number in _LEFT_POINTS.items()
+}
 
 
 class MediaPipe:
@@ -34,11 +48,14 @@ class MediaPipe:
         threshold: of the soft mask, from which on a pixel is the person's, between 0 and 1.
     """
 
-    def __init__(self, film: Film, *, confidence: float = 0.3, threshold: float = 0.5) -> None:
+    def __init__(
+        self, film: Film, *, confidence: float = 0.3, threshold: float = 0.5
+    ) -> None:
         between("confidence", confidence, 0.0, 1.0)
         between("threshold", threshold, 0.0, 1.0, ends=False)
         self._threshold = threshold
-        self.facing = math.nan  # in the latest picture: by the model's shoulders and hips
+        # in the latest picture: by the model's shoulders and hips
+        self.facing = math.nan
         self.landmarks = np.zeros((len(JOINTS), 3))  # in the latest picture
         self._model = _model(confidence)
 
@@ -48,9 +65,12 @@ class MediaPipe:
         with warnings.catch_warnings():  # of its own use of protobuf
             warnings.simplefilter("ignore")
             result = self._model.process(np.ascontiguousarray(image[..., ::-1]))
-        soft, self.facing = result.segmentation_mask, _facing(result.pose_world_landmarks)
+        soft = result.segmentation_mask
+        self.facing = _facing(result.pose_world_landmarks)
         self.landmarks = _landmarks(result.pose_landmarks, image.shape[:2])
-        return (empty if soft is None else np.asarray(soft > self._threshold)), empty.copy()
+        return (
+            empty if soft is None else np.asarray(soft > self._threshold)
+        ), empty.copy()
 
 
 def _facing(landmarks: Any) -> float:
@@ -58,7 +78,10 @@ def _facing(landmarks: Any) -> float:
     if landmarks is None:
         return math.nan
     points = [landmarks.landmark[k] for k in (*LEFT, *RIGHT)]
-    across, away = (sum(getattr(p, axis) * sign for p, sign in zip(points, SIDES, strict=True)) for axis in "xz")
+    across, away = (
+        sum(getattr(p, axis) * sign for p, sign in zip(points, SIDES, strict=True))
+        for axis in "xz"
+    )
     return math.atan2(away, across)
 
 
@@ -68,7 +91,11 @@ def _landmarks(landmarks: Any, shape: tuple[int, ...]) -> Array:
     if landmarks is not None:
         for joint, k in POINTS.items():
             point = landmarks.landmark[k]
-            result[JOINTS.index(joint)] = point.x * shape[1], point.y * shape[0], point.visibility
+            result[JOINTS.index(joint)] = (
+                point.x * shape[1],
+                point.y * shape[0],
+                point.visibility,
+            )
     return result
 
 
@@ -86,7 +113,8 @@ def _model(confidence: float) -> Any:
             min_detection_confidence=confidence,
             min_tracking_confidence=confidence,
         )
-        model.process(np.zeros((64, 64, 3), dtype=np.uint8))  # its log messages come with its first picture
+        # its log messages come with its first picture
+        model.process(np.zeros((64, 64, 3), dtype=np.uint8))
     return model
 
 
@@ -94,7 +122,8 @@ def _model(confidence: float) -> Any:
 def _silent() -> Iterator[None]:
     """Discard what is written to stderr: the model's libraries log for their own developers there."""
     sys.stderr.flush()
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    stderr = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
         yield

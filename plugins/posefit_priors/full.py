@@ -37,19 +37,28 @@ class Full:
         Raises ValueError where the skeleton states no limits, or where nothing moves.
         """
         angles = angles_of(angles, 1)
-        low, high = angles.min(axis=0), angles.max(axis=0)
+        low = angles.min(axis=0)
+        high = angles.max(axis=0)
         if self._limits == "asf":
             if skeleton is None or skeleton.limits is None:
-                name = "no skeleton" if skeleton is None else f"{skeleton.name}, whose file states none"
+                name = (
+                    "no skeleton"
+                    if skeleton is None
+                    else f"{skeleton.name}, whose file states none"
+                )
                 raise InputError(
                     f"limits must be training where the skeleton states no joint limits, got asf and {name}"
                 )
-            low, high = np.minimum(low, skeleton.limits[:, 0]), np.maximum(high, skeleton.limits[:, 1])
+            low = np.minimum(low, skeleton.limits[:, 0])
+            high = np.maximum(high, skeleton.limits[:, 1])
         self.angles = np.flatnonzero(high > low)
         if not len(self.angles):
-            raise InputError(f"angles must differ somewhere, got {len(angles)} equal frames")
+            raise InputError(
+                f"angles must differ somewhere, got {len(angles)} equal frames"
+            )
         self.rest = angles.mean(axis=0)
-        self.low, self.high = low[self.angles], high[self.angles]
+        self.low = low[self.angles]
+        self.high = high[self.angles]
         return self
 
     def transform(self, angles: Array) -> Array:

@@ -16,7 +16,8 @@ ARMS_DEGREES = 45.0
 LEGS_DEGREES = 15.0
 SLACK = 1.5  # times chi: the distance of a pose from the nearest cluster, at most
 ROUNDING = 1e-9  # radians by which a joint may pass its limit
-ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
+ARMS = ("humerus", "radius")
+LEGS = ("femur", "tibia")
 
 
 class Loose:
@@ -58,8 +59,10 @@ class Loose:
         self._pca.fit(angles, skeleton)
         self._max_distance = self._slack * float(self._pca.reach)
         angles = np.asarray(angles, dtype=np.float64)
-        least, most = angles.min(axis=0), angles.max(axis=0)
-        chosen, reach = [], []
+        least = angles.min(axis=0)
+        most = angles.max(axis=0)
+        chosen = []
+        reach = []
         for bones, bones_reach in zip((ARMS, LEGS), self._reach, strict=True):
             for name in (name for bone in bones for name in both(bone)):
                 first = angle_index(JOINTS.index(name)) - 3
@@ -67,7 +70,10 @@ class Loose:
                 chosen += moving
                 reach += [bones_reach] * len(moving)
         self.loose = np.array(chosen, dtype=np.intp)
-        self.angles_low, self.angles_high = np.full(len(chosen), -np.pi), np.full(len(chosen), np.pi)
+        self.angles_low, self.angles_high = (
+            np.full(len(chosen), -np.pi),
+            np.full(len(chosen), np.pi),
+        )
         if skeleton is not None and skeleton.limits is not None:
             self.angles_low, self.angles_high = skeleton.limits[self.loose].T.copy()
         self.angles_low = np.minimum(self.angles_low, least[self.loose])
@@ -76,19 +82,26 @@ class Loose:
         down = np.minimum(reach, least[self.loose] - self.angles_low)
         up = np.minimum(reach, self.angles_high - most[self.loose])
         left = self.transform(angles)[:, len(self._pca.low) :]
-        self.low = np.concatenate([self._pca.low, np.minimum(-down, left.min(axis=0, initial=0.0))])
-        self.high = np.concatenate([self._pca.high, np.maximum(up, left.max(axis=0, initial=0.0))])
+        self.low = np.concatenate(
+            [self._pca.low, np.minimum(-down, left.min(axis=0, initial=0.0))]
+        )
+        self.high = np.concatenate(
+            [self._pca.high, np.maximum(up, left.max(axis=0, initial=0.0))]
+        )
         return self
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, d) of joint angles (n, 63): components, then what they leave of the loose angles."""
         latents = self._pca.transform(angles)
-        left = (np.asarray(angles) - self._pca.inverse_transform(latents))[:, self.loose]
+        left = (np.asarray(angles) - self._pca.inverse_transform(latents))[
+            :, self.loose
+        ]
         return np.hstack([latents, left])
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, d)."""
-        latents, m = np.asarray(latents), len(self._pca.low)
+        latents = np.asarray(latents)
+        m = len(self._pca.low)
         angles = self._pca.inverse_transform(latents[:, :m])
         angles[:, self.loose] += latents[:, m:]
         return angles
@@ -97,6 +110,15 @@ class Loose:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
         m = len(self._pca.low)
         angles = self._pca.mean[self.loose] + latents[:, m:]
-        add_components(writeable(latents[:, :m]), writeable(self._pca.components[:, self.loose]), angles)
-        within = (angles >= self.angles_low - ROUNDING) & (angles <= self.angles_high + ROUNDING)
-        return np.asarray(within.all(axis=1) & (distances(writeable(latents), self._pca.centres) < self._max_distance))
+        add_components(
+            writeable(latents[:, :m]),
+            writeable(self._pca.components[:, self.loose]),
+            angles,
+        )
+        within = (angles >= self.angles_low - ROUNDING) & (
+            angles <= self.angles_high + ROUNDING
+        )
+        return np.asarray(
+            within.all(axis=1)
+            & (distances(writeable(latents), self._pca.centres) < self._max_distance)
+        )

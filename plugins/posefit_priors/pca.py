@@ -34,28 +34,44 @@ class PCA(Components):
     reach: Array  # () of a cluster: chi
     explained: Array  # (m,) share of the variance along each component
 
-    def __init__(self, *, components: float = COMPONENTS, clusters: int = CLUSTERS, quantile: float = QUANTILE) -> None:
-        if not 0.0 < components < np.inf or (components >= 1 and components != int(components)):
-            raise InputError(f"components must be a whole number or a share of variance below 1, got {components}")
+    def __init__(
+        self,
+        *,
+        components: float = COMPONENTS,
+        clusters: int = CLUSTERS,
+        quantile: float = QUANTILE,
+    ) -> None:
+        if not 0.0 < components < np.inf or (
+            components >= 1 and components != int(components)
+        ):
+            raise InputError(
+                f"components must be a whole number or a share of variance below 1, got {components}"
+            )
         at_least("clusters", clusters, 1)
         if not 0.0 < quantile <= 1.0:
             raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
-        self._components, self._clusters, self._quantile = components, clusters, quantile
+        self._components = components
+        self._clusters = clusters
+        self._quantile = quantile
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
         angles = angles_of(angles, max(self._clusters, int(self._components) + 1, 2))
         self.mean = rounded(angles.mean(axis=0))  # SAPSO 2.1.1
-        self.components, self.explained = principal(angles - self.mean, self._components)
+        self.components, self.explained = principal(
+            angles - self.mean, self._components
+        )
         latents = rounded(self.transform(angles))
         unit = 10.0**-DECIMALS  # by which rounding may have moved a frame inwards
-        self.low, self.high = latents.min(axis=0) - unit, latents.max(axis=0) + unit  # SAPSO 2.2 constraint 1
+        # SAPSO 2.2 constraint 1
+        self.low, self.high = latents.min(axis=0) - unit, latents.max(axis=0) + unit
         self.centres, self.reach = clusters_of(latents, self._clusters, self._quantile)
         return self
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        return np.asarray(distances(writeable(latents), self.centres) < self.reach)  # SAPSO 2.2 constraint 2
+        # SAPSO 2.2 constraint 2
+        return np.asarray(distances(writeable(latents), self.centres) < self.reach)
 
 
 def angles_of(angles: Array, least: int) -> Array:
@@ -66,7 +82,9 @@ def angles_of(angles: Array, least: int) -> Array:
     if len(angles) < least:
         raise InputError(f"angles must hold at least {least} frames, got {len(angles)}")
     if not np.isfinite(angles).all():
-        raise InputError(f"angles must be finite, got {np.count_nonzero(~np.isfinite(angles))} that are not")
+        raise InputError(
+            f"angles must be finite, got {np.count_nonzero(~np.isfinite(angles))} that are not"
+        )
     return angles
 
 
@@ -88,15 +106,22 @@ def distances(latents: Array, centres: Array) -> Array:
 
 def clusters_of(latents: Array, clusters: int, quantile: float) -> tuple[Array, Array]:
     """Return the centres (K, m) that K-means finds among training latents (n, m), and chi (), how far one reaches."""
-    from scipy.cluster.vq import kmeans2  # the same as scikit-learn's, whose import takes two seconds
+    # the same as scikit-learn's, whose import takes two seconds
+    from scipy.cluster.vq import kmeans2
 
-    count, rng = min(clusters, len(np.unique(latents, axis=0))), np.random.default_rng(CLUSTERING_SEED)
+    count = min(clusters, len(np.unique(latents, axis=0)))
+    rng = np.random.default_rng(CLUSTERING_SEED)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a run in which a cluster has lost its poses is not the best
-        runs = [kmeans2(latents, count, CLUSTERING_ROUNDS, minit="++", rng=rng) for _ in range(CLUSTERING_STARTS)]
+        # a run in which a cluster has lost its poses is not the best
+        warnings.simplefilter("ignore")
+        runs = [
+            kmeans2(latents, count, CLUSTERING_ROUNDS, minit="++", rng=rng)
+            for _ in range(CLUSTERING_STARTS)
+        ]
     best, _ = min(runs, key=lambda run: float(((latents - run[0][run[1]]) ** 2).sum()))
     centres = rounded(best)
-    return centres, np.array(np.quantile(distances(latents, centres), quantile))  # Interpretation S5
+    # Interpretation S5
+    return centres, np.array(np.quantile(distances(latents, centres), quantile))
 
 
 def principal(centred: Array, components: float) -> tuple[Array, Array]:
@@ -105,13 +130,23 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
     The largest number of a direction is above 0.
     """
     if components > centred.shape[1]:
-        raise InputError(f"components must be at most {centred.shape[1]}, got {components}")
+        raise InputError(
+            f"components must be at most {centred.shape[1]}, got {components}"
+        )
     _, spread, directions = np.linalg.svd(centred, full_matrices=False)  # SAPSO 2.1.2
     share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
-    count = int(components) if components >= 1 else int(np.searchsorted(share.cumsum(), components)) + 1
+    count = (
+        int(components)
+        if components >= 1
+        else int(np.searchsorted(share.cumsum(), components)) + 1
+    )
     directions = directions[:count]
-    longest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
-    return _orthonormal(rounded(np.where(longest < 0.0, -directions, directions))), rounded(share[:count])
+    longest = np.take_along_axis(
+        directions, np.abs(directions).argmax(axis=1)[:, None], axis=1
+    )
+    return _orthonormal(
+        rounded(np.where(longest < 0.0, -directions, directions))
+    ), rounded(share[:count])
 
 
 def rounded(numbers: Array) -> Array:

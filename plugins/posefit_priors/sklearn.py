@@ -13,7 +13,14 @@ from posefit.fitting.check import at_least, one_of
 from posefit.fitting.kernels import add_components
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import quoted
-from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, angles_of, clusters_of, distances
+from posefit_priors.pca import (
+    CLUSTERS,
+    COMPONENTS,
+    QUANTILE,
+    angles_of,
+    clusters_of,
+    distances,
+)
 
 # of `sklearn.decomposition`, those that have an inverse or are linear
 VARIANTS = (
@@ -21,7 +28,9 @@ VARIANTS = (
     "MiniBatchSparsePCA", "PCA", "SparsePCA", "TruncatedSVD",
 )  # fmt: skip
 KERNEL_POSES = 5_000  # of a KernelPCA, whose memory is their square
-DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}}
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}
+}
 
 
 class Transformed:
@@ -41,7 +50,13 @@ class Transformed:
     centres: Array  # (K, m)
     reach: Array  # ()
 
-    def __init__(self, *, variant: str = "KernelPCA", components: int = COMPONENTS, options: str = "{}") -> None:
+    def __init__(
+        self,
+        *,
+        variant: str = "KernelPCA",
+        components: int = COMPONENTS,
+        options: str = "{}",
+    ) -> None:
         at_least("components", components, 1)
         self._settings = variant, components, options
         _built(variant, components, options)
@@ -50,13 +65,17 @@ class Transformed:
         """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
         angles = angles_of(angles, max(CLUSTERS, self._settings[1] + 1))
         if self._settings[0] == "KernelPCA" and len(angles) > KERNEL_POSES:
-            raise InputError(f"KernelPCA must learn from at most {KERNEL_POSES} poses, got {len(angles)}")
+            raise InputError(
+                f"KernelPCA must learn from at most {KERNEL_POSES} poses, got {len(angles)}"
+            )
         self._model = _built(*self._settings)
         self._model.fit(angles)
         latents = self.transform(angles)
         if latents.ndim != 2 or latents.shape[1] < 1 or not np.isfinite(latents).all():
             name = type(self._model).__name__
-            raise InputError(f"variant must give finite latents (n, m), got {latents.shape} from {name}")
+            raise InputError(
+                f"variant must give finite latents (n, m), got {latents.shape} from {name}"
+            )
         self._linear = _linear(self._model, latents.shape[1])
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)
         self.centres, self.reach = clusters_of(latents, CLUSTERS, QUANTILE)
@@ -95,26 +114,45 @@ def _built(variant: str, components: int, options: str) -> Any:
         if not isinstance(parameters, dict):
             raise TypeError(type(parameters).__name__)
     except (ValueError, TypeError) as error:
-        raise InputError(f"options must be a JSON object, got {quoted(options)} ({error})") from None
+        raise InputError(
+            f"options must be a JSON object, got {quoted(options)} ({error})"
+        ) from None
     known = kind().get_params()
-    defaults = {"n_components": components, "random_state": 0, **DEFAULTS.get(variant, {})}
+    defaults = {
+        "n_components": components,
+        "random_state": 0,
+        **DEFAULTS.get(variant, {}),
+    }
     if unknown := sorted(set(parameters) - set(known)):
-        raise InputError(f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}")
-    return kind(**{name: value for name, value in defaults.items() if name in known} | parameters)
+        raise InputError(
+            f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}"
+        )
+    return kind(
+        **{name: value for name, value in defaults.items() if name in known}
+        | parameters
+    )
 
 
 def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
     """Return the matrix (m, 63) and the mean (63,) of a transformer whose inverse is linear; None of another."""
     if type(model).__name__ == "FactorAnalysis":
         return writeable(model.components_), writeable(model.mean_)
-    probe = np.vstack([np.zeros(components), np.eye(components), np.full(components, 0.5)])
+    probe = np.vstack(
+        [np.zeros(components), np.eye(components), np.full(components, 0.5)]
+    )
     try:
         images = np.asarray(model.inverse_transform(probe), dtype=np.float64)
     except (ValueError, AttributeError) as error:
-        raise InputError(f"variant must have an inverse, got {type(model).__name__}: {error}") from None
+        raise InputError(
+            f"variant must have an inverse, got {type(model).__name__}: {error}"
+        ) from None
     if images.shape != (len(probe), 63):
-        raise InputError(f"variant must give back 63 angles, got {images.shape[1:]} from {type(model).__name__}")
+        raise InputError(
+            f"variant must give back 63 angles, got {images.shape[1:]} from {type(model).__name__}"
+        )
     matrix = images[1:-1] - images[0]
-    if np.allclose(images[-1], images[0] + 0.5 * matrix.sum(axis=0), rtol=0.0, atol=1e-9):
+    if np.allclose(
+        images[-1], images[0] + 0.5 * matrix.sum(axis=0), rtol=0.0, atol=1e-9
+    ):
         return writeable(matrix), writeable(images[0])
     return None

@@ -11,9 +11,13 @@ from posefit_related.training import training_poses
 YAW_REACH = np.radians(45.0)  # ours: to either side of a known first yaw
 
 
-def costs_of(task: Task, observation: Observation, poses: Array, places: Array) -> Array:
+def costs_of(
+    task: Task, observation: Observation, poses: Array, places: Array
+) -> Array:
     """Return the costs (n,) of poses (n, 66) with their root at places (n, 3). SAPSO (4)."""
-    return pose_costs(task.body, task.cameras, observation.silhouettes, poses, places)[0]
+    return pose_costs(task.body, task.cameras, observation.silhouettes, poses, places)[
+        0
+    ]
 
 
 def first_poses(task: Task, rng: np.random.Generator, count: int) -> Array:
@@ -29,17 +33,27 @@ def first_poses(task: Task, rng: np.random.Generator, count: int) -> Array:
 
 def squared_distances(first: Array, second: Array) -> Array:
     """Return the squared distances (n, k) of points (n, D) from others (k, D)."""
-    squares = (first**2).sum(axis=1)[:, None] + (second**2).sum(axis=1) - 2.0 * first @ second.T
+    squares = (
+        (first**2).sum(axis=1)[:, None]
+        + (second**2).sum(axis=1)
+        - 2.0 * first @ second.T
+    )
     return np.asarray(np.maximum(squares, 0.0))
 
 
-def frame_of(task: Task, observation: Observation, pose: Array, place: Array, evaluations: int) -> Frame:
+def frame_of(
+    task: Task, observation: Observation, pose: Array, place: Array, evaluations: int
+) -> Frame:
     """Return the frame of a pose (66,) at a place (3,); its cost is one more evaluation."""
-    costs, counts = pose_costs(task.body, task.cameras, observation.silhouettes, pose[None], place[None])
+    costs, counts = pose_costs(
+        task.body, task.cameras, observation.silhouettes, pose[None], place[None]
+    )
     return Frame(pose, place, float(costs[0]), counts[:, 0], evaluations + 1)
 
 
-def place_of(task: Task, observation: Observation, pose: Array, place: Array) -> tuple[Array, int]:
+def place_of(
+    task: Task, observation: Observation, pose: Array, place: Array
+) -> tuple[Array, int]:
     """Return the place (3,) of the root, known or estimated by a mask, and how many poses were drawn for that.
 
     The mask of the first view that shows something is compared with that of the pose at `place`: the ratio of their
@@ -48,11 +62,16 @@ def place_of(task: Task, observation: Observation, pose: Array, place: Array) ->
     if observation.translation is not None:
         return np.array(observation.translation, dtype=np.float64), 0
     for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True):
-        mask, drawn = (_box(mask) for mask in (silhouette.mask, project(task.body, camera, pose, place)))
+        mask, drawn = (
+            _box(mask)
+            for mask in (silhouette.mask, project(task.body, camera, pose, place))
+        )
         if mask is not None and drawn is not None:
             at = camera.rotation @ place + camera.translation
             depth = at[2] * (drawn[1] / mask[1])[1]
-            pixel = mask[0] + (camera.project(place[None])[0][0] - drawn[0]) * at[2] / depth
+            pixel = (
+                mask[0] + (camera.project(place[None])[0][0] - drawn[0]) * at[2] / depth
+            )
             at = np.append((pixel - camera.centre) / camera.focal * depth, depth)
             return np.asarray(camera.rotation.T @ (at - camera.translation)), 1
     return place, 1

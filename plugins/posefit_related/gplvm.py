@@ -21,7 +21,8 @@ from posefit_related.training import evenly, training_angles
 
 STEPS = 150  # ours: of L-BFGS
 NEAREST = 4  # ours: training poses whose latents a pose has
-MAX_VARIANCE = 0.7  # ours: of a feasible latent, as a share of the process's own variance
+# ours: of a feasible latent, as a share of the process's own variance
+MAX_VARIANCE = 0.7
 
 
 def kernel(first: Array, second: Array, logs: Array) -> Array:
@@ -35,18 +36,25 @@ def loss(parameters: Array, y: Array) -> tuple[float, Array]:
 
     `parameters` are the latents (n, m), then the logarithms of variance, inverse square width and noise; `y` (n, D).
     """
-    n, logs = len(y), parameters[-3:]
+    n = len(y)
+    logs = parameters[-3:]
     x = parameters[:-3].reshape(n, -1)
     smooth = kernel(x, x, logs)
     inverse = np.linalg.inv(smooth + (np.exp(logs[2]) + 1e-6) * np.eye(n))
     fitted = inverse @ y
     logdet = -np.linalg.slogdet(inverse)[1]
-    value = 0.5 * y.shape[1] * logdet + 0.5 * np.sum(fitted * y) + 0.5 * np.sum(x**2)  # URTASUN2005 (likelihood)
+    # URTASUN2005 (likelihood)
+    value = 0.5 * y.shape[1] * logdet + 0.5 * np.sum(fitted * y) + 0.5 * np.sum(x**2)
     by_covariances = 0.5 * (y.shape[1] * inverse - fitted @ fitted.T)
-    away, width = x[:, None] - x, np.exp(logs[1])
+    away = x[:, None] - x
+    width = np.exp(logs[1])
     by_x = -2.0 * width * np.einsum("ij,ijm->im", by_covariances * smooth, away) + x
     by_width = -0.5 * width * np.sum(by_covariances * smooth * (away**2).sum(axis=2))
-    by_logs = [np.sum(by_covariances * smooth), by_width, np.exp(logs[2]) * np.trace(by_covariances)]
+    by_logs = [
+        np.sum(by_covariances * smooth),
+        by_width,
+        np.exp(logs[2]) * np.trace(by_covariances),
+    ]
     return float(value), np.concatenate([by_x.ravel(), by_logs])
 
 
@@ -64,7 +72,8 @@ class GPLVM:
     def __init__(self, *, components: int = 3, poses: int = 100) -> None:
         at_least("components", components, 1)
         at_least("poses", poses, 20)
-        self._components, self._poses = components, poses
+        self._components = components
+        self._poses = poses
 
     def fit(self, angles: Array, skeleton: object = None) -> Self:
         """Learn from joint angles (T, 63). Raises ValueError where they are not, or too few."""
@@ -72,14 +81,29 @@ class GPLVM:
         self.angles, self.mean = evenly(angles, self._poses), angles.mean(axis=0)
         self.scale = np.maximum(angles.std(axis=0), 1e-3)  # URTASUN2005 (scales)
         y = (self.angles - self.mean) / self.scale
-        from scipy.optimize import minimize  # not before it is needed: it takes a third of a second
+        # not before it is needed: it takes a third of a second
+        from scipy.optimize import minimize
 
         scores, sizes, _ = np.linalg.svd(y, full_matrices=False)
-        x = (scores * np.sqrt(len(y)))[:, : self._components] * (sizes > 1e-9)[: self._components]
+        x = (scores * np.sqrt(len(y)))[:, : self._components] * (sizes > 1e-9)[
+            : self._components
+        ]
         start = np.concatenate([x.ravel(), [0.0, 0.0, np.log(0.05)]])
-        end = np.asarray(minimize(loss, start, (y,), jac=True, method="L-BFGS-B", options={"maxiter": STEPS}).x)
-        self.latents, self.logs = end[:-3].reshape(len(y), -1), end[-3:]
-        noisy = kernel(self.latents, self.latents, self.logs) + (np.exp(self.logs[2]) + 1e-6) * np.eye(len(y))
+        end = np.asarray(
+            minimize(
+                loss,
+                start,
+                (y,),
+                jac=True,
+                method="L-BFGS-B",
+                options={"maxiter": STEPS},
+            ).x
+        )
+        self.latents = end[:-3].reshape(len(y), -1)
+        self.logs = end[-3:]
+        noisy = kernel(self.latents, self.latents, self.logs) + (
+            np.exp(self.logs[2]) + 1e-6
+        ) * np.eye(len(y))
         self.inverse = np.linalg.inv(noisy)
         self.factors = self.inverse @ y
         self.low, self.high = self.latents.min(axis=0), self.latents.max(axis=0)
@@ -87,7 +111,9 @@ class GPLVM:
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63): those of the nearest training poses."""
-        squares = squared_distances(np.asarray(angles) / self.scale, self.angles / self.scale)
+        squares = squared_distances(
+            np.asarray(angles) / self.scale, self.angles / self.scale
+        )
         nearest = np.argsort(squares, axis=1, kind="stable")[:, :NEAREST]
         weights = 1.0 / (np.take_along_axis(squares, nearest, axis=1) + 1e-9)
         weights /= weights.sum(axis=1, keepdims=True)
@@ -96,10 +122,14 @@ class GPLVM:
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m): the mean of the process."""
         near = kernel(np.asarray(latents), self.latents, self.logs)
-        return np.asarray(self.mean + self.scale * np.einsum("nk,ka->na", near, self.factors))  # URTASUN2005 (mean)
+        # URTASUN2005 (mean)
+        return np.asarray(
+            self.mean + self.scale * np.einsum("nk,ka->na", near, self.factors)
+        )
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return where the process is certain enough (n,)."""
         near = kernel(np.asarray(latents), self.latents, self.logs)
-        explained = np.einsum("nk,kl,nl->n", near, self.inverse, near)  # URTASUN2005 (variance)
+        # URTASUN2005 (variance)
+        explained = np.einsum("nk,kl,nl->n", near, self.inverse, near)
         return np.asarray(1.0 - explained / np.exp(self.logs[0]) <= MAX_VARIANCE)

@@ -13,11 +13,21 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from posefit.plugin import Array, Frame, Observation, Task, at_least, contour_fit, positive
+from posefit.plugin import (
+    Array,
+    Frame,
+    Observation,
+    Task,
+    at_least,
+    contour_fit,
+    positive,
+)
 from posefit_related.frames import costs_of, first_poses, frame_of, place_of
 
 FIRST_SHARE = 0.5  # ours: of a first frame's evaluations, for the pose to begin with
-KNOWN_SHIFT, SHIFT = 0.003, 0.05  # ours: metres that a known root, and a predicted one, is off
+# ours: metres that a known root, and a predicted one, is off
+KNOWN_SHIFT = 0.003
+SHIFT = 0.05
 
 
 class Gradient:
@@ -28,14 +38,23 @@ class Gradient:
         damping: share of the velocity that the prediction has, 0 or more.
     """
 
-    def __init__(self, task: Task, *, turn_degrees: float = 8.0, damping: float = 1.0) -> None:
+    def __init__(
+        self, task: Task, *, turn_degrees: float = 8.0, damping: float = 1.0
+    ) -> None:
         positive("turn_degrees", turn_degrees)
         at_least("damping", damping, 0.0)
-        self.task, self.turn, self.damping = task, float(np.radians(turn_degrees)), damping
+        self.task, self.turn, self.damping = (
+            task,
+            float(np.radians(turn_degrees)),
+            damping,
+        )
 
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+    def track(
+        self, observations: Iterable[Observation], rng: np.random.Generator
+    ) -> Iterator[Frame]:
         """Yield a frame for each observation."""
-        latest: list[tuple[Array, Array]] = []  # poses and places of the last two frames
+        # poses and places of the last two frames
+        latest: list[tuple[Array, Array]] = []
         for observation in observations:
             if not latest:
                 pose, place, used = self._first(observation, rng)
@@ -44,22 +63,40 @@ class Gradient:
             if observation.translation is not None:
                 place = np.array(observation.translation, dtype=np.float64)
             if observation.usable:
-                deviations = self.turn, SHIFT if observation.translation is None else KNOWN_SHIFT
-                pose, moved, effort = contour_fit(
-                    self.task, observation, (pose, place), deviations, self.task.evaluations - used - 1
+                deviations = (
+                    self.turn,
+                    SHIFT if observation.translation is None else KNOWN_SHIFT,
                 )
-                place, used = moved if observation.translation is None else place, used + effort
+                pose, moved, effort = contour_fit(
+                    self.task,
+                    observation,
+                    (pose, place),
+                    deviations,
+                    self.task.evaluations - used - 1,
+                )
+                place = moved if observation.translation is None else place
+                used = used + effort
             elif latest:
-                pose, place = latest[-1][0], latest[-1][1] if observation.translation is None else place
+                pose = latest[-1][0]
+                place = latest[-1][1] if observation.translation is None else place
             latest = [*latest, (pose, place)][-2:]
             yield frame_of(self.task, observation, pose, place, used)
 
-    def _first(self, observation: Observation, rng: np.random.Generator) -> tuple[Array, Array, int]:
+    def _first(
+        self, observation: Observation, rng: np.random.Generator
+    ) -> tuple[Array, Array, int]:
         """Return the first pose and place, and the evaluations that they took."""
         count = max(int(FIRST_SHARE * self.task.evaluations), 1)
         poses = first_poses(self.task, rng, count)
-        place, drawn = place_of(self.task, observation, poses[0], np.array(self.task.anchor, dtype=np.float64))
-        best = costs_of(self.task, observation, poses, np.tile(place, (count, 1))).argmin()
+        place, drawn = place_of(
+            self.task,
+            observation,
+            poses[0],
+            np.array(self.task.anchor, dtype=np.float64),
+        )
+        best = costs_of(
+            self.task, observation, poses, np.tile(place, (count, 1))
+        ).argmin()
         return poses[best], place, count + drawn
 
 
@@ -67,4 +104,5 @@ def predicted(latest: list[tuple[Array, Array]], damping: float) -> tuple[Array,
     """Return the pose and the place that the last two lead to at constant velocity; one stays where it is."""
     (pose, place), (before, place_before) = latest[-1], latest[0]
     turns = (pose - before + np.pi) % (2.0 * np.pi) - np.pi
-    return pose + damping * turns, place + damping * (place - place_before)  # WACHTER1999 (prediction)
+    # WACHTER1999 (prediction)
+    return pose + damping * turns, place + damping * (place - place_before)

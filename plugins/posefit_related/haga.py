@@ -28,8 +28,10 @@ from posefit.plugin import (
 )
 from posefit_related.stages import EVALUATIONS, middle, opened
 
-TEMPERATURES = 5.0, 0.2  # ours: of the first and the last generation of a layer, in units of the cost
-BEYOND = 0.25  # ours: how far beyond its parents a child may lie, as a share of their distance
+# ours: of the first and the last generation of a layer, in units of the cost
+TEMPERATURES = 5.0, 0.2
+# ours: how far beyond its parents a child may lie, as a share of their distance
+BEYOND = 0.25
 
 
 class HAGA:
@@ -59,12 +61,22 @@ class HAGA:
         at_least("evaluations", evaluations, 1)
         between("mutation", mutation, 0.0, 1.0)
         positive("spread", spread)
-        self._space, self._rng, self._size = space, rng, min(population_size, evaluations)
-        self._layers, self._mutation = layers, mutation
+        self._space, self._rng, self._size = (
+            space,
+            rng,
+            min(population_size, evaluations),
+        )
+        self._layers = layers
+        self._mutation = mutation
         self._generations = max(evaluations // (self._size * layers), 1)
-        self._spread = np.full(space.dimensions, spread) if space.start is None else space.start.spread
+        self._spread = (
+            np.full(space.dimensions, spread)
+            if space.start is None
+            else space.start.spread
+        )
         self._layer = self._generation = self._waiting = 0
-        self._best, self._best_cost = middle(space, rng), np.inf
+        self._best = middle(space, rng)
+        self._best_cost = np.inf
         self._x = self._grown(np.tile(self._best, (self._size, 1)), 0)
 
     def ask(self) -> Array:
@@ -77,12 +89,22 @@ class HAGA:
         check_tell(self._waiting, proposals, costs)
         costs = np.where(np.isnan(costs), np.inf, costs)
         if costs.min() < self._best_cost:
-            self._best, self._best_cost = proposals[costs.argmin()].copy(), float(costs.min())
+            self._best, self._best_cost = (
+                proposals[costs.argmin()].copy(),
+                float(costs.min()),
+            )
         children = self._children(np.array(proposals), costs)
-        self._generation, self._waiting = self._generation + 1, 0
+        self._generation = self._generation + 1
+        self._waiting = 0
         if self._generation == self._generations:
-            before, self._generation, self._layer = self._opened_count(), 0, self._layer + 1
-            children = self._grown(children, before) if self._layer < self._layers else children
+            before = self._opened_count()
+            self._generation = 0
+            self._layer = self._layer + 1
+            children = (
+                self._grown(children, before)
+                if self._layer < self._layers
+                else children
+            )
         children[0] = self._best  # ZHAO2008 (elite)
         self._x = children
 
@@ -91,7 +113,8 @@ class HAGA:
 
     def _grown(self, x: Array, before: int) -> Array:
         """Return individuals (n, d) whose coordinates that a layer opens are drawn."""
-        now, drawn = self._opened_count(), draw_population(self._space, self._rng, self._size)
+        now = self._opened_count()
+        drawn = draw_population(self._space, self._rng, self._size)
         grown = x.copy()
         grown[:, before:now] = drawn[:, before:now]
         return repair(self._space, grown, self._best)
@@ -105,10 +128,13 @@ class HAGA:
     def _children(self, x: Array, costs: Array) -> Array:
         n, d, count = *x.shape, self._opened_count()
         fitness = weigh(costs, 1.0 / self.temperature())  # ZHAO2008 (selection)
-        mothers, fathers = x[self._rng.choice(n, n, p=fitness)], x[self._rng.choice(n, n, p=fitness)]
+        mothers = x[self._rng.choice(n, n, p=fitness)]
+        fathers = x[self._rng.choice(n, n, p=fitness)]
         share = self._rng.uniform(-BEYOND, 1.0 + BEYOND, (n, d))
-        children = mothers + share * displacement(self._space, mothers, fathers)  # ZHAO2008 (crossover)
+        # ZHAO2008 (crossover)
+        children = mothers + share * displacement(self._space, mothers, fathers)
         width = self._spread * self.temperature() / TEMPERATURES[0]
         mutated = (self._rng.random((n, d)) < self._mutation) & (np.arange(d) < count)
-        children += mutated * width * self._rng.standard_normal((n, d))  # ZHAO2008 (mutation)
+        # ZHAO2008 (mutation)
+        children += mutated * width * self._rng.standard_normal((n, d))
         return repair(self._space, children, mothers)

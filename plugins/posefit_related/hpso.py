@@ -57,12 +57,25 @@ class HPSO:
         between("inertia", inertia, 0.1, math.inf, ends=False)
         at_least("acceleration", acceleration, 0.0)
         positive("alpha", alpha)
-        self._space, self._rng, self._size = space, rng, min(population_size, evaluations)
-        self._runs, self._stage, self._waiting = runs(space.dimensions, run_length), -1, 0  # -1: the first poses
+        self._space, self._rng, self._size = (
+            space,
+            rng,
+            min(population_size, evaluations),
+        )
+        # -1: the first poses
+        self._runs = runs(space.dimensions, run_length)
+        self._stage = -1
+        self._waiting = 0
         self._x = first_population(space, rng, evaluations)
-        self._generations = max((evaluations - len(self._x)) // (self._size * len(self._runs)), 1)
-        self._inertia, self._acceleration, self._alpha = inertia, acceleration, alpha
-        self._v, self._generation, self._estimate = np.zeros_like(self._x), 0, self._x[0]
+        self._generations = max(
+            (evaluations - len(self._x)) // (self._size * len(self._runs)), 1
+        )
+        self._inertia = inertia
+        self._acceleration = acceleration
+        self._alpha = alpha
+        self._v = np.zeros_like(self._x)
+        self._generation = 0
+        self._estimate = self._x[0]
         self._pbest, self._pbest_cost = self._x, np.full(len(self._x), np.inf)
 
     def ask(self) -> Array:
@@ -75,31 +88,51 @@ class HPSO:
         check_tell(self._waiting, proposals, costs)
         self._waiting = 0
         if self._stage < 0:
-            self._pbest, self._pbest_cost = np.array(proposals), np.where(np.isnan(costs), np.inf, costs)
+            self._pbest, self._pbest_cost = (
+                np.array(proposals),
+                np.where(np.isnan(costs), np.inf, costs),
+            )
         else:
             better = costs < self._pbest_cost
-            self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
+            self._pbest[better], self._pbest_cost[better] = (
+                proposals[better],
+                costs[better],
+            )
             self._generation += 1
             if self._generation < self._generations:
                 self._move()
                 return
-        self._estimate = self._pbest[self._pbest_cost.argmin()].copy()  # JOHN2010 (handed down)
+        # JOHN2010 (handed down)
+        self._estimate = self._pbest[self._pbest_cost.argmin()].copy()
         self._stage += 1
         if self._stage < len(self._runs):
             self._begin()
 
     def _begin(self) -> None:
         """Spread the swarm over the coordinates of its stage, around the estimate of those before."""
-        run, x = self._runs[self._stage], np.tile(self._estimate, (self._size, 1))
-        x[1:, run] = draw_population(self._space, self._rng, self._size)[1:, run]  # JOHN2010 (stage)
-        self._x, self._v, self._generation = repair(self._space, x, self._estimate), np.zeros_like(x), 0
+        run = self._runs[self._stage]
+        x = np.tile(self._estimate, (self._size, 1))
+        # JOHN2010 (stage)
+        x[1:, run] = draw_population(self._space, self._rng, self._size)[1:, run]
+        self._x, self._v, self._generation = (
+            repair(self._space, x, self._estimate),
+            np.zeros_like(x),
+            0,
+        )
         self._pbest, self._pbest_cost = self._x.copy(), np.full(self._size, np.inf)
 
     def _move(self) -> None:
-        run, gbest = self._runs[self._stage], self._pbest[self._pbest_cost.argmin()]
-        omega = self._inertia * (10.0 * self._inertia) ** (-self._generation / self._generations)  # JOHN2010 (inertia)
+        run = self._runs[self._stage]
+        gbest = self._pbest[self._pbest_cost.argmin()]
+        # JOHN2010 (inertia)
+        omega = self._inertia * (10.0 * self._inertia) ** (
+            -self._generation / self._generations
+        )
         phi1, phi2 = self._acceleration * self._rng.random((2, self._size, len(run)))
-        to_pbest, to_gbest = (displacement(self._space, self._x, best)[:, run] for best in (self._pbest, gbest))
+        to_pbest, to_gbest = (
+            displacement(self._space, self._x, best)[:, run]
+            for best in (self._pbest, gbest)
+        )
         v = omega * self._v[:, run] + phi1 * to_pbest + phi2 * to_gbest
         self._v[:, run] = np.clip(v, -self._alpha, self._alpha)
         self._x = repair(self._space, self._x + self._v, self._estimate)

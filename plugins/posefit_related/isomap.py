@@ -21,8 +21,11 @@ from posefit_related.training import evenly, training_angles
 
 NEIGHBOURS = 8  # ours: of a pose in the graph; more where they do not connect all poses
 NEAREST = 6  # ours: training poses of the way back
-DAMPING = 1e-2  # ours: of its weights, as a share of the neighbours' mean squared distance
-REACH = 0.5  # ours: of a feasible latent from a training pose, as a share of the range's half diagonal
+# ours: of its weights, as a share of the neighbours' mean squared distance
+DAMPING = 1e-2
+# ours: of a feasible latent from a training pose, as a share of the range's half
+# diagonal
+REACH = 0.5
 
 
 def rebuilt(latents: Array, centres: Array, angles: Array) -> Array:
@@ -31,10 +34,13 @@ def rebuilt(latents: Array, centres: Array, angles: Array) -> Array:
     nearest = np.argsort(squares, axis=1, kind="stable")[:, :NEAREST]
     away = centres[nearest] - latents[:, None]
     gram = np.einsum("nkm,nlm->nkl", away, away)
-    gram += (DAMPING * np.einsum("nkk->n", gram) / gram.shape[1] + 1e-12)[:, None, None] * np.eye(gram.shape[1])
+    gram += (DAMPING * np.einsum("nkk->n", gram) / gram.shape[1] + 1e-12)[
+        :, None, None
+    ] * np.eye(gram.shape[1])
     weights = np.linalg.solve(gram, np.ones((*gram.shape[:2], 1)))[..., 0]
     weights /= weights.sum(axis=1, keepdims=True)
-    return np.asarray(np.einsum("nk,nka->na", weights, angles[nearest]))  # WANG2003 (way back)
+    # WANG2003 (way back)
+    return np.asarray(np.einsum("nk,nka->na", weights, angles[nearest]))
 
 
 class IsomapPrior:
@@ -51,7 +57,8 @@ class IsomapPrior:
     def __init__(self, *, components: int = 3, poses: int = 400) -> None:
         at_least("components", components, 1)
         at_least("poses", poses, 20)
-        self._components, self._poses = components, poses
+        self._components = components
+        self._poses = poses
 
     def fit(self, angles: Array, skeleton: object = None) -> Self:
         """Learn from joint angles (T, 63). Raises ValueError where they are not, or too few."""
@@ -63,14 +70,19 @@ class IsomapPrior:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")  # a graph in several pieces
                 try:
-                    model = Isomap(n_neighbors=neighbours, n_components=self._components).fit(self.angles)
+                    model = Isomap(
+                        n_neighbors=neighbours, n_components=self._components
+                    ).fit(self.angles)
                     break
                 except Warning:
                     continue
         else:
-            raise ValueError(f"angles must be of poses near each other, got {len(angles)} that no graph connects")
+            raise ValueError(
+                f"angles must be of poses near each other, got {len(angles)} that no graph connects"
+            )
         self._model: Any = model
-        self.centres = np.asarray(model.embedding_, dtype=np.float64)  # WANG2003 (Isomap)
+        # WANG2003 (Isomap)
+        self.centres = np.asarray(model.embedding_, dtype=np.float64)
         latents = np.concatenate([self.centres, self.transform(angles)])
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)
         self.reach = REACH * 0.5 * float(np.linalg.norm(self.high - self.low))

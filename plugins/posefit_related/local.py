@@ -13,7 +13,15 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from posefit.plugin import Array, Space, at_least, check_tell, positive, repair, sample_normal
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    check_tell,
+    positive,
+    repair,
+    sample_normal,
+)
 from posefit_related.stages import EVALUATIONS, first_population, runs
 
 MIN_STEP = 1e-3  # ours: half-ranges of the box
@@ -44,12 +52,24 @@ class Local:
         positive("step", step)
         at_least("patience", patience, 1)
         at_least("evaluations", evaluations, 1)
-        self._space, self._rng, self._patience = space, rng, patience
-        self._step, self._runs, self._part, self._waiting = step, runs(space.dimensions, run_length), 0, 0
+        self._space = space
+        self._rng = rng
+        self._patience = patience
+        self._step, self._runs, self._part, self._waiting = (
+            step,
+            runs(space.dimensions, run_length),
+            0,
+            0,
+        )
         self._next = first_population(space, rng, evaluations)
-        self._best, self._best_cost, self._improved = self._next[0], np.inf, False
-        self._open: list[tuple[float, int, Array]] = []  # poses to expand, the best first
-        self._closed, self._misses, self._count = self._next[:0], 0, 0
+        self._best = self._next[0]
+        self._best_cost = np.inf
+        self._improved = False
+        # poses to expand, the best first
+        self._open: list[tuple[float, int, Array]] = []
+        self._closed = self._next[:0]
+        self._misses = 0
+        self._count = 0
 
     def ask(self) -> Array:
         """Return the neighbours (n, d) of the most promising pose."""
@@ -62,7 +82,10 @@ class Local:
         self._waiting, costs = 0, np.where(np.isnan(costs), np.inf, costs)
         better = bool(costs.min() < self._best_cost)
         if better:
-            self._best, self._best_cost = proposals[costs.argmin()].copy(), float(costs.min())
+            self._best, self._best_cost = (
+                proposals[costs.argmin()].copy(),
+                float(costs.min()),
+            )
         if not len(self._closed):  # the first poses are of no part
             self._restart()
         else:
@@ -80,24 +103,39 @@ class Local:
         for _ in range(2 * len(self._runs)):
             while self._open:
                 pose = heappop(self._open)[2]  # GAVRILA1996 (best first)
-                moves = np.eye(self._space.dimensions)[self._runs[self._part]] * self._step
+                moves = (
+                    np.eye(self._space.dimensions)[self._runs[self._part]] * self._step
+                )
                 near = repair(self._space, pose + np.concatenate([moves, -moves]), pose)
-                new: Array = near[(np.abs(near[:, None] - self._closed).max(axis=2) > SAME_POSE).all(axis=1)]
+                new: Array = near[
+                    (np.abs(near[:, None] - self._closed).max(axis=2) > SAME_POSE).all(
+                        axis=1
+                    )
+                ]
                 if len(new):
                     return new
             self._next_part()
-        return sample_normal(self._space, self._rng, self._best[None], np.full(self._space.dimensions, self._step))
+        return sample_normal(
+            self._space,
+            self._rng,
+            self._best[None],
+            np.full(self._space.dimensions, self._step),
+        )
 
     def _next_part(self) -> None:
         self._part = (self._part + 1) % len(self._runs)  # GAVRILA1996 (decomposition)
         if self._part == 0:
-            self._step = self._step if self._improved else max(0.5 * self._step, MIN_STEP)
+            self._step = (
+                self._step if self._improved else max(0.5 * self._step, MIN_STEP)
+            )
             self._improved = False
         self._restart()
 
     def _restart(self) -> None:
         """Begin a part at the best pose so far."""
-        self._open, self._closed, self._misses = [], self._best[None], 0
+        self._open = []
+        self._closed = self._best[None]
+        self._misses = 0
         self._push(self._best_cost, self._best)
 
     def _push(self, cost: float, pose: Array) -> None:

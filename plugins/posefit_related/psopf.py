@@ -27,7 +27,9 @@ from posefit.plugin import (
 )
 from posefit_related.stages import EVALUATIONS
 
-CHI, PHI = 0.7298, 2.05  # Clerc and Kennedy 2002: the constriction, and the acceleration of either pull
+# Clerc and Kennedy 2002: the constriction, and the acceleration of either pull
+CHI = 0.7298
+PHI = 2.05
 
 
 class PSOPF:
@@ -57,9 +59,13 @@ class PSOPF:
         positive("sharpness", sharpness)
         positive("noise", noise)
         positive("alpha", alpha)
-        self._space, self._rng, self._waiting = space, rng, 0
+        self._space = space
+        self._rng = rng
+        self._waiting = 0
         self._iterations = min(iterations, evaluations - 1)
-        self._sharpness, self._noise, self._alpha = sharpness, noise, alpha
+        self._sharpness = sharpness
+        self._noise = noise
+        self._alpha = alpha
         self._begin(draw_population(space, rng, evaluations // (self._iterations + 1)))
 
     def _begin(self, x: Array) -> None:
@@ -76,13 +82,17 @@ class PSOPF:
         check_tell(self._waiting, proposals, costs)
         better = costs < self._pbest_cost
         self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
-        self._moves, self._waiting = self._moves + 1, 0
+        self._moves = self._moves + 1
+        self._waiting = 0
         if self._moves > self._iterations:
             return
         gbest = self._pbest[self._pbest_cost.argmin()]
         pulls = PHI * self._rng.random((2, *self._x.shape))
-        to_pbest, to_gbest = (displacement(self._space, self._x, best) for best in (self._pbest, gbest))
-        v = CHI * (self._v + pulls[0] * to_pbest + pulls[1] * to_gbest)  # KRZESZOWSKI2010 (shift)
+        to_pbest, to_gbest = (
+            displacement(self._space, self._x, best) for best in (self._pbest, gbest)
+        )
+        # KRZESZOWSKI2010 (shift)
+        v = CHI * (self._v + pulls[0] * to_pbest + pulls[1] * to_gbest)
         self._v = np.clip(v, -self._alpha, self._alpha)
         self._x = repair(self._space, self._x + self._v, self._pbest)
 
@@ -92,4 +102,8 @@ class PSOPF:
         rows = systematic_rows(weights, self._rng.random(), len(weights))
         moved = converted(space, self._pbest[rows], self._space)
         self._space = space
-        self._begin(sample_normal(space, self._rng, moved, np.full(space.dimensions, self._noise)))
+        self._begin(
+            sample_normal(
+                space, self._rng, moved, np.full(space.dimensions, self._noise)
+            )
+        )

@@ -20,12 +20,20 @@ from posefit_related.frames import frame_of, place_of, squared_distances
 from posefit_related.training import training_poses
 
 POINTS = 80  # ours: of a border, at most
-SECTORS, RINGS = 12, 5  # ours: the bins of a shape context
-YAW_REACH = np.radians(90.0)  # ours: of training poses to either side of a known first yaw
-VOTE_WIDTH = 0.25  # ours: of a vote for a word, as a share of the root mean square distance from the words
-PREDICTION_NOISE = 0.5  # ours: that training's predicted poses are off, in standard deviations of each number
+# ours: the bins of a shape context
+SECTORS = 12
+RINGS = 5
+# ours: of training poses to either side of a known first yaw
+YAW_REACH = np.radians(90.0)
+# ours: of a vote for a word, as a share of the root mean square distance from the words
+VOTE_WIDTH = 0.25
+# ours: that training's predicted poses are off, in standard deviations of each number
+PREDICTION_NOISE = 0.5
 DAMPING = 0.5  # ours: share of the velocity that the prediction has
-SILHOUETTE_SHARPNESS, YAW_SHARPNESS, ANGLES_SHARPNESS = 3.0, 0.3, 0.5  # ours: of the factors of the kernel
+# ours: of the factors of the kernel
+SILHOUETTE_SHARPNESS = 3.0
+YAW_SHARPNESS = 0.3
+ANGLES_SHARPNESS = 0.5
 
 
 def contexts(mask: NDArray[np.bool_]) -> Array:
@@ -38,14 +46,22 @@ def contexts(mask: NDArray[np.bool_]) -> Array:
     points = np.argwhere(padded[1:-1, 1:-1] & ~inner).astype(np.float64)
     if len(points) < 3:
         return np.zeros((1, SECTORS * RINGS))
-    points = points[np.linspace(0, len(points) - 1, min(POINTS, len(points))).astype(int)]
+    points = points[
+        np.linspace(0, len(points) - 1, min(POINTS, len(points))).astype(int)
+    ]
     away = points[None] - points[:, None]
     far = np.hypot(*np.moveaxis(away, 2, 0))
-    ring = np.clip(np.log2(far / far.mean() + 1e-9) + RINGS - 1.5, 0.0, RINGS - 1.0).astype(int)
-    sector = ((np.arctan2(away[..., 0], away[..., 1]) + np.pi) * SECTORS / (2.0 * np.pi)).astype(int) % SECTORS
+    ring = np.clip(
+        np.log2(far / far.mean() + 1e-9) + RINGS - 1.5, 0.0, RINGS - 1.0
+    ).astype(int)
+    sector = (
+        (np.arctan2(away[..., 0], away[..., 1]) + np.pi) * SECTORS / (2.0 * np.pi)
+    ).astype(int) % SECTORS
     bins = ring * SECTORS + sector + SECTORS * RINGS * np.arange(len(points))[:, None]
     others = bins[~np.eye(len(points), dtype=bool)]
-    counts = np.bincount(others, minlength=SECTORS * RINGS * len(points)).reshape(len(points), -1)
+    counts = np.bincount(others, minlength=SECTORS * RINGS * len(points)).reshape(
+        len(points), -1
+    )
     return np.asarray(counts / (len(points) - 1.0))  # AGARWAL2006 (shape context)
 
 
@@ -53,8 +69,11 @@ def histogram(shapes: Array, words: Array) -> Array:
     """Return the votes (k,) of contexts (n, 60) for the words (k, 60) of a codebook; they sum to 1."""
     squares = squared_distances(shapes, words)
     squares -= squares.min(axis=1, keepdims=True)
-    votes = np.exp(-squares / (2.0 * (VOTE_WIDTH * np.sqrt(squares.mean()) + 1e-9) ** 2))
-    return np.asarray((votes / votes.sum(axis=1, keepdims=True)).mean(axis=0))  # AGARWAL2006 (histogram)
+    votes = np.exp(
+        -squares / (2.0 * (VOTE_WIDTH * np.sqrt(squares.mean()) + 1e-9) ** 2)
+    )
+    # AGARWAL2006 (histogram)
+    return np.asarray((votes / votes.sum(axis=1, keepdims=True)).mean(axis=0))
 
 
 class Regression:
@@ -66,7 +85,9 @@ class Regression:
         ridge: of the regression, above 0.
     """
 
-    def __init__(self, task: Task, *, samples: int = 1200, words: int = 100, ridge: float = 0.02) -> None:
+    def __init__(
+        self, task: Task, *, samples: int = 1200, words: int = 100, ridge: float = 0.02
+    ) -> None:
         from sklearn.cluster import MiniBatchKMeans
 
         at_least("samples", samples, 10)
@@ -75,30 +96,65 @@ class Regression:
         self.task, rng = task, np.random.default_rng(0)
         poses = training_poses(task)
         poses = poses[rng.integers(len(poses), size=samples)]
-        poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * (np.pi if task.yaw is None else YAW_REACH) + (task.yaw or 0.0)
-        shapes = [[contexts(project(task.body, view, pose, task.anchor)) for pose in poses] for view in task.cameras]
-        some = np.concatenate([shape for view in shapes for shape in view[:: max(samples // 200, 1)]])
-        self.words = MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0).fit(some).cluster_centers_
-        self.histograms = np.concatenate([[histogram(shape, self.words) for shape in view] for view in shapes], axis=1)
-        self.spread = float(((self.histograms - self.histograms.mean(axis=0)) ** 2).sum(axis=1).mean())
+        poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * (
+            np.pi if task.yaw is None else YAW_REACH
+        ) + (task.yaw or 0.0)
+        shapes = [
+            [contexts(project(task.body, view, pose, task.anchor)) for pose in poses]
+            for view in task.cameras
+        ]
+        some = np.concatenate(
+            [shape for view in shapes for shape in view[:: max(samples // 200, 1)]]
+        )
+        self.words = (
+            MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0)
+            .fit(some)
+            .cluster_centers_
+        )
+        self.histograms = np.concatenate(
+            [[histogram(shape, self.words) for shape in view] for view in shapes],
+            axis=1,
+        )
+        self.spread = float(
+            ((self.histograms - self.histograms.mean(axis=0)) ** 2).sum(axis=1).mean()
+        )
         values = regressed(poses)
-        self.mean, self.scale = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-3)
+        self.mean, self.scale = (
+            values.mean(axis=0),
+            np.maximum(values.std(axis=0), 1e-3),
+        )
         self.targets = (values - self.mean) / self.scale
-        self.predictions = self.targets + PREDICTION_NOISE * rng.standard_normal(values.shape)
-        self.factors = {}  # by how many numbers of the predicted pose are known: none, two of the yaw, or all
+        self.predictions = self.targets + PREDICTION_NOISE * rng.standard_normal(
+            values.shape
+        )
+        # by how many numbers of the predicted pose are known: none, two of the yaw, or
+        # all
+        self.factors = {}
         for known in (0, 2, values.shape[1]):
             gram = self._kernel(self.histograms, self.predictions, known)
-            self.factors[known] = np.linalg.solve(gram + ridge * np.eye(samples), self.targets)  # AGARWAL2006 (ridge)
+            # AGARWAL2006 (ridge)
+            self.factors[known] = np.linalg.solve(
+                gram + ridge * np.eye(samples), self.targets
+            )
 
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+    def track(
+        self, observations: Iterable[Observation], rng: np.random.Generator
+    ) -> Iterator[Frame]:
         """Yield a frame for each observation."""
-        task, latest, place = self.task, list[Array](), np.array(self.task.anchor, dtype=np.float64)
+        task = self.task
+        latest = list[Array]()
+        place = np.array(self.task.anchor, dtype=np.float64)
         for observation in observations:
             if observation.usable or not latest:
                 prediction, known = self._predicted(latest)
                 masks = [silhouette.mask for silhouette in observation.silhouettes]
-                votes = np.concatenate([histogram(contexts(mask), self.words) for mask in masks])
-                estimate = (self._kernel(votes[None], prediction[None], known) @ self.factors[known])[0]
+                votes = np.concatenate(
+                    [histogram(contexts(mask), self.words) for mask in masks]
+                )
+                estimate = (
+                    self._kernel(votes[None], prediction[None], known)
+                    @ self.factors[known]
+                )[0]
                 latest = [*latest, estimate][-2:]
             cosine, sine, *angles = self.mean + self.scale * latest[-1]
             pose = np.array([np.arctan2(sine, cosine), *angles])
@@ -108,17 +164,29 @@ class Regression:
     def _predicted(self, latest: list[Array]) -> tuple[Array, int]:
         """Return the predicted numbers, scaled, and how many of them are known."""
         if latest:
-            return latest[-1] + DAMPING * (latest[-1] - latest[0]), len(self.mean)  # AGARWAL2006 (prediction)
-        yaw, angles = self.task.yaw, self.task.first_pose
-        pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], np.zeros(63) if angles is None else angles])
+            # AGARWAL2006 (prediction)
+            return latest[-1] + DAMPING * (latest[-1] - latest[0]), len(self.mean)
+        yaw = self.task.yaw
+        angles = self.task.first_pose
+        pose = np.concatenate(
+            [[yaw or 0.0, 0.0, 0.0], np.zeros(63) if angles is None else angles]
+        )
         known = 0 if yaw is None else 2 if angles is None else len(self.mean)
         return (regressed(pose[None])[0] - self.mean) / self.scale, known
 
     def _kernel(self, histograms: Array, predictions: Array, known: int) -> Array:
         """Return the kernels (n, samples) of silhouettes, and of the first `known` numbers of predicted poses."""
-        scales = np.sqrt(np.repeat([YAW_SHARPNESS / 2, ANGLES_SHARPNESS / 65], [2, 65]))[:known]
-        squares = squared_distances(predictions[:, :known] * scales, self.predictions[:, :known] * scales)
-        squares += SILHOUETTE_SHARPNESS * squared_distances(histograms, self.histograms) / self.spread
+        scales = np.sqrt(
+            np.repeat([YAW_SHARPNESS / 2, ANGLES_SHARPNESS / 65], [2, 65])
+        )[:known]
+        squares = squared_distances(
+            predictions[:, :known] * scales, self.predictions[:, :known] * scales
+        )
+        squares += (
+            SILHOUETTE_SHARPNESS
+            * squared_distances(histograms, self.histograms)
+            / self.spread
+        )
         return np.asarray(np.exp(-squares))  # AGARWAL2006 (kernel)
 
 

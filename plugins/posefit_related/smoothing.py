@@ -15,12 +15,22 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, systematic_rows, weigh
+from posefit.plugin import (
+    Array,
+    Frame,
+    Observation,
+    Task,
+    at_least,
+    positive,
+    systematic_rows,
+    weigh,
+)
 from posefit_related.frames import costs_of, first_poses, frame_of
 from posefit_related.training import training_poses
 
 HEAVIEST = 600  # ours: particles of a frame that are smoothed
-MIN_STEPS = np.array([np.radians(2.0), 0.005, 0.005, 0.005])  # ours: least deviations a frame of yaw and place
+# ours: least deviations a frame of yaw and place
+MIN_STEPS = np.array([np.radians(2.0), 0.005, 0.005, 0.005])
 
 
 class Smoothing:
@@ -34,45 +44,73 @@ class Smoothing:
     """
 
     def __init__(
-        self, task: Task, *, components: int = 8, sharpness: float = 1.0, spread: float = 1.5, backwards: bool = True
+        self,
+        task: Task,
+        *,
+        components: int = 8,
+        sharpness: float = 1.0,
+        spread: float = 1.5,
+        backwards: bool = True,
     ) -> None:
         at_least("components", components, 1)
         positive("sharpness", sharpness)
         positive("spread", spread)
-        self.task, self.sharpness, self.backwards = task, sharpness, backwards
+        self.task = task
+        self.sharpness = sharpness
+        self.backwards = backwards
         poses = training_poses(task)[:, 1:]
         self.mean = poses.mean(axis=0)
-        self.axes = np.linalg.svd(poses - self.mean, full_matrices=False)[2][:components]
+        self.axes = np.linalg.svd(poses - self.mean, full_matrices=False)[2][
+            :components
+        ]
         self.steps = spread * self._training_steps()
 
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+    def track(
+        self, observations: Iterable[Observation], rng: np.random.Generator
+    ) -> Iterator[Frame]:
         """Yield a frame for each observation, once all were filtered."""
-        sequence, states, weights = list(observations), list[Array](), list[Array]()
+        sequence = list(observations)
+        states = list[Array]()
+        weights = list[Array]()
         count = max(self.task.evaluations - 1, 1)
         poses = first_poses(self.task, rng, count)
         where = np.tile(self.task.anchor, (count, 1))
-        particles = np.column_stack([poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T])
+        particles = np.column_stack(
+            [poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T]
+        )
         likelihood = np.full(count, 1.0 / count)
         for observation in sequence:
             if states:
                 rows = systematic_rows(likelihood, rng.random(), len(likelihood))
-                particles = particles[rows] + self.steps * rng.standard_normal((count, len(self.steps)))
+                particles = particles[rows] + self.steps * rng.standard_normal(
+                    (count, len(self.steps))
+                )
             if observation.translation is not None:
                 particles[:, 1:4] = observation.translation
             costs = np.zeros(count)
             if observation.usable:
-                costs = costs_of(self.task, observation, self._poses(particles), particles[:, 1:4])
+                costs = costs_of(
+                    self.task, observation, self._poses(particles), particles[:, 1:4]
+                )
             likelihood = weigh(costs, self.sharpness)
             heaviest = np.argsort(-likelihood, kind="stable")[:HEAVIEST]
             states.append(particles[heaviest])
             weights.append(likelihood[heaviest] / likelihood[heaviest].sum())
         if self.backwards:
             weights = smoothed(states, weights, self.steps)
-        for observation, particles, weight in zip(sequence, states, weights, strict=True):
+        for observation, particles, weight in zip(
+            sequence, states, weights, strict=True
+        ):
             leading = particles[weight.argmax()]
             mean = leading + weight @ differences(particles, leading)
             evaluations = count if observation.usable else 0
-            yield frame_of(self.task, observation, self._poses(mean[None])[0], mean[1:4], evaluations)
+            yield frame_of(
+                self.task,
+                observation,
+                self._poses(mean[None])[0],
+                mean[1:4],
+                evaluations,
+            )
 
     def _poses(self, states: Array) -> Array:
         """Return the poses (n, 66) of states (n, 4 + m): yaw, place and components."""
@@ -82,8 +120,16 @@ class Smoothing:
         """Return the root mean squares (4 + m,) of how states of training change in a frame of the task."""
         squares = []
         for motion in self.task.training:
-            moved = np.column_stack([motion.poses[:, 0], motion.translations, motion.poses[:, 1:] @ self.axes.T])
-            squares.append((differences(moved[1:], moved[:-1]) * motion.fps / self.task.fps) ** 2)
+            moved = np.column_stack(
+                [
+                    motion.poses[:, 0],
+                    motion.translations,
+                    motion.poses[:, 1:] @ self.axes.T,
+                ]
+            )
+            squares.append(
+                (differences(moved[1:], moved[:-1]) * motion.fps / self.task.fps) ** 2
+            )
         steps = np.sqrt(np.concatenate(squares).mean(axis=0))
         steps[:4] = np.maximum(steps[:4], MIN_STEPS)
         return np.asarray(np.maximum(steps, 1e-6))
@@ -99,10 +145,13 @@ def differences(states: Array, origin: Array) -> Array:
 def smoothed(states: list[Array], weights: list[Array], steps: Array) -> list[Array]:
     """Return the weights (n,) of each frame's states (n, D) given all frames, for normal steps (D,) between frames."""
     after = weights[-1:]
-    for now, later, weight in reversed(list(zip(states, states[1:], weights, strict=False))):
+    for now, later, weight in reversed(
+        list(zip(states, states[1:], weights, strict=False))
+    ):
         moves = differences(later[None], now[:, None]) / steps
         logs = -0.5 * (moves**2).sum(axis=2)
-        likelihoods = np.exp(logs - logs.max(axis=0))  # (now, later), each column up to a factor that cancels
+        # (now, later), each column up to a factor that cancels
+        likelihoods = np.exp(logs - logs.max(axis=0))
         reached = likelihoods / np.maximum(weight @ likelihoods, 1e-300)
         backward = weight * (reached @ after[0])  # PEURSUM2010 (backward)
         after.insert(0, backward / backward.sum())

@@ -24,5 +24,7 @@ def training_angles(angles: Array, least: int) -> Array:
 
 def evenly(angles: Array, count: int) -> Array:
     """Return at most `count` of the angles (T, 63), evenly spaced."""
-    rows = np.unique(np.linspace(0, len(angles) - 1, min(count, len(angles))).astype(int))
+    rows = np.unique(
+        np.linspace(0, len(angles) - 1, min(count, len(angles))).astype(int)
+    )
     return np.asarray(angles[rows])

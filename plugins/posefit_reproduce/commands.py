@@ -23,10 +23,22 @@ def reproduce_group() -> None:
     """Repeat the experiments of the two publications."""
 
 
-QUICK: dict[str, Any] = {"seeds": 2, "frames": 15, "views": (0.0, 45.0), "around": (0.0, 45.0)}  # of a `Scale`
+# of a `Scale`
+QUICK: dict[str, Any] = {
+    "seeds": 2,
+    "frames": 15,
+    "views": (0.0, 45.0),
+    "around": (0.0, 45.0),
+}
 
-OUT = click.option("--out", metavar="DIR", help="Folder of runs, tables and figures; continues an earlier one there.")
-WORKERS = click.option("--workers", type=int, default=2, show_default=True, metavar="N", help="Processes.")
+OUT = click.option(
+    "--out",
+    metavar="DIR",
+    help="Folder of runs, tables and figures; continues an earlier one there.",
+)
+WORKERS = click.option(
+    "--workers", type=int, default=2, show_default=True, metavar="N", help="Processes."
+)
 CLIPS = click.option(
     "--clips",
     envvar="POSEFIT_CMU",
@@ -36,7 +48,13 @@ CLIPS = click.option(
 
 
 @reproduce_group.command("vsmm")
-@click.option("--films", type=int, default=10, show_default=True, help="Films, of those that no default was chosen on.")
+@click.option(
+    "--films",
+    type=int,
+    default=10,
+    show_default=True,
+    help="Films, of those that no default was chosen on.",
+)
 @OUT
 @WORKERS
 def vsmm_command(films: int, out: str | None, workers: int) -> None:
@@ -48,7 +66,13 @@ def vsmm_command(films: int, out: str | None, workers: int) -> None:
 
 @reproduce_group.command("sapso")
 @CLIPS
-@click.option("--seeds", type=int, default=10, show_default=True, help="Tracks of each method, motion and view.")
+@click.option(
+    "--seeds",
+    type=int,
+    default=10,
+    show_default=True,
+    help="Tracks of each method, motion and view.",
+)
 @click.option(
     "--quick",
     is_flag=True,
@@ -56,11 +80,15 @@ def vsmm_command(films: int, out: str | None, workers: int) -> None:
 )
 @OUT
 @WORKERS
-def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int) -> None:
+def sapso_command(
+    clips: str | None, seeds: int, quick: bool, out: str | None, workers: int
+) -> None:
     """A walk, a walk with a turn and a run: Acta Automatica Sinica 38(5), and what each part of its method is worth."""
     from posefit_reproduce.sapso.experiment import Scale
 
-    _run(paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers)
+    _run(
+        paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers
+    )
 
 
 def _run(experiment: "Experiment", out: str | None, workers: int) -> None:
@@ -71,7 +99,11 @@ def _run(experiment: "Experiment", out: str | None, workers: int) -> None:
 
 
 @click.command("bench")
-@click.option("--threads", type=click.IntRange(1), help="Threads of the multi-threaded figures; by default every core.")
+@click.option(
+    "--threads",
+    type=click.IntRange(1),
+    help="Threads of the multi-threaded figures; by default every core.",
+)
 @JSON
 def bench_command(threads: int | None, as_json: bool) -> None:
     """Time the kernel, the OpenCV way, and every optimiser's ask and tell, all in one run.
@@ -92,7 +124,9 @@ def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:
         if isinstance(value, Mapping):
             yield from _named_lines(value, f"{group}{name}.")
         else:
-            yield f"{group + name:50} " + (f"{value:.4g}" if isinstance(value, float) else str(value))
+            yield f"{group + name:50} " + (
+                f"{value:.4g}" if isinstance(value, float) else str(value)
+            )
 
 
 def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
@@ -107,8 +141,14 @@ def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
         [*scale.runs],
         partial(perform, clips, scale),
         lambda results: paper_tables(analysis(results)),
-        lambda results: import_module("posefit_reproduce.sapso.figures").paper_figures(analysis(results)),
-        {"frames": scale.frames, "iterations": scale.iterations, "clips": digests(clips)},
+        lambda results: import_module("posefit_reproduce.sapso.figures").paper_figures(
+            analysis(results)
+        ),
+        {
+            "frames": scale.frames,
+            "iterations": scale.iterations,
+            "clips": digests(clips),
+        },
     )
 
 
@@ -122,5 +162,7 @@ def patent_experiment(scale: Any) -> "Experiment":
         [*scale.runs],
         perform,
         patent_tables,
-        lambda results: import_module("posefit_reproduce.vsmm.figures").patent_figures(results),
+        lambda results: import_module("posefit_reproduce.vsmm.figures").patent_figures(
+            results
+        ),
     )

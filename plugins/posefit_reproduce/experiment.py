@@ -28,7 +28,8 @@ from posefit.statistics.means import Mean, mean_interval
 from posefit.version import posefit_build
 from posefit_reproduce.jobs import Progress, each
 
-RECORD, MAX_RECORD_BYTES = "runs.json", 100_000
+RECORD = "runs.json"
+MAX_RECORD_BYTES = 100_000
 LEVEL = 0.95  # of an interval, or of all the intervals of a table of claims together
 Arrays = Mapping[str, Any]
 Verdict = Literal["holds", "fails", "not decided"]
@@ -47,7 +48,11 @@ class Run(NamedTuple):
     def file(self) -> str:
         """The name of its file."""
         return re.sub(
-            r"[^\w.+-]+", "_", "-".join(f"{part:g}" if isinstance(part, float) else str(part) for part in self)
+            r"[^\w.+-]+",
+            "_",
+            "-".join(
+                f"{part:g}" if isinstance(part, float) else str(part) for part in self
+            ),
         )
 
 
@@ -59,8 +64,13 @@ class Results:
 
     def of(self, name: str, kind: str, subject: str, method: str) -> Array:
         """Return a named array of all runs of a method, (views, seeds, ...)."""
-        rows = {run[3:]: arrays[name] for run, arrays in self.runs.items() if run[:3] == (kind, subject, method)}
-        views, seeds = sorted({view for view, _ in rows}), sorted({seed for _, seed in rows})
+        rows = {
+            run[3:]: arrays[name]
+            for run, arrays in self.runs.items()
+            if run[:3] == (kind, subject, method)
+        }
+        views = sorted({view for view, _ in rows})
+        seeds = sorted({seed for _, seed in rows})
         return np.array([[rows[view, seed] for seed in seeds] for view in views])
 
     def has(self, kind: str, subject: str, method: str) -> bool:
@@ -79,7 +89,13 @@ class Table(NamedTuple):
     def __str__(self) -> str:
         """The table in Markdown."""
         rule = "|" + "---|" * self.words + "---:|" * (len(self.heads) - self.words)
-        return "\n".join([f"| {' | '.join(self.heads)} |", rule, *(f"| {' | '.join(row)} |" for row in self.rows)])
+        return "\n".join(
+            [
+                f"| {' | '.join(self.heads)} |",
+                rule,
+                *(f"| {' | '.join(row)} |" for row in self.rows),
+            ]
+        )
 
 
 class Claim(NamedTuple):
@@ -100,7 +116,8 @@ class Claim(NamedTuple):
     def verdict(self, level: float) -> tuple[Verdict, Mean]:
         """Return the verdict by an interval of a level, and that interval. Nothing is decided without one."""
         mean = interval(self.values, level)
-        lower, higher = mean.high < self.bound, mean.low > self.bound
+        lower = mean.high < self.bound
+        higher = mean.low > self.bound
         if lower or higher:
             return "holds" if higher == self.above else "fails", mean
         return "not decided", mean
@@ -132,9 +149,12 @@ def claims_table(name: str, claims: Sequence[Claim]) -> Table:
         for subject, claim in by_subject.items():
             verdict, mean = claim.verdict(level)
             cells[subject] = f"**{verdict}** {bounded(mean)}"
-        *_, last = by_subject.values()  # source, unit, direction and number of runs are the same in all
+        # source, unit, direction and number of runs are the same in all
+        *_, last = by_subject.values()
         count = str(last.values.size) if last.values.ndim else "-"
-        bounds = " / ".join(dict.fromkeys(f"{claim.bound:.3g}" for claim in by_subject.values()))
+        bounds = " / ".join(
+            dict.fromkeys(f"{claim.bound:.3g}" for claim in by_subject.values())
+        )
         condition = f"{'above' if last.above else 'below'} {bounds} {last.unit}"
         rows.append([text, last.source, condition, count, *cells.values()])
     return Table(name, ["claim", "where", "holds if", "n", *subjects], rows, 3)
@@ -154,11 +174,18 @@ class Experiment:
     runs: Sequence[Run]
     perform: Callable[[Run], Arrays]
     tables: Callable[[Results], Iterable[Table]]
-    figures: Callable[[Results], Iterable[tuple[str, Any]]]  # by names of files: matplotlib's figures, or images
-    shared: Mapping[str, Any] = field(default_factory=dict)  # what all runs depend on, beside their names
+    # by names of files: matplotlib's figures, or images
+    figures: Callable[[Results], Iterable[tuple[str, Any]]]
+    # what all runs depend on, beside their names
+    shared: Mapping[str, Any] = field(default_factory=dict)
 
 
-def reproduce(experiment: Experiment, out: str | Path | None, workers: int, progress: Progress | None) -> list[Table]:
+def reproduce(
+    experiment: Experiment,
+    out: str | Path | None,
+    workers: int,
+    progress: Progress | None,
+) -> list[Table]:
     """Return the tables of an experiment; with a folder, write them and the figures there, too.
 
     Runs that the folder holds are not run again. Raises InputError where it holds something else, or runs that depend
@@ -172,7 +199,11 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
         folder = Path(place)
         _make_runs_folder(folder)
         files = {run: folder / "runs" / f"{run.file}.npz" for run in experiment.runs}
-        jobs = {run: partial(_store, experiment.perform, run, file) for run, file in files.items() if not file.exists()}
+        jobs = {
+            run: partial(_store, experiment.perform, run, file)
+            for run, file in files.items()
+            if not file.exists()
+        }
         _check_record(folder, experiment.shared, bool(jobs))
         if jobs:
             each(jobs, workers, progress)
@@ -183,7 +214,9 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
                 (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
             for name, figure in experiment.figures(results):
                 if isinstance(figure, np.ndarray):
-                    (folder / name).write_bytes(cv2.imencode(Path(name).suffix, figure)[1].tobytes())
+                    (folder / name).write_bytes(
+                        cv2.imencode(Path(name).suffix, figure)[1].tobytes()
+                    )
                 else:
                     figure.savefig(folder / name, dpi=130)
     return tables
@@ -193,10 +226,14 @@ def _make_runs_folder(folder: Path) -> None:
     """Make the folder of runs where there is none. Raises InputError where the folder holds something else."""
     try:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / "runs").is_dir():
-            raise InputError(f"{folder}: expected a new folder or one of an earlier reproduction, got another one")
+            raise InputError(
+                f"{folder}: expected a new folder or one of an earlier reproduction, got another one"
+            )
         (folder / "runs").mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: expected a folder to write to, got {error.strerror}") from error
+        raise InputError(
+            f"{folder}: expected a folder to write to, got {error.strerror}"
+        ) from error
 
 
 def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None:
@@ -205,10 +242,15 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
     The build of posefit counts only where runs are added to others.
     """
     file = folder / RECORD
-    now = {name: digest_of(value) for name, value in {**shared, "build": posefit_build()}.items()}
+    now = {
+        name: digest_of(value)
+        for name, value in {**shared, "build": posefit_build()}.items()
+    }
     if not file.exists():
         if any((folder / "runs").iterdir()):
-            say(f"warning: {file}: there is none, so that what the runs depend on is not checked")
+            say(
+                f"warning: {file}: there is none, so that what the runs depend on is not checked"
+            )
         else:
             file.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
         return
@@ -216,10 +258,17 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
         before = parsed_json(read_text(file, MAX_RECORD_BYTES))
     except ValueError:
         before = None
-    if not isinstance(before, dict) or not all(isinstance(value, dict) for value in before.values()):
-        raise InputError(f"{file}: expected what all runs have in common, got something else")
+    if not isinstance(before, dict) or not all(
+        isinstance(value, dict) for value in before.values()
+    ):
+        raise InputError(
+            f"{file}: expected what all runs have in common, got something else"
+        )
     if not adding:
-        before, now = ({name: value[name] for name in value if name != "build"} for value in (before, now))
+        before, now = (
+            {name: value[name] for name in value if name != "build"}
+            for value in (before, now)
+        )
     if changed := difference(before, now):
         raise InputError(f"{folder}: {changed}")
 

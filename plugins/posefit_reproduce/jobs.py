@@ -28,7 +28,8 @@ def each(
     engine = Pool(min(wanted, len(jobs)), limits or Limits(), _called)
 
     def ended() -> Iterator[tuple[K, T]]:
-        waiting, running = deque(jobs.items()), 0
+        waiting = deque(jobs.items())
+        running = 0
         while waiting or running:
             while waiting and running < engine.window():
                 engine.submit(waiting.popleft())

@@ -8,7 +8,16 @@ import math
 
 import numpy as np
 
-from posefit.plugin import Array, Space, at_least, between, check_tell, displacement, draw_population, positive
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    displacement,
+    draw_population,
+    positive,
+)
 from posefit_swarm.sapso import REDRAWS, Rows, first_velocities, fly, limited, redrawn
 
 
@@ -35,7 +44,9 @@ class PSO:
         at_least("population_size", population_size, 1)
         between("phi", phi, 4.0, math.inf, ends=False)
         positive("alpha", alpha)
-        self.space, self.rng, self.waiting = space, rng, 0
+        self.space = space
+        self.rng = rng
+        self.waiting = 0
         self.phi, self.chi, self.alpha = phi, constriction(phi), alpha
         self.x = draw_population(space, rng, population_size)
         self.v = first_velocities(space, rng, population_size, alpha)
@@ -52,13 +63,17 @@ class PSO:
         self.waiting = 0
         better = costs < self.pbest_cost  # KENNEDY1995 (pbest, gbest)
         self.pbest[better], self.pbest_cost[better] = self.x[better], costs[better]
-        self.v, self.x = redrawn(self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS)
+        self.v, self.x = redrawn(
+            self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS
+        )
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
         """Return velocities and positions (k, d) of some particles (k,) after a move."""
-        x, gbest = self.x[rows], self.pbest[self.pbest_cost.argmin()]
+        x = self.x[rows]
+        gbest = self.pbest[self.pbest_cost.argmin()]
         phi1, phi2 = self.phi / 2.0 * self.rng.random((2, *x.shape))
-        to_pbest, to_gbest = displacement(self.space, x, self.pbest[rows]), displacement(self.space, x, gbest)
+        to_pbest = displacement(self.space, x, self.pbest[rows])
+        to_gbest = displacement(self.space, x, gbest)
         v = self.v[rows] + phi1 * to_pbest + phi2 * to_gbest  # KENNEDY1995 (velocity)
         v = self.chi * v  # CLERC2002 (velocity)
         return fly(self.space, x, limited(v, self.alpha))
@@ -66,4 +81,5 @@ class PSO:
 
 def constriction(phi: float) -> float:
     """Return chi of two accelerations that sum up to phi > 4: the swarm neither explodes nor stands still."""
-    return 2.0 / abs(2.0 - phi - math.sqrt(phi * phi - 4.0 * phi))  # CLERC2002 (constriction)
+    # CLERC2002 (constriction)
+    return 2.0 / abs(2.0 - phi - math.sqrt(phi * phi - 4.0 * phi))

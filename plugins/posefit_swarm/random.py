@@ -14,9 +14,14 @@ class Random:
 
     baseline = True  # the chance that other optimisers are held against
 
-    def __init__(self, space: Space, rng: np.random.Generator, *, population_size: int = 40) -> None:
+    def __init__(
+        self, space: Space, rng: np.random.Generator, *, population_size: int = 40
+    ) -> None:
         at_least("population_size", population_size, 1)
-        self._space, self._rng, self._population_size, self._waiting = space, rng, population_size, 0
+        self._space = space
+        self._rng = rng
+        self._population_size = population_size
+        self._waiting = 0
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""

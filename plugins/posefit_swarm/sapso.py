@@ -23,7 +23,9 @@ from posefit.plugin import (
     wrap,
 )
 
-REDRAWS = 10  # ours: of rand() for a particle that is no pose to the prior; then it stays. Interpretation S7
+# ours: of rand() for a particle that is no pose to the prior; then it stays.
+# Interpretation S7
+REDRAWS = 10
 
 Rows = NDArray[np.int64]
 
@@ -64,9 +66,17 @@ class SAPSO:
         between("inertia", inertia, 0.1, math.inf, ends=False)
         at_least("acceleration", acceleration, 0.0)
         positive("alpha", alpha)
-        self.space, self.rng, self.c, self.C, self.waiting = space, rng, 0, iterations, 0
-        self.T, self.gamma, self.T0 = temperature, cooling, stop_temperature
-        self.A, self.acceleration, self.alpha = inertia, acceleration, alpha
+        self.space = space
+        self.rng = rng
+        self.c = 0
+        self.C = iterations
+        self.waiting = 0
+        self.T = temperature
+        self.gamma = cooling
+        self.T0 = stop_temperature
+        self.A = inertia
+        self.acceleration = acceleration
+        self.alpha = alpha
         # the positions to be evaluated next; c counts iterations, and the paper's own c is c ln(10 A) / C
         self.moved = draw_population(space, rng, population_size)  # SAPSO A1.1
         self.x, self.cost = self.moved.copy(), np.full(population_size, np.inf)
@@ -86,14 +96,20 @@ class SAPSO:
         if self.c > 0:  # the first evaluation is no move
             self.T *= self.gamma  # SAPSO A1.2e
         if self.c < self.C:
-            self.v, self.moved = redrawn(self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS)
-        self.c, self.waiting = self.c + 1, 0
+            self.v, self.moved = redrawn(
+                self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS
+            )
+        self.c = self.c + 1
+        self.waiting = 0
 
     def accept(self, costs: Array) -> int:
         """Accept or refuse the moves by their costs (N,), remember the bests, and return how many are accepted."""
-        with np.errstate(invalid="ignore", over="ignore"):  # infinity less infinity; nan is never accepted
-            chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))  # Metropolis' criterion
-        accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))  # SAPSO A1.2d
+        # infinity less infinity; nan is never accepted
+        with np.errstate(invalid="ignore", over="ignore"):
+            # Metropolis' criterion
+            chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))
+        # SAPSO A1.2d
+        accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))
         self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
         better = self.cost < self.pbest_cost  # SAPSO A1.2b
         self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
@@ -105,9 +121,13 @@ class SAPSO:
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
         """Return velocities and positions (k, d) of some particles (k,) after a move."""
-        x, gbest, omega = self.x[rows], self.pbest[self.pbest_cost.argmin()], self.inertia()
-        phi1, phi2 = self.acceleration * self.rng.random((2, *x.shape))  # Interpretation S8
-        to_pbest, to_gbest = displacement(self.space, x, self.pbest[rows]), displacement(self.space, x, gbest)
+        x = self.x[rows]
+        gbest = self.pbest[self.pbest_cost.argmin()]
+        omega = self.inertia()
+        # Interpretation S8
+        phi1, phi2 = self.acceleration * self.rng.random((2, *x.shape))
+        to_pbest = displacement(self.space, x, self.pbest[rows])
+        to_gbest = displacement(self.space, x, gbest)
         v = omega * self.v[rows] + phi1 * to_pbest + phi2 * to_gbest  # SAPSO (1)
         return fly(self.space, x, limited(v, self.alpha))
 
@@ -122,13 +142,19 @@ def limited(v: Array, alpha: float) -> Array:
     return np.minimum(np.maximum(v, -alpha), alpha)  # SAPSO 2.2 velocity
 
 
-def first_velocities(space: Space, rng: np.random.Generator, count: int, alpha: float) -> Array:
+def first_velocities(
+    space: Space, rng: np.random.Generator, count: int, alpha: float
+) -> Array:
     """Return the velocities (count, d) of first particles, towards the prediction where there is one."""
     if space.start is None:
-        return rng.uniform(-alpha, alpha, (count, space.dimensions))  # ours: the paper does not say
+        # ours: the paper does not say
+        return rng.uniform(-alpha, alpha, (count, space.dimensions))
     v_pred = space.start.velocity
-    low, high = np.minimum(v_pred, 0.0), np.maximum(v_pred, 0.0)  # Interpretation S12
-    return limited(rng.uniform(low, high, (count, space.dimensions)), alpha)  # SAPSO (7)
+    # Interpretation S12
+    low = np.minimum(v_pred, 0.0)
+    high = np.maximum(v_pred, 0.0)
+    # SAPSO (7)
+    return limited(rng.uniform(low, high, (count, space.dimensions)), alpha)
 
 
 def fly(space: Space, x: Array, v: Array) -> tuple[Array, Array]:
@@ -154,7 +180,8 @@ def redrawn(
     broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c
     if len(broken):
         again = step(np.repeat(broken, redraws))
-        works, shape = allowed(*again).reshape(len(broken), redraws), (len(broken), redraws, -1)
+        works = allowed(*again).reshape(len(broken), redraws)
+        shape = (len(broken), redraws, -1)
         v[broken] = first_that_works(again[0].reshape(shape), works, 0.0)
         moved[broken] = first_that_works(again[1].reshape(shape), works, x[broken])
     return v, moved

@@ -14,7 +14,8 @@ class Topology(NamedTuple):
     groups: Mapping[str, tuple[str, ...]]
     neighbours: Mapping[str, tuple[str, ...]]  # which models each changes into
     activities: Mapping[str, tuple[str, ...]]  # the labels of frames, and their models
-    stay: float  # how probable it is that a model goes on; the rest is shared among its neighbours
+    # how probable it is that a model goes on; the rest is shared among its neighbours
+    stay: float
 
     def transition(self, models: Sequence[str]) -> Array:
         """Return how probable each of some models (r, r) is after each: `stay`, the rest among its neighbours there.
@@ -23,7 +24,11 @@ class Topology(NamedTuple):
         """
         matrix = np.zeros((len(models), len(models)))
         for i, name in enumerate(models):
-            others = [j for j, other in enumerate(models) if other in self.neighbours[name] and j != i]
+            others = [
+                j
+                for j, other in enumerate(models)
+                if other in self.neighbours[name] and j != i
+            ]
             others = others or [j for j in range(len(models)) if j != i]
             matrix[i, others] = (1.0 - self.stay) / max(1, len(others))
             matrix[i, i] = self.stay if others else 1.0
@@ -35,10 +40,14 @@ class Topology(NamedTuple):
         return tuple(dict.fromkeys(model for models in chosen for model in models))
 
 
-def most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array) -> str:
+def most_probable(
+    sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array
+) -> str:
     """Return the name of the set, a group or an activity, whose models are the most probable together."""
     known = dict(zip(models, probabilities, strict=True))
-    return max(sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name]))
+    return max(
+        sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name])
+    )
 
 
 # Interpretation V1. The rules of step 7 speak of the first, the second and the third group.

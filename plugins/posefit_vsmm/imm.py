@@ -37,7 +37,9 @@ class Manifold:
                 break
         return means
 
-    def spreads(self, states: Array, covariances: Array, weights: Array, means: Array) -> Array:
+    def spreads(
+        self, states: Array, covariances: Array, weights: Array, means: Array
+    ) -> Array:
         """Return the covariances (k, e, e) around means of mixtures of states (r, n) and covariances (r, e, e)."""
         errors = self.minus(states, means[:, None])
         between = (weights[..., None] * errors).swapaxes(1, 2) @ errors
@@ -76,7 +78,12 @@ Measure = Callable[[Array], Measurement]
 def start(state: Array, covariance: Array, models: int) -> Belief:
     """Return the belief in one state, with all models equally probable."""
     log_probabilities = np.full(models, -np.log(models))
-    return Belief(np.tile(state, (models, 1)), np.tile(covariance, (models, 1, 1)), log_probabilities, np.zeros(models))
+    return Belief(
+        np.tile(state, (models, 1)),
+        np.tile(covariance, (models, 1, 1)),
+        log_probabilities,
+        np.zeros(models),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,18 +98,26 @@ class IMM:
     predict: Callable[[Array, Array], tuple[Array, Array]]
     transition: Array
     manifold: Manifold = Manifold()
-    at_mixed: bool = False  # whether residuals are those of states before their prediction. Interpretation V3
+    # whether residuals are those of states before their prediction. Interpretation V3
+    at_mixed: bool = False
 
     def __post_init__(self) -> None:
-        if not ((self.transition >= 0.0).all() and np.allclose(self.transition.sum(axis=1), 1.0)):
-            raise InputError(f"transition must hold probabilities whose rows sum to 1, got {self.transition.tolist()}")
+        if not (
+            (self.transition >= 0.0).all()
+            and np.allclose(self.transition.sum(axis=1), 1.0)
+        ):
+            raise InputError(
+                f"transition must hold probabilities whose rows sum to 1, got {self.transition.tolist()}"
+            )
 
     def cycle(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief one frame later; `measure` returns the measurement for states."""
         mixed = self.mixed(belief)
         states, covariances = self.predict(mixed.states, mixed.covariances)  # VSMM 6.3a
         predicted = replace(mixed, states=states, covariances=covariances)
-        after = self.updated(predicted, (lambda _: measure(mixed.states)) if self.at_mixed else measure)
+        after = self.updated(
+            predicted, (lambda _: measure(mixed.states)) if self.at_mixed else measure
+        )
         joint = after.log_likelihoods + mixed.log_probabilities  # VSMM 6.4
         return replace(after, log_probabilities=joint - np.logaddexp.reduce(joint))
 
@@ -112,9 +127,13 @@ class IMM:
             steps = np.log(self.transition) + belief.log_probabilities[:, None]
             after = np.logaddexp.reduce(steps, axis=0)  # log c_j
             weights = np.exp(steps - after)  # VSMM 6.2a
-        weights = np.where(np.isfinite(after), weights, np.eye(len(after))).T  # its own, where none changes into it
+        # its own, where none changes into it
+        weights = np.where(np.isfinite(after), weights, np.eye(len(after))).T
         states = self.manifold.means(belief.states, weights)
-        covariances = self.manifold.spreads(belief.states, belief.covariances, weights, states)  # VSMM 6.2b
+        # VSMM 6.2b
+        covariances = self.manifold.spreads(
+            belief.states, belief.covariances, weights, states
+        )
         return Belief(states, covariances, after, belief.log_likelihoods)
 
     def updated(self, belief: Belief, measure: Measure) -> Belief:
@@ -125,19 +144,30 @@ class IMM:
             return replace(belief, log_likelihoods=np.zeros(count))
         across = jacobians @ belief.covariances
         innovations = across @ jacobians.swapaxes(1, 2) + noise  # VSMM 6.3b
-        solved = np.linalg.solve(innovations, np.concatenate([across, residuals[..., None]], axis=2))
-        distances = (residuals * solved[..., -1]).sum(axis=1)  # squared Mahalanobis distances
+        solved = np.linalg.solve(
+            innovations, np.concatenate([across, residuals[..., None]], axis=2)
+        )
+        # squared Mahalanobis distances
+        distances = (residuals * solved[..., -1]).sum(axis=1)
         log_determinants = np.linalg.slogdet(innovations)[1]
-        likelihoods = -0.5 * (distances + log_determinants + size * np.log(2.0 * np.pi))  # VSMM 6.3c
+        # VSMM 6.3c
+        likelihoods = -0.5 * (distances + log_determinants + size * np.log(2.0 * np.pi))
         gains = solved[..., :-1].swapaxes(1, 2)  # VSMM 6.3d
         rest = np.eye(jacobians.shape[2]) - gains @ jacobians
-        after = rest @ belief.covariances @ rest.swapaxes(1, 2) + gains @ noise @ gains.swapaxes(1, 2)  # Joseph's form
+        # Joseph's form
+        after = rest @ belief.covariances @ rest.swapaxes(
+            1, 2
+        ) + gains @ noise @ gains.swapaxes(1, 2)
         after = 0.5 * (after + after.swapaxes(1, 2))
-        states = self.manifold.plus(belief.states, (gains @ residuals[..., None])[..., 0])
+        states = self.manifold.plus(
+            belief.states, (gains @ residuals[..., None])[..., 0]
+        )
         return Belief(states, after, belief.log_probabilities, likelihoods)
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state and covariance that stand for all models."""
         weights = belief.probabilities[None]
         means = self.manifold.means(belief.states, weights)  # VSMM 6.5
-        return means[0], self.manifold.spreads(belief.states, belief.covariances, weights, means)[0]
+        return means[0], self.manifold.spreads(
+            belief.states, belief.covariances, weights, means
+        )[0]

@@ -35,7 +35,8 @@ from posefit_vsmm.state import (
 FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
 CLIP_FPS = 120.0  # the rate of the clips that they were fitted to
 LAMBDA = 0.15
-STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
+# of the deviation of an axis that a joint may turn about: that of one that it may not
+STIFF = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,26 +44,36 @@ class MotionModels:
     """Models (r,) side by side, for a body and a frame rate. Each has a state of its own."""
 
     names: tuple[str, ...]
-    matrices: Array = field(repr=False)  # (r, 43, 40) F less the identity, of the quaternions
+    # (r, 43, 40) F less the identity, of the quaternions
+    matrices: Array = field(repr=False)
     offsets: Array = field(repr=False)  # (r, 43)
     noises: Array = field(repr=False)  # (r, 33, 33) covariance of W
-    poses: Array = field(repr=False)  # (r, n, 40) quaternions of typical poses, heading along +z
-    captured: Array = field(repr=False)  # (r, n, 40) those of poses that a model was fitted to
+    # (r, n, 40) quaternions of typical poses, heading along +z
+    poses: Array = field(repr=False)
+    # (r, n, 40) those of poses that a model was fitted to
+    captured: Array = field(repr=False)
     leg: float = 1.0  # metres
     share: float = 1.0  # of the step at 30 frames a second
 
     def of(self, names: Sequence[str]) -> "MotionModels":
         """Return some of the models."""
         rows = [self.names.index(name) for name in names]
-        chosen = {name: getattr(self, name)[rows] for name in ("matrices", "offsets", "noises", "poses", "captured")}
+        chosen = {
+            name: getattr(self, name)[rows]
+            for name in ("matrices", "offsets", "noises", "poses", "captured")
+        }
         return replace(self, names=tuple(names), **chosen)
 
-    def fitted_to(self, skeleton: Skeleton, fps: float, process_noise: float = 1.0) -> "MotionModels":
+    def fitted_to(
+        self, skeleton: Skeleton, fps: float, process_noise: float = 1.0
+    ) -> "MotionModels":
         """Return the models for a body's legs and another frame rate, of which a step is a share of a step at 30."""
-        leg, share = leg_of(skeleton), FPS / fps
+        leg = leg_of(skeleton)
+        share = FPS / fps
         scale = np.maximum(free_errors(skeleton), STIFF)
         scale[:3] = leg
-        noises = process_noise * share * self.noises * np.outer(scale, scale)  # Interpretation V7
+        # Interpretation V7
+        noises = process_noise * share * self.noises * np.outer(scale, scale)
         return replace(self, noises=noises, leg=leg, share=share)
 
     def predict(self, states: Array, covariances: Array) -> tuple[Array, Array]:
@@ -75,30 +86,45 @@ class MotionModels:
         """Return the same for covariances (r, 43, 43) of the states' numbers. Interpretation V4."""
         before = unit(states)
         changes = inverse_tangents(before)
-        moved, after = self.predict(before, changes @ covariances @ changes.swapaxes(1, 2))
+        moved, after = self.predict(
+            before, changes @ covariances @ changes.swapaxes(1, 2)
+        )
         return moved, lifted(moved, after)
 
     def step(self, states: Array) -> Array:
         """Return the states (r, n, 43) one frame later, n of each model: moved by F without their headings."""
         headings, before = without_heading(states)
-        signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)  # F is that of quaternions with w above 0
+        # F is that of quaternions with w above 0
+        signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)
         inputs = (signs * before).reshape(*states.shape[:-1], -1)
-        change = self.share * (inputs @ self.matrices.swapaxes(1, 2) + self.offsets[:, None])
+        change = self.share * (
+            inputs @ self.matrices.swapaxes(1, 2) + self.offsets[:, None]
+        )
         after = before + signs * quaternions_of(change)
         after /= lengths(after)
         after[..., 0, :] = product(headings, after[..., 0, :])
-        w, y = headings[..., 0], headings[..., 2]
-        sine, cosine = 2.0 * w * y, w * w - y * y
+        w = headings[..., 0]
+        y = headings[..., 2]
+        sine = 2.0 * w * y
+        cosine = w * w - y * y
         side, up, ahead = self.leg * np.moveaxis(change[..., :3], -1, 0)
-        way = np.stack([cosine * side + sine * ahead, up, cosine * ahead - sine * side], axis=-1)
+        way = np.stack(
+            [cosine * side + sine * ahead, up, cosine * ahead - sine * side], axis=-1
+        )
         return joined_state(states[..., :3] + way, after)
 
     def typical_states(self, yaws: Array, place: Array) -> Array:
         """Return the states (n, 43) of all typical poses at a place (3,), turned by each of some yaws."""
-        headings = np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1) @ np.eye(4)[[0, 2]]
+        headings = (
+            np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1)
+            @ np.eye(4)[[0, 2]]
+        )
         turns = np.tile(self.poses.reshape(-1, TURNS, 4), (len(yaws), 1, 1, 1))
         turns[:, :, 0] = product(headings[:, None], turns[:, :, 0])
-        return joined_state(np.tile(place, (turns.shape[0] * turns.shape[1], 1)), turns.reshape(-1, TURNS, 4))
+        return joined_state(
+            np.tile(place, (turns.shape[0] * turns.shape[1], 1)),
+            turns.reshape(-1, TURNS, 4),
+        )
 
     def captured_nearest(self, name: str, state: Array) -> Array:
         """Return a state (43,) with its place and heading, in the captured pose of a model nearest to it."""
@@ -107,7 +133,9 @@ class MotionModels:
         similarity = np.abs(np.einsum("nij,ij->ni", poses, turns))
         pose = poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
         pose[0] = product(heading, pose[0])
-        signs = np.where((pose * quaternions_of(state)).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+        signs = np.where(
+            (pose * quaternions_of(state)).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0
+        )
         return unit(joined_state(state[:3], signs * pose))
 
 
@@ -116,7 +144,9 @@ def without_heading(states: Array) -> tuple[Array, Array]:
     turns = quaternions_of(states).copy()
     headings = turns[..., 0, :] * [1.0, 0.0, 1.0, 0.0]
     sizes = lengths(headings)
-    headings = np.where(sizes > 1e-9, headings / np.maximum(sizes, 1e-9), [1.0, 0.0, 0.0, 0.0])
+    headings = np.where(
+        sizes > 1e-9, headings / np.maximum(sizes, 1e-9), [1.0, 0.0, 0.0, 0.0]
+    )
     turns[..., 0, :] = product(headings * [1.0, 1.0, -1.0, 1.0], turns[..., 0, :])
     return headings, turns
 
@@ -124,7 +154,9 @@ def without_heading(states: Array) -> tuple[Array, Array]:
 def lifted(states: Array, covariances: Array) -> Array:
     """Return the covariances (r, 43, 43) of the numbers of states (r, 43), of those of their errors (r, 33, 33)."""
     changes = tangents(states)
-    return np.asarray(changes @ covariances @ changes.swapaxes(1, 2) + 1e-9 * np.eye(STATE))
+    return np.asarray(
+        changes @ covariances @ changes.swapaxes(1, 2) + 1e-9 * np.eye(STATE)
+    )
 
 
 class Library(NamedTuple):
@@ -143,12 +175,22 @@ def library(shrunk_to: Literal["identity", "zero"] = "identity") -> Library:
     stored = json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8"))
     models: dict[str, Any] = stored["models"]
     fits = [model[shrunk_to] for model in models.values()]
-    matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
-    poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
+    matrices, offsets, noises = (
+        np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise")
+    )
+    poses, captured = (
+        np.array([model[key] for model in models.values()])
+        for key in ("poses", "captured")
+    )
     turns = captured.reshape(*captured.shape[:2], TURNS, 4)
     captured = (turns / lengths(turns)).reshape(captured.shape)
-    dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
-    return Library(MotionModels(tuple(models), matrices, offsets, noises, poses, captured), dependent)
+    dependent = DependentJoints(
+        *(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset"))
+    )
+    return Library(
+        MotionModels(tuple(models), matrices, offsets, noises, poses, captured),
+        dependent,
+    )
 
 
 def ridge(inputs: Array, outputs: Array, weight: float = LAMBDA) -> Array:
@@ -159,4 +201,8 @@ def ridge(inputs: Array, outputs: Array, weight: float = LAMBDA) -> Array:
 
 def leg_of(skeleton: Skeleton) -> float:
     """Return how long a leg is, in metres, from hip to ankle."""
-    return float(skeleton.lengths[[SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]].sum())
+    return float(
+        skeleton.lengths[
+            [SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]
+        ].sum()
+    )

@@ -13,7 +13,9 @@ from posefit.arrays import Array
 from posefit.silhouette.mask import Mask
 
 MIN_PIECE = 0.05  # of the largest piece's area: a smaller piece is no part of a person
-SPUR = 1.2  # radii of the body where it branches off: a shorter branch of the skeleton line is a bump of the outline
+# radii of the body where it branches off: a shorter branch of the skeleton line is a
+# bump of the outline
+SPUR = 1.2
 
 
 class Lines(NamedTuple):
@@ -38,7 +40,9 @@ def lines_of(mask: Mask) -> Lines | None:
     corner = np.array([left - 2, top - 2], dtype=np.float64) + 0.5  # pixel centres
     outlines, _ = cv2.findContours(clean, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     thin = np.asarray(skeletonize(clean > 0), dtype=np.uint8)  # type: ignore[no-untyped-call]  # VSMM 1.4
-    ends = _ends(thin, np.asarray(cv2.distanceTransform(clean, cv2.DIST_L2, 3), dtype=np.float32))
+    ends = _ends(
+        thin, np.asarray(cv2.distanceTransform(clean, cv2.DIST_L2, 3), dtype=np.float32)
+    )
     return Lines(
         np.argwhere(clean)[:, ::-1] + corner,
         np.concatenate([outline[:, 0] for outline in outlines]) + corner,
@@ -51,7 +55,9 @@ def _large_pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0  # the background
-    return np.asarray((areas >= max(1.0, MIN_PIECE * areas.max()))[labels], dtype=np.uint8)
+    return np.asarray(
+        (areas >= max(1.0, MIN_PIECE * areas.max()))[labels], dtype=np.uint8
+    )
 
 
 def _ends(thin: NDArray[np.uint8], radii: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -62,11 +68,18 @@ def _ends(thin: NDArray[np.uint8], radii: NDArray[np.float32]) -> NDArray[np.int
     square = np.ones((3, 3), np.uint8)
     count = cv2.filter2D(thin, -1, square, borderType=cv2.BORDER_CONSTANT)
     junctions = (thin > 0) & (count > 3)
-    _, branches = cv2.connectedComponents(thin * (count <= 3).astype(np.uint8), connectivity=8)
+    _, branches = cv2.connectedComponents(
+        thin * (count <= 3).astype(np.uint8), connectivity=8
+    )
     ends = []
     for end in np.argwhere((thin > 0) & (count == 2)):
-        around = cv2.dilate((branches == branches[tuple(end)]).astype(np.uint8), square) > 0
+        around = (
+            cv2.dilate((branches == branches[tuple(end)]).astype(np.uint8), square) > 0
+        )
         starts = np.argwhere(around & junctions)
-        if not len(starts) or np.hypot(*(end - starts[0])) > SPUR * radii[tuple(starts[0])]:
+        if (
+            not len(starts)
+            or np.hypot(*(end - starts[0])) > SPUR * radii[tuple(starts[0])]
+        ):
             ends.append(end)
     return np.array(ends, dtype=np.int64).reshape(-1, 2)

@@ -16,24 +16,44 @@ from posefit.geometry import rotation
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angles_of
 
 # hips, knees, shoulders, elbows, neck
-BONES = ("lfemur", "ltibia", "rfemur", "rtibia", "lhumerus", "lradius", "rhumerus", "rradius", "lowerneck")
+BONES = (
+    "lfemur",
+    "ltibia",
+    "rfemur",
+    "rtibia",
+    "lhumerus",
+    "lradius",
+    "rhumerus",
+    "rradius",
+    "lowerneck",
+)
 TURNS = 1 + len(BONES)  # quaternions of a state: the whole body's, and each bone's
-STATE, ERROR = 3 + 4 * TURNS, 3 + 3 * TURNS
-FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and the whole body's rotation vector
+STATE = 3 + 4 * TURNS
+ERROR = 3 + 3 * TURNS
+# where the bones' part of an error starts: behind the step and the whole body's
+# rotation vector
+FIRST_BONE = 6
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
-HELD_ANGLES, OTHER_ANGLES = angles_of(BONES), angles_of([JOINTS[joint] for joint in INNER if joint not in HELD])
-DIFFERENCE = 1e-4  # metres and radians to either side, from which functions of a state are differentiated
+HELD_ANGLES = angles_of(BONES)
+OTHER_ANGLES = angles_of([JOINTS[joint] for joint in INNER if joint not in HELD])
+# metres and radians to either side, from which functions of a state are differentiated
+DIFFERENCE = 1e-4
 
 _W, _X, _Y, _Z = np.eye(4)
 # row a holds the products (4, 4) of the a-th of the units 1, i, j, k with each of them
-_PRODUCTS = np.array([_W, _X, _Y, _Z, _X, -_W, _Z, -_Y, _Y, -_Z, -_W, _X, _Z, _Y, -_X, -_W]).reshape(4, 16)
+_PRODUCTS = np.array(
+    [_W, _X, _Y, _Z, _X, -_W, _Z, -_Y, _Y, -_Z, -_W, _X, _Z, _Y, -_X, -_W]
+).reshape(4, 16)
 # where the numbers of quaternions (10, 4, 1) are in a state, and their rotation vectors (10, 1, 3) in an error
-_NUMBERS, _VECTORS = np.arange(3, STATE).reshape(TURNS, 4, 1), np.arange(3, ERROR).reshape(TURNS, 1, 3)
+_NUMBERS = np.arange(3, STATE).reshape(TURNS, 4, 1)
+_VECTORS = np.arange(3, ERROR).reshape(TURNS, 1, 3)
 
 
 def free_errors(skeleton: Skeleton) -> Array:
     """Return 1 for each error (33,) that a skeleton's joints allow, and 0 for the others: a knee is a hinge."""
-    return np.concatenate([np.ones(FIRST_BONE), skeleton.free[HELD_ANGLES].astype(np.float64)])
+    return np.concatenate(
+        [np.ones(FIRST_BONE), skeleton.free[HELD_ANGLES].astype(np.float64)]
+    )
 
 
 def joined_state(translations: Array, turns: Array) -> Array:
@@ -59,7 +79,9 @@ def unit(states: Array) -> Array:
 
 def product(first: Array, second: Array) -> Array:
     """Return the products (..., 4) of quaternions (..., 4)."""
-    return np.asarray((second[..., None, :] @ (first @ _PRODUCTS).reshape(*first.shape, 4))[..., 0, :])
+    return np.asarray(
+        (second[..., None, :] @ (first @ _PRODUCTS).reshape(*first.shape, 4))[..., 0, :]
+    )
 
 
 def rotation_matrices(turns: Array) -> Array:
@@ -78,28 +100,45 @@ def rotation_vectors(turns: Array) -> Array:
     turns = np.where(turns[..., :1] < 0.0, -turns, turns)
     sines = lengths(turns[..., 1:])
     angles = 2.0 * np.arctan2(sines, turns[..., :1])
-    return np.asarray(turns[..., 1:] * np.where(sines < 1e-8, 2.0, angles / np.maximum(sines, 1e-8)))
+    return np.asarray(
+        turns[..., 1:] * np.where(sines < 1e-8, 2.0, angles / np.maximum(sines, 1e-8))
+    )
 
 
 def plus(states: Array, errors: Array) -> Array:
     """Return states (..., 43) moved by errors (..., 33)."""
     vectors = errors[..., 3:].reshape(*errors.shape[:-1], TURNS, 3)
     halves = 0.5 * lengths(vectors)
-    turns = np.concatenate([np.cos(halves), 0.5 * np.sinc(halves / np.pi) * vectors], axis=-1)
-    return unit(joined_state(states[..., :3] + errors[..., :3], product(quaternions_of(states), turns)))
+    turns = np.concatenate(
+        [np.cos(halves), 0.5 * np.sinc(halves / np.pi) * vectors], axis=-1
+    )
+    return unit(
+        joined_state(
+            states[..., :3] + errors[..., :3], product(quaternions_of(states), turns)
+        )
+    )
 
 
 def minus(first: Array, second: Array) -> Array:
     """Return the errors (..., 33) that lead from states `second` to `first`, both (..., 43), the shorter way round."""
     inverses = quaternions_of(second) * [1.0, -1.0, -1.0, -1.0]
-    return joined_state(first[..., :3] - second[..., :3], rotation_vectors(product(inverses, quaternions_of(first))))
+    return joined_state(
+        first[..., :3] - second[..., :3],
+        rotation_vectors(product(inverses, quaternions_of(first))),
+    )
 
 
-def differentiate(function: Callable[[Array], Array], states: Array) -> tuple[Array, Array]:
+def differentiate(
+    function: Callable[[Array], Array], states: Array
+) -> tuple[Array, Array]:
     """Return a function, of (r, n, 43), of states (r, 43), and its derivatives (r, ..., 33) by errors."""
-    errors = DIFFERENCE * np.concatenate([np.zeros((1, ERROR)), np.eye(ERROR), -np.eye(ERROR)])
+    errors = DIFFERENCE * np.concatenate(
+        [np.zeros((1, ERROR)), np.eye(ERROR), -np.eye(ERROR)]
+    )
     values = function(plus(states[:, None], errors))
-    derivatives = (values[:, 1 : 1 + ERROR] - values[:, 1 + ERROR :]) / (2.0 * DIFFERENCE)
+    derivatives = (values[:, 1 : 1 + ERROR] - values[:, 1 + ERROR :]) / (
+        2.0 * DIFFERENCE
+    )
     return values[:, 0], np.moveaxis(derivatives, 1, -1)
 
 
@@ -107,7 +146,8 @@ def tangents(states: Array) -> Array:
     """Return how the numbers of states (r, 43) change with their errors: (r, 43, 33)."""
     matrices = np.tile(np.eye(STATE, ERROR), (len(states), 1, 1))
     matrices[:, 3:, 3:] = 0.0
-    changes = product(quaternions_of(states)[:, :, None], 0.5 * np.eye(4)[1:])  # (r, 10, 3, 4)
+    # (r, 10, 3, 4)
+    changes = product(quaternions_of(states)[:, :, None], 0.5 * np.eye(4)[1:])
     matrices[:, _NUMBERS, _VECTORS] = changes.swapaxes(2, 3)
     return matrices
 
@@ -115,7 +155,9 @@ def tangents(states: Array) -> Array:
 def inverse_tangents(states: Array) -> Array:
     """Return how the errors of states (r, 43) change with their numbers: (r, 33, 43)."""
     # the columns of a quaternion's tangents are orthogonal and of length 1/2
-    return np.asarray(tangents(states).swapaxes(1, 2) * np.repeat([1.0, 4.0], [3, STATE - 3]))
+    return np.asarray(
+        tangents(states).swapaxes(1, 2) * np.repeat([1.0, 4.0], [3, STATE - 3])
+    )
 
 
 class DependentJoints(NamedTuple):
@@ -128,27 +170,44 @@ class DependentJoints(NamedTuple):
 def encode(poses: Array, translations: Array) -> Array:
     """Return the states (n, 43) of poses (n, 66) and translations (n, 3); signs are those that change least."""
     root = rotation.rotation_from_root_angles(poses[:, :3])
-    held = rotation.rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
+    held = rotation.rotation_from_joint_angles(
+        poses[:, HELD_ANGLES].reshape(len(poses), -1, 3)
+    )
     rotations = np.concatenate([root[:, None], held], axis=1)
-    turns = np.stack([rotation.quaternions(rotations[:, k])[:, [3, 0, 1, 2]] for k in range(TURNS)], axis=1)
+    turns = np.stack(
+        [rotation.quaternions(rotations[:, k])[:, [3, 0, 1, 2]] for k in range(TURNS)],
+        axis=1,
+    )
     return joined_state(translations, np.where(turns[:1, :, :1] < 0.0, -turns, turns))
 
 
 def decode(states: Array, dependent: DependentJoints) -> tuple[Array, Array]:
     """Return the poses (..., 66) and the translations (..., 3) of states (..., 43)."""
-    turns, lead = quaternions_of(states), states.shape[:-1]
-    rotations, vectors = rotation_matrices(turns), rotation_vectors(turns[..., 1:, :])
+    turns = quaternions_of(states)
+    lead = states.shape[:-1]
+    rotations = rotation_matrices(turns)
+    vectors = rotation_vectors(turns[..., 1:, :])
     poses = np.zeros((*lead, ANGLES))
     poses[..., :3] = rotation.root_angles_from_rotation(rotations[..., 0, :, :])
-    poses[..., HELD_ANGLES] = rotation.joint_angles_from_rotation(rotations[..., 1:, :, :]).reshape(*lead, -1)
-    poses[..., OTHER_ANGLES] = vectors.reshape(*lead, -1) @ dependent.matrix.T + dependent.offset
+    poses[..., HELD_ANGLES] = rotation.joint_angles_from_rotation(
+        rotations[..., 1:, :, :]
+    ).reshape(*lead, -1)
+    poses[..., OTHER_ANGLES] = (
+        vectors.reshape(*lead, -1) @ dependent.matrix.T + dependent.offset
+    )
     return poses, states[..., :3].copy()
 
 
 # The joints that the 17 points are the middles of
 _MIDDLE = {"head": ("upperneck", "head"), "root": ("root",), "torso": ("upperback",)}
-_SIDES = {"clavicle": ("thorax", "?clavicle"), "shoulder": ("?clavicle",), "elbow": ("?humerus",), "hand": ("?wrist",)}
-_SIDES |= {"hip": ("?hipjoint",), "knee": ("?femur",), "foot": ("?foot",)}  # ? is l or r
+_SIDES = {
+    "clavicle": ("thorax", "?clavicle"),
+    "shoulder": ("?clavicle",),
+    "elbow": ("?humerus",),
+    "hand": ("?wrist",),
+}
+# ? is l or r
+_SIDES |= {"hip": ("?hipjoint",), "knee": ("?femur",), "foot": ("?foot",)}
 _BETWEEN = _MIDDLE | {
     f"{side} {name}": tuple(joint.replace("?", side[0]) for joint in joints)
     for name, joints in _SIDES.items()
@@ -157,4 +216,6 @@ _BETWEEN = _MIDDLE | {
 POINTS = tuple(_BETWEEN)
 AT = {name: k for k, name in enumerate(POINTS)}
 # (17, 2) two joints a point, or one twice
-ENDS = np.array([[JOINTS.index(joints[k]) for k in (0, -1)] for joints in _BETWEEN.values()])
+ENDS = np.array(
+    [[JOINTS.index(joints[k]) for k in (0, -1)] for joints in _BETWEEN.values()]
+)

@@ -24,7 +24,8 @@ _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right f
 Structure = Literal["variable", "all"]
 MOST = 3  # of the four lower limbs. Interpretation V15
 FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
-FIRST_SECONDS = 1.0  # by default: within ten cycles the filter has not converged yet. Interpretation V19
+# by default: within ten cycles the filter has not converged yet. Interpretation V19
+FIRST_SECONDS = 1.0
 ENDED = 0.9  # the ratio, new to old, below which a new group ends
 
 
@@ -36,8 +37,11 @@ def requested_group(points: Sequence[Array]) -> int | None:
     """
     if len(points) < 3:
         return None
-    before, now = np.abs(wrapped(np.diff([limb_angles(frame) for frame in points[-3:]], axis=0)))
-    doubled, halved = (now >= 2.0 * before) & (now > 0.0), (now <= 0.5 * before) & (before > 0.0)
+    before, now = np.abs(
+        wrapped(np.diff([limb_angles(frame) for frame in points[-3:]], axis=0))
+    )
+    doubled = (now >= 2.0 * before) & (now > 0.0)
+    halved = (now <= 0.5 * before) & (before > 0.0)
     if doubled[:2].all():  # VSMM 7a
         return 2
     if doubled.sum() >= MOST:  # VSMM 7b
@@ -54,10 +58,21 @@ def limb_angles(points: Array) -> Array:
 
 
 def regrouped(
-    belief: Belief, old: Sequence[str], models: Sequence[str], new: Mapping[str, tuple[Array, Array, float]]
+    belief: Belief,
+    old: Sequence[str],
+    models: Sequence[str],
+    new: Mapping[str, tuple[Array, Array, float]],
 ) -> Belief:
     """Return a belief over other models: `new` has state, covariance and log-probability of those not in `old`."""
-    known = dict(zip(old, zip(belief.states, belief.covariances, belief.log_probabilities, strict=True), strict=True))
+    known = dict(
+        zip(
+            old,
+            zip(
+                belief.states, belief.covariances, belief.log_probabilities, strict=True
+            ),
+            strict=True,
+        )
+    )
     parts = zip(*({**new, **known}[name] for name in models), strict=True)
     states, covariances, probabilities = (np.array(part) for part in parts)
     return Belief(states, covariances, probabilities, np.zeros(len(models)))
@@ -66,7 +81,9 @@ def regrouped(
 def normalised(belief: Belief) -> Belief:
     """Return a belief whose probabilities sum to 1, all the same where none is above 0."""
     probabilities = np.maximum(belief.log_probabilities, -1e9)
-    return replace(belief, log_probabilities=probabilities - np.logaddexp.reduce(probabilities))
+    return replace(
+        belief, log_probabilities=probabilities - np.logaddexp.reduce(probabilities)
+    )
 
 
 class DefaultForm:
@@ -92,12 +109,21 @@ class DefaultForm:
         """Return a measurement whose Jacobians are by what the filter's covariances are of."""
         return measure
 
-    def cycle_over_both(self, switching: "Switching", before: Belief, candidate_group: str, measure: Measure) -> Belief:
+    def cycle_over_both(
+        self,
+        switching: "Switching",
+        before: Belief,
+        candidate_group: str,
+        measure: Measure,
+    ) -> Belief:
         """Return the belief after the cycle, run again over both groups; new models had a probability of 0."""
-        old, fused = switching.active, switching.imm.fused(before)
+        old = switching.active
+        fused = switching.imm.fused(before)
         switching.bring_in(candidate_group)
         new = dict.fromkeys(switching.active, (*fused, -np.inf))
-        return switching.imm.cycle(regrouped(before, old, switching.active, new), measure)
+        return switching.imm.cycle(
+            regrouped(before, old, switching.active, new), measure
+        )
 
 
 class PatentForm:
@@ -125,29 +151,52 @@ class PatentForm:
 
         def by_numbers(states: Array) -> Measurement:
             measurement = measure(unit(states))
-            return measurement._replace(jacobians=measurement.jacobians @ inverse_tangents(unit(states)))
+            return measurement._replace(
+                jacobians=measurement.jacobians @ inverse_tangents(unit(states))
+            )
 
         return by_numbers
 
-    def cycle_over_both(self, switching: "Switching", before: Belief, candidate_group: str, measure: Measure) -> Belief:
+    def cycle_over_both(
+        self,
+        switching: "Switching",
+        before: Belief,
+        candidate_group: str,
+        measure: Measure,
+    ) -> Belief:
         """Return the belief after the cycle, run again over both groups and judged."""
         old = switching.active
         both = self.joined(switching, before, candidate_group)
         return switching.decided(self.beside(switching, old).cycle(both, measure))
 
-    def joined(self, switching: "Switching", belief: Belief, candidate_group: str) -> Belief:
+    def joined(
+        self, switching: "Switching", belief: Belief, candidate_group: str
+    ) -> Belief:
         """Return a belief with another group's models beside those in force. VSMM 8."""
-        old, models, (state, _) = switching.active, switching.models, switching.fused(belief)
+        old, models, (state, _) = (
+            switching.active,
+            switching.models,
+            switching.fused(belief),
+        )
         switching.bring_in(candidate_group)
         top = belief.log_probabilities.max()  # VSMM 8.1
         noises = dict(zip(models.names, models.noises, strict=True))
-        poses = {name: models.captured_nearest(name, state) for name in switching.active if name not in old}  # VSMM 8.3
-        new = {name: (pose, lifted(pose[None], noises[name])[0], top) for name, pose in poses.items()}
+        # VSMM 8.3
+        poses = {
+            name: models.captured_nearest(name, state)
+            for name in switching.active
+            if name not in old
+        }
+        new = {
+            name: (pose, lifted(pose[None], noises[name])[0], top)
+            for name, pose in poses.items()
+        }
         return normalised(regrouped(belief, old, switching.active, new))
 
     def beside(self, switching: "Switching", old: Sequence[str]) -> IMM:
         """Return the filter in which the prediction of models that are not `old` has their noise as its covariance."""
-        imm, rows = switching.imm, [k for k, name in enumerate(switching.active) if name not in old]
+        imm = switching.imm
+        rows = [k for k, name in enumerate(switching.active) if name not in old]
         noises = switching.models.of(switching.active).noises
 
         def predict(states: Array, covariances: Array) -> tuple[Array, Array]:
@@ -166,11 +215,20 @@ class Switching:
     """The models in force; at first all of them."""
 
     def __init__(
-        self, models: MotionModels, topology: Topology, form: Form | None = None, structure: Structure = "variable"
+        self,
+        models: MotionModels,
+        topology: Topology,
+        form: Form | None = None,
+        structure: Structure = "variable",
     ) -> None:
-        self.topology, self.groups = topology, topology.groups
+        self.topology = topology
+        self.groups = topology.groups
         self.models = models.of(topology.union(topology.groups))
-        self.form, self._structure, self._filter = form or DefaultForm(), structure, lru_cache(self._filter_of)
+        self.form, self._structure, self._filter = (
+            form or DefaultForm(),
+            structure,
+            lru_cache(self._filter_of),
+        )
         self.restart()
 
     def restart(self) -> None:
@@ -178,7 +236,8 @@ class Switching:
         self.active = self.models.names
         self.group: str | None = None
         self.candidate_group: str | None = None
-        self._log_ratio = 0.0  # of the likelihoods since the candidate group came into force, new to old
+        # of the likelihoods since the candidate group came into force, new to old
+        self._log_ratio = 0.0
         self._cycles = 0
         self._points: list[Array] = []
 
@@ -192,7 +251,9 @@ class Switching:
 
     def start(self, state: Array, covariance: Array) -> Belief:
         """Return the belief in one state (43,) with a covariance (33, 33)."""
-        return start(state, self.form.covariances(state[None], covariance)[0], len(self.active))
+        return start(
+            state, self.form.covariances(state[None], covariance)[0], len(self.active)
+        )
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state (43,), and the covariance (33, 33) of its error, that stand for all models."""
@@ -220,18 +281,27 @@ class Switching:
             self.group = likely
             return after
         if self.group is None:
-            return after if self._cycles < self.form.first_cycles(self.models) else self._only(likely, after)
+            return (
+                after
+                if self._cycles < self.form.first_cycles(self.models)
+                else self._only(likely, after)
+            )
         if self.candidate_group is not None:
             return self.decided(after)
-        number, names = requested_group(self._points), tuple(self.groups)
+        number = requested_group(self._points)
+        names = tuple(self.groups)
         if number is None or number >= len(names) or names[number] == self.group:
             return after
         return self.form.cycle_over_both(self, before, names[number], measure)
 
     def bring_in(self, candidate_group: str) -> None:
         """Bring another group into force beside the present one."""
-        self.candidate_group, self._log_ratio = candidate_group, 0.0
-        self.active = self.topology.union([self.group or candidate_group, candidate_group])  # VSMM 8.4
+        self.candidate_group = candidate_group
+        self._log_ratio = 0.0
+        # VSMM 8.4
+        self.active = self.topology.union(
+            [self.group or candidate_group, candidate_group]
+        )
 
     def decided(self, after: Belief) -> Belief:
         """Return the belief after a cycle over both groups: over one of them as soon as the other has to end.
@@ -241,11 +311,15 @@ class Switching:
         assert self.candidate_group is not None
         assert self.group is not None
         old, new = (
-            [self.active.index(name) for name in self.groups[group]] for group in (self.group, self.candidate_group)
+            [self.active.index(name) for name in self.groups[group]]
+            for group in (self.group, self.candidate_group)
         )
 
         def log_ratio(logarithms: Array) -> float:
-            return float(np.logaddexp.reduce(logarithms[new]) - np.logaddexp.reduce(logarithms[old]))
+            return float(
+                np.logaddexp.reduce(logarithms[new])
+                - np.logaddexp.reduce(logarithms[old])
+            )
 
         self._log_ratio += log_ratio(after.log_likelihoods)  # VSMM 9
         smaller = min(log_ratio(after.log_probabilities), self._log_ratio)
@@ -255,6 +329,8 @@ class Switching:
 
     def _only(self, group: str, belief: Belief) -> Belief:
         """Return the belief over one group, which alone stays in force."""
-        old, self.active = self.active, self.groups[group]
-        self.group, self.candidate_group = group, None
+        old = self.active
+        self.active = self.groups[group]
+        self.group = group
+        self.candidate_group = None
         return normalised(regrouped(belief, old, self.active, {}))

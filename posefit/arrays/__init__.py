@@ -40,11 +40,17 @@ def _compiled(function: Callable[..., Any], inline: str) -> Any:
 
     from posefit.arrays.compiling import cached
 
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}, "inline": inline}
+    options: dict[str, Any] = {
+        "nogil": True,
+        "error_model": "numpy",
+        "fastmath": {"contract", "nsz"},
+        "inline": inline,
+    }
     # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
     options["no_cfunc_wrapper"] = True
     compiled: Any = numba.njit(**options)(function)
-    return compiled if compiled is function else cached(compiled)  # NUMBA_DISABLE_JIT: nothing is compiled
+    # NUMBA_DISABLE_JIT: nothing is compiled
+    return compiled if compiled is function else cached(compiled)
 
 
 def writeable(values: ArrayLike) -> Array:
@@ -52,7 +58,11 @@ def writeable(values: ArrayLike) -> Array:
 
     Compiled loops are typed by their arguments' layout: one more layout would cost one more compilation.
     """
-    if isinstance(values, np.ndarray) and values.dtype == np.float64 and values.flags.carray:
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == np.float64
+        and values.flags.carray
+    ):
         return values
     return np.require(values, np.float64, ["C", "W"])
 
@@ -66,13 +76,18 @@ def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} must be numbers of shape {sides}, got {quoted(values)}") from None
+        raise InputError(
+            f"{name} must be numbers of shape {sides}, got {quoted(values)}"
+        ) from None
     fits = array.ndim == len(shape) and all(
-        isinstance(side, str) or side == length for side, length in zip(shape, array.shape, strict=True)
+        isinstance(side, str) or side == length
+        for side, length in zip(shape, array.shape, strict=True)
     )
     if not fits:
         raise InputError(f"{name} must have shape {sides}, got {array.shape}")
     if not np.isfinite(array).all():
-        raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not")
+        raise InputError(
+            f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not"
+        )
     array.setflags(write=False)
     return array

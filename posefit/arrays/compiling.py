@@ -57,7 +57,8 @@ class CheckedFile(IndexDataCacheFile):
 
     def _load_data(self, name: str) -> Any:
         content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
-        digest, dumped = content[:32], content[32:]
+        digest = content[:32]
+        dumped = content[32:]
         if hashlib.sha256(dumped).digest() != digest:
             raise ValueError(f"{name} is damaged")
         return pickle.loads(dumped)
@@ -98,16 +99,24 @@ def _folder(module: str) -> str:
 
     That is the module's source, the constants that it imports, and the same of the modules whose functions it imports.
     """
-    digest, modules, own = hashlib.sha256(numba.__version__.encode()), [module], ("posefit", module.partition(".")[0])
+    digest = hashlib.sha256(numba.__version__.encode())
+    modules = [module]
+    own = ("posefit", module.partition(".")[0])
     for name in modules:
         loaded = sys.modules[name]
         digest.update(Path(str(loaded.__file__)).read_bytes())
         for key, value in sorted(vars(loaded).items()):
             if isinstance(value, np.ndarray):
                 digest.update(key.encode() + value.tobytes())
-            elif isinstance(value, int | float | str | tuple | np.generic) and not key.startswith("__"):
+            elif isinstance(
+                value, int | float | str | tuple | np.generic
+            ) and not key.startswith("__"):
                 digest.update(f"{key} {value!r}".encode())
-            elif (owner := getattr(value, "__module__", None)) and owner.startswith(own) and owner not in modules:
+            elif (
+                (owner := getattr(value, "__module__", None))
+                and owner.startswith(own)
+                and owner not in modules
+            ):
                 modules.append(owner)
     return f"{module}-{digest.hexdigest()[:16]}"
 
@@ -117,14 +126,24 @@ def cached(dispatcher: Any) -> Any:
     before = config.CACHE_DIR
     try:
         name = _folder(dispatcher.py_func.__module__)
-        base = Path(before) if before else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "posefit"
+        base = (
+            Path(before)
+            if before
+            else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+            / "posefit"
+        )
         if not (base / name).is_dir():
             (base / name).mkdir(parents=True)
-            for old in sorted(base.iterdir(), key=os.path.getmtime)[:-MAX_FOLDERS] if not before else ():
+            for old in (
+                sorted(base.iterdir(), key=os.path.getmtime)[:-MAX_FOLDERS]
+                if not before
+                else ()
+            ):
                 shutil.rmtree(old, ignore_errors=True)
         config.CACHE_DIR = str(base / name)
         cache = TolerantCache(dispatcher.py_func)  # type: ignore[no-untyped-call]
-        if Path(cache.cache_path).is_relative_to(base):  # else numba chose a place where stale files may be
+        # else numba chose a place where stale files may be
+        if Path(cache.cache_path).is_relative_to(base):
             dispatcher._cache = cache
     except (OSError, RuntimeError):
         pass  # no home, no room, or no file of the function: every process compiles

@@ -35,12 +35,24 @@ class _Commands(Command, Group):
         """Return the names of all commands: those of plugins come last."""
         return [*self.commands, *_added()]
 
-    def format_commands(self, _context: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_commands(
+        self, _context: click.Context, formatter: click.HelpFormatter
+    ) -> None:
         """Write the commands by what they are for, each with its whole first sentence; those of plugins last."""
-        for heading, commands in (GROUPS | {"From plugins": tuple(_added().values())}).items():
+        for heading, commands in (
+            GROUPS | {"From plugins": tuple(_added().values())}
+        ).items():
             with formatter.section(heading):
-                first = [" ".join((command.help or "").split("\n\n")[0].split()) for command in commands]
-                formatter.write_dl([(command.name or "", text) for command, text in zip(commands, first, strict=True)])
+                first = [
+                    " ".join((command.help or "").split("\n\n")[0].split())
+                    for command in commands
+                ]
+                formatter.write_dl(
+                    [
+                        (command.name or "", text)
+                        for command, text in zip(commands, first, strict=True)
+                    ]
+                )
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
         """Return a command; plugins are looked at for those alone that posefit does not have itself."""
@@ -51,12 +63,16 @@ def _added() -> dict[str, click.Command]:
     from posefit.registry import COMMAND, plugins_of
 
     added = plugins_of((COMMAND,), tuple(main.commands))
-    return {command.name or "": command for plugin in added for command in plugin.commands}
+    return {
+        command.name or "": command for plugin in added for command in plugin.commands
+    }
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="posefit")
-@click.option("--debug", is_flag=True, help="Show the traceback of a mistake instead of one line.")
+@click.option(
+    "--debug", is_flag=True, help="Show the traceback of a mistake instead of one line."
+)
 def main(debug: bool) -> None:
     """Recover a person's 3D motion from masks, by searching.
 
@@ -80,16 +96,30 @@ def run() -> None:
         if error.errno != errno.ENOSPC or error.filename is not None:
             raise
         drop(1)
-        say(f"posefit: standard output: expected room to write results to, got {error.strerror}")
+        say(
+            f"posefit: standard output: expected room to write results to, got {error.strerror}"
+        )
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
-        others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
-        running = [thread for thread in others if not thread.daemon and not thread.name.startswith(f"{POOL}_")]
+        others = [
+            thread
+            for thread in threading.enumerate()
+            if thread is not threading.main_thread()
+        ]
+        running = [
+            thread
+            for thread in others
+            if not thread.daemon and not thread.name.startswith(f"{POOL}_")
+        ]
         for thread in running:
             thread.join(THREAD_SECONDS / len(running))
-        names = ", ".join(sorted({thread.name for thread in running if thread.is_alive()}))
+        names = ", ".join(
+            sorted({thread.name for thread in running if thread.is_alive()})
+        )
         if names:
             say(f"posefit: not waiting for what a plugin left running: {cut(names)}")
             sys.stdout.flush()
-            os._exit(end.code if isinstance(end.code, int) else 0 if end.code is None else 1)
+            os._exit(
+                end.code if isinstance(end.code, int) else 0 if end.code is None else 1
+            )
         raise

@@ -20,7 +20,9 @@ class Group(click.Group):
         """Return the command that the first word names. Raises click.UsageError where it names none."""
         if args[0][:1].isalnum() and self.get_command(context, args[0]) is None:
             root = context.find_root()
-            listed = dict.fromkeys((f"{kind}s" for kind in (*KINDS, "method")), "posefit plugins")
+            listed = dict.fromkeys(
+                (f"{kind}s" for kind in (*KINDS, "method")), "posefit plugins"
+            )
             known = listed | dict(_paths(root.command, root, "posefit"))
             near = get_close_matches(cut(args[0]), known, 1)
             hint = f"; did you mean {known[near[0]]!r}?" if near else ""
@@ -28,7 +30,9 @@ class Group(click.Group):
         return super().resolve_command(context, args)
 
 
-def _paths(command: click.Command, context: click.Context, path: str) -> Iterator[tuple[str, str]]:
+def _paths(
+    command: click.Command, context: click.Context, path: str
+) -> Iterator[tuple[str, str]]:
     """Yield the name of each command below one, and what to type for it; of two of a name the outer one comes last."""
     if isinstance(command, click.Group):
         for name in command.list_commands(context):

@@ -43,7 +43,9 @@ def listing(registry: Registry) -> Iterator[str]:
         for offer in registry.offers[kind].values():
             yield _head(offer)
             yield from _wrapped(offer.summary, 4 * " ", 4 * " ")
-            yield from _wrapped(", ".join(map(_typed, offer.settings)), "    --set ", 10 * " ")
+            yield from _wrapped(
+                ", ".join(map(_typed, offer.settings)), "    --set ", 10 * " "
+            )
 
 
 def explanation(registry: Registry, name: str) -> Iterator[str]:
@@ -52,22 +54,32 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
     named = [offer for offer in offers if offer.name == name]
     if not named:
         known = sorted({offer.name for offer in offers})
-        raise InputError(f"plugin must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}")
+        raise InputError(
+            f"plugin must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+        )
     for offer in named:
         text = getdoc(offer.factory) or ""
         listed = settings_in(text)
         yield _head(offer)
-        yield from (f"    {line}".rstrip() for line in without_settings(text).splitlines())
+        yield from (
+            f"    {line}".rstrip() for line in without_settings(text).splitlines()
+        )
         if not offer.settings:
             yield "    It has no settings."
         for setting in offer.settings:
             yield f"    --set {name}.{_typed(setting)}"
             symbol, meaning = listed.get(setting.name, ("", ""))
-            yield from _wrapped(f"({symbol}) {meaning}" if symbol else meaning, 8 * " ", 8 * " ")
+            yield from _wrapped(
+                f"({symbol}) {meaning}" if symbol else meaning, 8 * " ", 8 * " "
+            )
 
 
 def _head(offer: Offer) -> str:
-    missing = f" [not installed: python -m pip install '{offer.missing}']" if offer.missing else ""
+    missing = (
+        f" [not installed: python -m pip install '{offer.missing}']"
+        if offer.missing
+        else ""
+    )
     return f"{offer.kind} {offer.name} ({offer.distribution} {offer.version}){missing}"
 
 
@@ -82,7 +94,9 @@ def _wrapped(text: str, first: str, other: str) -> list[str]:
     return textwrap.wrap(text, width, initial_indent=first, subsequent_indent=other)
 
 
-def diagnosis(plugins: Iterable[Plugin], verbose: bool = False) -> tuple[list[str], bool]:
+def diagnosis(
+    plugins: Iterable[Plugin], verbose: bool = False
+) -> tuple[list[str], bool]:
     """Return the lines of `posefit plugins doctor`, and whether all is well.
 
     Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
@@ -94,23 +108,38 @@ def diagnosis(plugins: Iterable[Plugin], verbose: bool = False) -> tuple[list[st
             [f"{offer.kind} {offer.name}" for offer in plugin.offers]
             + [f"{COMMAND} {command.name}" for command in plugin.commands]
         )
-        state: str = "empty" if plugin.state == "loaded" and not offers else plugin.state
+        state: str = (
+            "empty" if plugin.state == "loaded" and not offers else plugin.state
+        )
         states.add(state)
-        cause = " ".join(plugin.cause.split()) or f"offers {offers}"  # on one line, whatever the error says
+        # on one line, whatever the error says
+        cause = " ".join(plugin.cause.split()) or f"offers {offers}"
         if state == "empty":
             cause = "registers nothing: a hook such as posefit_register_optimisers must have the mark @hookimpl"
-        lines.append(f"{state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}")
-        lines += [f"          {traced}" for traced in plugin.traceback.splitlines() if verbose]
+        lines.append(
+            f"{state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}"
+        )
+        lines += [
+            f"          {traced}" for traced in plugin.traceback.splitlines() if verbose
+        ]
         for offer in plugin.offers:
             if offer.missing:
-                lines.append(f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'")
+                lines.append(
+                    f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'"
+                )
             if not offer.summary:
-                lines.append(f"          {offer.name} has no docstring to be listed with")
+                lines.append(
+                    f"          {offer.name} has no docstring to be listed with"
+                )
             if not offer.missing and plugin.distribution != PROJECT:
                 lines.append(f"          next: posefit check {offer.kind} {offer.name}")
     hint = "" if verbose else "; -v shows where they fail"
     if "broken" in states:
         lines.append(f"broken plugins are left out; the others are loaded{hint}")
     else:
-        lines.append("all plugins are loaded, but not all offer something" if "empty" in states else "all plugins work")
+        lines.append(
+            "all plugins are loaded, but not all offer something"
+            if "empty" in states
+            else "all plugins work"
+        )
     return lines, not states & {"broken", "empty"}

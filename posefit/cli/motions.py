@@ -13,13 +13,29 @@ def motions(as_json: bool) -> None:
 
     clips = recorded.clips()
     people = [
-        {"name": clip.name, "subject": clip.subject, "seconds": round(clip.seconds, 3), "poses": len(clip)}
+        {
+            "name": clip.name,
+            "subject": clip.subject,
+            "seconds": round(clip.seconds, 3),
+            "poses": len(clip),
+        }
         for clip in clips
     ]
-    lines = ["built in, made by a model; the letters are different people", "", f"  {' '.join(built_in.names())}", ""]
-    lines += ["recorded, in the CMU database (mocap.cs.cmu.edu); --train library learns from all of them", ""]
+    lines = [
+        "built in, made by a model; the letters are different people",
+        "",
+        f"  {' '.join(built_in.names())}",
+        "",
+    ]
+    lines += [
+        "recorded, in the CMU database (mocap.cs.cmu.edu); --train library learns from all of them",
+        "",
+    ]
     for subject in recorded.subjects():
         parts = [clip for clip in clips if clip.subject == subject]
-        minutes, ends = sum(clip.seconds for clip in parts) / 60.0, f"{parts[0].name} to {parts[-1].name}"
-        lines.append(f"  library:{subject:4} {len(parts):3} clips, {minutes:5.1f} minutes: {ends}")
+        minutes = sum(clip.seconds for clip in parts) / 60.0
+        ends = f"{parts[0].name} to {parts[-1].name}"
+        lines.append(
+            f"  library:{subject:4} {len(parts):3} clips, {minutes:5.1f} minutes: {ends}"
+        )
     print_result(lines, {"built_in": built_in.names(), "recorded": people}, as_json)

@@ -15,10 +15,14 @@ from posefit.tracking.options import TrackOptions, declared, text_range
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
-def parsed_by(parse: Callable[[str], Any]) -> Callable[[click.Context, click.Parameter, Any], Any]:
+def parsed_by(
+    parse: Callable[[str], Any],
+) -> Callable[[click.Context, click.Parameter, Any], Any]:
     """Return a click callback that parses an option's text, or each of several, and shows what is wrong with it."""
 
-    def callback(_context: click.Context, _parameter: click.Parameter, value: Any) -> Any:
+    def callback(
+        _context: click.Context, _parameter: click.Parameter, value: Any
+    ) -> Any:
         try:
             if isinstance(value, tuple):
                 return tuple(map(parse, value))
@@ -29,25 +33,36 @@ def parsed_by(parse: Callable[[str], Any]) -> Callable[[click.Context, click.Par
     return callback
 
 
-def methods_from(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[str]:
+def methods_from(
+    _context: click.Context, _parameter: click.Parameter, begun: str
+) -> list[str]:
     """Return the methods that begin so, for a shell to complete."""
     from posefit.registry import registry
 
     offers = registry().offers
     optimiser, at, _ = begun.partition("@")
-    names = [f"{optimiser}@{prior}" for prior in offers["prior"]] if at else [*offers["tracker"], *offers["optimiser"]]
+    names = (
+        [f"{optimiser}@{prior}" for prior in offers["prior"]]
+        if at
+        else [*offers["tracker"], *offers["optimiser"]]
+    )
     return [name for name in names if name.startswith(begun)]
 
 
-def sources_from(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+def sources_from(
+    _context: click.Context, _parameter: click.Parameter, begun: str
+) -> list[CompletionItem]:
     """Return the built-in motions that begin so, and have the shell add files."""
     from posefit.motion import built_in
 
-    names = [CompletionItem(name) for name in built_in.names() if name.startswith(begun)]
+    names = [
+        CompletionItem(name) for name in built_in.names() if name.startswith(begun)
+    ]
     return [*names, CompletionItem(begun, type="file")]
 
 
-COMPLETED = {"method": methods_from, "train": sources_from}  # options whose values a shell completes
+# options whose values a shell completes
+COMPLETED = {"method": methods_from, "train": sources_from}
 
 
 def number_by(parse: Callable[[str], float]) -> Callable[[str], float]:
@@ -57,7 +72,9 @@ def number_by(parse: Callable[[str], float]) -> Callable[[str], float]:
         try:
             return parse(text)
         except ValueError:
-            expected = "a whole number such as 30" if parse is int else "a number such as 1.75"
+            expected = (
+                "a whole number such as 30" if parse is int else "a number such as 1.75"
+            )
             raise InputError(f"expected {expected}, got {quoted(str(text))}") from None
 
     return read
@@ -79,12 +96,18 @@ def under(heading: str) -> Callable[..., Decorator]:
 class TrackCommand(click.Command):
     """A command with the options of a track, whose help lists them under headings."""
 
-    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_options(
+        self, context: click.Context, formatter: click.HelpFormatter
+    ) -> None:
         """Write the options: those of no heading last."""
         sections: dict[str, list[tuple[str, str]]] = {}
         for flag in self.get_params(context):
-            if isinstance(flag, click.Option) and (record := flag.get_help_record(context)):
-                sections.setdefault(getattr(flag, "heading", "Others"), []).append(record)
+            if isinstance(flag, click.Option) and (
+                record := flag.get_help_record(context)
+            ):
+                sections.setdefault(getattr(flag, "heading", "Others"), []).append(
+                    record
+                )
         sections["Others"] = sections.pop("Others", [])
         for heading, rows in sections.items():
             with formatter.section(heading):
@@ -96,18 +119,27 @@ def track_flags(*names: str) -> list[Decorator]:
     flags: list[Decorator] = []
     heading = ""
     for field in fields(TrackOptions):
-        option, default = declared(field), field.default
+        option = declared(field)
+        default = field.default
         heading = option.heading or heading
         if (field.name not in names) if names else option.flag == "":
             continue
-        flag, make = (option.flag or field.name).replace("_", "-"), under(heading)
-        words: dict[str, Any] = {"help": option.help, "shell_complete": COMPLETED.get(field.name)}
+        flag = (option.flag or field.name).replace("_", "-")
+        make = under(heading)
+        words: dict[str, Any] = {
+            "help": option.help,
+            "shell_complete": COMPLETED.get(field.name),
+        }
         if option.parse is bool:
-            flags.append(make(f"--{flag}/--no-{flag}", field.name, default=None, **words))
+            flags.append(
+                make(f"--{flag}/--no-{flag}", field.name, default=None, **words)
+            )
             continue
         words |= {"metavar": option.unit or None, "multiple": option.repeated}
         if option.parse in (int, float):
-            words["metavar"] = option.unit or ("INTEGER" if option.parse is int else "FLOAT")
+            words["metavar"] = option.unit or (
+                "INTEGER" if option.parse is int else "FLOAT"
+            )
             words |= {"type": str, "callback": parsed_by(number_by(option.parse))}
         else:
             words["callback"] = parsed_by(option.parse)
@@ -121,11 +153,14 @@ def box(text: str) -> tuple[int, ...]:
     """Return the left, the top, the width and the height of a text X,Y,WIDTH,HEIGHT."""
     parts = text.split(",")
     if len(parts) != 4 or not all(part.strip().isdigit() for part in parts):
-        raise InputError(f"expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, got {quoted(text)}")
+        raise InputError(
+            f"expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, got {quoted(text)}"
+        )
     return tuple(map(int, parts))
 
 
-_video, _result = under("How the person is taken out of video"), under("Results")
+_video = under("How the person is taken out of video")
+_result = under("Results")
 FRAMES = under("What is seen")(
     "--frames",
     default=":",
@@ -133,39 +168,95 @@ FRAMES = under("What is seen")(
     metavar="A:B",
     help="Only these frames: of footage as filmed, of a motion after resampling.",
 )
-JSON = _result("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-QUIET = _result("--quiet", is_flag=True, help="No messages and no bars, only the result.")
+JSON = _result(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print one JSON object and nothing else on stdout.",
+)
+QUIET = _result(
+    "--quiet", is_flag=True, help="No messages and no bars, only the result."
+)
 EXTRACTION = (
     _video(
         "--extraction",
         help="Of video: mixture, or mean with --background; else median, masks, or another of `posefit plugins`.",
     ),
-    _video("--background", metavar="A:B|IMAGE", help="Frames without the person, or an image."),
-    _video("--roi", callback=parsed_by(box), metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
-    _video("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
-    _video("--width", type=int, help="Larger videos are scaled down to this; by default 640."),
+    _video(
+        "--background",
+        metavar="A:B|IMAGE",
+        help="Frames without the person, or an image.",
+    ),
+    _video(
+        "--roi",
+        callback=parsed_by(box),
+        metavar="X,Y,W,H",
+        help="Where the person is, in the video's pixels.",
+    ),
+    _video(
+        "--ignore",
+        metavar="IMAGE",
+        help="Bright pixels are never known, such as a tree in front.",
+    ),
+    _video(
+        "--width",
+        type=int,
+        help="Larger videos are scaled down to this; by default 640.",
+    ),
 )
 WITHOUT = under("Method and budget")(
-    "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
+    "--without-subject",
+    multiple=True,
+    metavar="N",
+    help="Leave a person of the library out; may be repeated.",
 )
 TRACK: tuple[Any, ...] = (
     click.argument("source", nargs=-1, shell_complete=sources_from),
     *track_flags(),
     WITHOUT,
     *EXTRACTION,
-    _result("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
-    _result("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
-    _result("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
+    _result(
+        "--out",
+        metavar="DIR",
+        help="Write poses, table, video and picture to this new folder.",
+    ),
+    _result(
+        "--force", is_flag=True, help="Replace DIR where it holds earlier results."
+    ),
+    _result(
+        "--resume",
+        is_flag=True,
+        help="Go on with the track to DIR that ended too early.",
+    ),
     _result("--verbose", is_flag=True, help="Print all figures, not three lines."),
     QUIET,
     JSON,
 )
 ENGINE = (
-    click.option("--workers", type=int, metavar="N", help="Processes of this machine; by default one a core."),
-    click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead, such as tcp://host:8786."),
-    click.option("--cell-seconds", type=float, default=3600.0, show_default=True, help="How long a cell may take."),
     click.option(
-        "--cell-gigabytes", type=float, default=4.0, show_default=True, help="How much memory a cell may have."
+        "--workers",
+        type=int,
+        metavar="N",
+        help="Processes of this machine; by default one a core.",
+    ),
+    click.option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="A Dask scheduler instead, such as tcp://host:8786.",
+    ),
+    click.option(
+        "--cell-seconds",
+        type=float,
+        default=3600.0,
+        show_default=True,
+        help="How long a cell may take.",
+    ),
+    click.option(
+        "--cell-gigabytes",
+        type=float,
+        default=4.0,
+        show_default=True,
+        help="How much memory a cell may have.",
     ),
 )
 

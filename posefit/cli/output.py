@@ -48,8 +48,15 @@ class Command(click.Command):
         """Run a command."""
         try:
             return super().invoke(context)
-        except (click.UsageError, InputError, OSError, ImportError, MemoryError) as error:
-            unnamed = isinstance(error, OSError) and error.filename is None  # a fault, no file that a user named
+        except (
+            click.UsageError,
+            InputError,
+            OSError,
+            ImportError,
+            MemoryError,
+        ) as error:
+            # a fault, no file that a user named
+            unnamed = isinstance(error, OSError) and error.filename is None
             if unnamed or context.params.get("debug"):
                 raise
             say(f"posefit: {' '.join(_mistake(error).split())}")
@@ -71,7 +78,16 @@ def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[
     """Yield steps, of which there are `count`, with a bar on stderr where that is a terminal."""
     from tqdm import tqdm
 
-    return iter(tqdm(steps, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True, disable=None))
+    return iter(
+        tqdm(
+            steps,
+            total=count,
+            unit=unit,
+            file=sys.stderr,
+            dynamic_ncols=True,
+            disable=None,
+        )
+    )
 
 
 @contextmanager

@@ -23,7 +23,11 @@ def plugins(context: click.Context, as_json: bool) -> None:
 
     with results_alone():
         offers = registry().offers
-    print_result(listing(registry()), [described(offer) for kind in KINDS for offer in offers[kind].values()], as_json)
+    print_result(
+        listing(registry()),
+        [described(offer) for kind in KINDS for offer in offers[kind].values()],
+        as_json,
+    )
 
 
 @plugins.command()
@@ -39,7 +43,12 @@ def show(name: str) -> None:
 
 
 @plugins.command()
-@click.option("-v", "--verbose", is_flag=True, help="Show where a plugin fails, too: its traceback.")
+@click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    help="Show where a plugin fails, too: its traceback.",
+)
 @click.pass_context
 def doctor(context: click.Context, verbose: bool) -> None:
     """Say of every plugin what it offers, or why nothing; exit status 1 where one is broken or offers nothing."""
@@ -58,7 +67,10 @@ def doctor(context: click.Context, verbose: bool) -> None:
 @plugins.command()
 @click.argument("name")
 @click.option(
-    "--kind", default="optimiser", show_default=True, help="optimiser, prior, tracker, start, segmenter or command."
+    "--kind",
+    default="optimiser",
+    show_default=True,
+    help="optimiser, prior, tracker, start, segmenter or command.",
 )
 @click.option("--out", metavar="DIR", help="The new folder; by default posefit-NAME.")
 @click.pass_context
@@ -67,18 +79,33 @@ def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> Non
     from posefit.cli.template import write_plugin
 
     folder = write_plugin(name, kind, out, _own(context))
-    click.echo(f"written to {folder}; next: cd {folder} && python -m pip install -e '.[test]' && python -m pytest")
+    click.echo(
+        f"written to {folder}; next: cd {folder} && python -m pip install -e '.[test]' && python -m pytest"
+    )
 
 
 @click.command()
 @click.argument("kind", metavar="KIND")
 @click.argument("name")
-@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Check it with this setting.")
-@click.option("--only", multiple=True, metavar="RULE", help="Check this rule alone; repeatable.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="SETTING=VALUE",
+    help="Check it with this setting.",
+)
+@click.option(
+    "--only", multiple=True, metavar="RULE", help="Check this rule alone; repeatable."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
 def check(
-    context: click.Context, kind: Any, name: str, settings: tuple[str, ...], only: tuple[str, ...], as_json: bool
+    context: click.Context,
+    kind: Any,
+    name: str,
+    settings: tuple[str, ...],
+    only: tuple[str, ...],
+    as_json: bool,
 ) -> None:
     """Check that an installed plugin keeps the rules of its kind; exit status 1 where it breaks one.
 
@@ -95,7 +122,12 @@ def check(
 
         report = check_in_process(kind, name, settings, only)
     results = [
-        {"check": result.name, "outcome": result.outcome, "detail": result.detail, "traceback": result.traceback}
+        {
+            "check": result.name,
+            "outcome": result.outcome,
+            "detail": result.detail,
+            "traceback": result.traceback,
+        }
         for result in report.results
     ]
     value = {"plugin": report.plugin, "summary": report.summary, "results": results}

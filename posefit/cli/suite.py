@@ -26,15 +26,33 @@ def suite(context: click.Context, as_json: bool) -> None:
     from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 
     lines = [f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100"]
-    lines += [f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out", ""]
-    lines += [f"  {f.number}  {f.name:20} d = {listed(f.dimensions):14} {f.summary}" for f in FUNCTIONS]
+    lines += [
+        f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out",
+        "",
+    ]
+    lines += [
+        f"  {f.number}  {f.name:20} d = {listed(f.dimensions):14} {f.summary}"
+        for f in FUNCTIONS
+    ]
     print_result(lines, [asdict(function) for function in FUNCTIONS], as_json)
 
 
 @suite.command("run")
 @click.argument("optimiser")
-@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
-@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
+@click.option(
+    "--function",
+    "functions",
+    type=int,
+    multiple=True,
+    help="Its number; repeatable, by default each.",
+)
+@click.option(
+    "--dimension",
+    "dimensions",
+    type=int,
+    multiple=True,
+    help="Repeatable, by default 9.",
+)
 @click.option(
     "--instances",
     callback=parsed_by(text_range),
@@ -43,11 +61,33 @@ def suite(context: click.Context, as_json: bool) -> None:
     metavar="A:B",
     help="A to B - 1.",
 )
-@click.option("--budget", type=int, default=100, show_default=True, help="Evaluations for each dimension, as in plans.")
+@click.option(
+    "--budget",
+    type=int,
+    default=100,
+    show_default=True,
+    help="Evaluations for each dimension, as in plans.",
+)
 @click.option("--seed", type=int, default=0, show_default=True)
-@click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
-@click.option("--infeasible", default="repair", show_default=True, help="repair, reject or penalise.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
+@click.option(
+    "--set",
+    "texts",
+    multiple=True,
+    metavar="SETTING=VALUE",
+    help="Of the optimiser; repeatable.",
+)
+@click.option(
+    "--infeasible",
+    default="repair",
+    show_default=True,
+    help="repair, reject or penalise.",
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print one JSON array and nothing else on stdout.",
+)
 def suite_run(
     optimiser: str,
     *,
@@ -71,15 +111,27 @@ def suite_run(
         whole("budget", budget, 1)
         whole("seed", seed, 0)
         numbers = _numbers(*instances)
-        chosen_functions, chosen_dimensions = functions or None, dimensions or (9,)
+        chosen_functions = functions or None
+        chosen_dimensions = dimensions or (9,)
         problems = Suite(
-            functions=chosen_functions, dimensions=chosen_dimensions, instances=numbers, infeasible=infeasible
+            functions=chosen_functions,
+            dimensions=chosen_dimensions,
+            instances=numbers,
+            infeasible=infeasible,
         )
         for function in problems.passed_over:
-            say(f"function {function.number} is left out: it has dimensions {listed(function.dimensions)}")
+            say(
+                f"function {function.number} is left out: it has dimensions {listed(function.dimensions)}"
+            )
         chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
         asked = (
-            run_on(problem, optimiser, chosen, evaluations=budget * problem.dimension, seed=seed)
+            run_on(
+                problem,
+                optimiser,
+                chosen,
+                evaluations=budget * problem.dimension,
+                seed=seed,
+            )
             for problem in problems
         )
         runs = list(progress(asked, len(problems), "run"))
@@ -96,9 +148,12 @@ def _numbers(start: int | None, stop: int | None) -> range:
     """Return the instances of a range A:B. Raises InputError where there are none."""
     from posefit.suites.functions import INSTANCES
 
-    first, last = start or 0, INSTANCES.stop if stop is None else stop
+    first = start or 0
+    last = INSTANCES.stop if stop is None else stop
     if not 0 <= first < last <= INSTANCES.stop:
-        raise InputError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
+        raise InputError(
+            f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}"
+        )
     return range(first, last)
 
 
@@ -107,12 +162,22 @@ def _score_lines(scores: "Sequence[SuiteScore]") -> list[str]:
     from posefit.suites.running import ALL, SHOWN
 
     heads = [f"ERT +{above:g}" for above in SHOWN]
-    lines = [f"{'d':>3} {'function':22} {'method':24} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
+    lines = [
+        f"{'d':>3} {'function':22} {'method':24} {'runs':>5} {'above':>7} {'targets':>8}"
+        + _cells(heads)
+    ]
     for score in scores:
-        function = score.name if score.function == ALL else f"{score.function} {score.name}"
-        times = ["-" if time is None else f"{time:.0f}" for time in score.running_times.values()]
+        function = (
+            score.name if score.function == ALL else f"{score.function} {score.name}"
+        )
+        times = [
+            "-" if time is None else f"{time:.0f}"
+            for time in score.running_times.values()
+        ]
         start = f"{score.dimension:>3} {function:22} {score.method:24}"
-        lines.append(f"{start} {score.runs:>5} {score.above:>7.2f} {score.reached:>8.1%}{_cells(times)}".rstrip())
+        lines.append(
+            f"{start} {score.runs:>5} {score.above:>7.2f} {score.reached:>8.1%}{_cells(times)}".rstrip()
+        )
     return lines
 
 

@@ -18,7 +18,12 @@ from posefit.registry import COMMAND, KINDS, Registrable, plugins_of, registry
 TAKEN = {"Frame"}  # names that a template's module has already
 
 
-def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None, commands: Sequence[str] = ()) -> Path:
+def write_plugin(
+    name: str,
+    kind: Registrable,
+    folder: str | Path | None = None,
+    commands: Sequence[str] = (),
+) -> Path:
     """Return the new folder with a small installable plugin, `posefit-NAME` unless another is given.
 
     `commands` are the names of posefit's own, which a new one cannot have. Raises ValueError where the name cannot
@@ -26,9 +31,13 @@ def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None,
     """
     one_of("kind", kind, (*KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
-        raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}")
+        raise InputError(
+            f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}"
+        )
     if name in (known := _taken(kind, commands)):
-        raise InputError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
+        raise InputError(
+            f"name must be a new one, got {name!r}, which {known[name]} registers already"
+        )
     module = name.replace("-", "_")
     if (there := find_spec(f"{PROJECT}_{module}")) is not None:
         raise InputError(
@@ -49,7 +58,8 @@ def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None,
         "module": module,
         "dashed": name.replace("_", "-"),
         "class_name": class_name,
-        "usage": f"posefit check {kind} {name}\n" * (kind != COMMAND) + f"posefit {used}",
+        "usage": f"posefit check {kind} {name}\n" * (kind != COMMAND)
+        + f"posefit {used}",
     }
     target = Path(folder or f"posefit-{words['dashed']}")
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -60,15 +70,25 @@ def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None,
             (f"{kind}.py", f"posefit_{module}.py"),
             (f"{COMMAND if kind == COMMAND else 'kit'}_test.py", f"test_{module}.py"),
         ):
-            text = (files("posefit") / "templates" / f"{template}.txt").read_text(encoding="utf-8")
-            (building / written).write_text(Template(text).substitute(words), encoding="utf-8")
+            text = (files("posefit") / "templates" / f"{template}.txt").read_text(
+                encoding="utf-8"
+            )
+            (building / written).write_text(
+                Template(text).substitute(words), encoding="utf-8"
+            )
     return target
 
 
 def _taken(kind: Registrable, commands: Sequence[str]) -> dict[str, str]:
     """Return the names that a new plugin cannot have, each with the distribution that has it."""
     if kind != COMMAND:
-        return {offer.name: offer.distribution for offer in registry().offers[kind].values()}
+        return {
+            offer.name: offer.distribution for offer in registry().offers[kind].values()
+        }
     plugins = plugins_of((COMMAND,), tuple(commands))
-    others = {str(command.name): plugin.distribution for plugin in plugins for command in plugin.commands}
+    others = {
+        str(command.name): plugin.distribution
+        for plugin in plugins
+        for command in plugin.commands
+    }
     return dict.fromkeys(commands, PROJECT) | others

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options, track_flags, under
+from posefit.cli.options import (
+    EXTRACTION,
+    FRAMES,
+    JSON,
+    TRACK,
+    TrackCommand,
+    options,
+    track_flags,
+    under,
+)
 from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
@@ -27,9 +36,13 @@ COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
 @options(TRACK)
 @FRAMES
 @under("What is seen")(
-    "--live", metavar="DEVICE|URL|-", help="Frames as they come, instead of SOURCE; - reads PGM masks or PPM pictures."
+    "--live",
+    metavar="DEVICE|URL|-",
+    help="Frames as they come, instead of SOURCE; - reads PGM masks or PPM pictures.",
 )
-def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options: Any) -> None:
+def track(
+    as_json: bool, live: str | None, verbose: bool, quiet: bool, **options: Any
+) -> None:
     """Track a person through SOURCE.
 
     A video; masks as a folder, image files, .npz or .npy; a built-in or recorded motion, an .amc or .bvh file. Several
@@ -49,7 +62,10 @@ def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options
 
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
-    shown.log("took " + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()))
+    shown.log(
+        "took "
+        + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items())
+    )
     hint = "open track.html, watch overlay.mp4, look at summary.png"
     _print(result.content, as_json, {}, options["out"], verbose, hint)
 
@@ -57,7 +73,12 @@ def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options
 @click.command(cls=TrackCommand)
 @options(TRACK)
 @under("What is seen")(
-    "--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling."
+    "--frame",
+    type=int,
+    default=0,
+    show_default=True,
+    metavar="K",
+    help="The frame, after resampling.",
 )
 def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.
@@ -70,29 +91,61 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
 
     logging.getLogger("posefit").disabled = quiet
     with results_alone() if as_json else nullcontext():
-        result = run(progress=Progress() if quiet else Progress(say), **_arguments(options))
+        result = run(
+            progress=Progress() if quiet else Progress(say), **_arguments(options)
+        )
     more = {"pose_degrees": [round(math.degrees(angle), 6) for angle in result.pose]}
-    _print(result.track.content, as_json, more, options["out"], verbose, "open track.html, look at summary.png")
+    _print(
+        result.track.content,
+        as_json,
+        more,
+        options["out"],
+        verbose,
+        "open track.html, look at summary.png",
+    )
 
 
-def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progress) -> None:
+def _track_live(
+    live: str, as_json: bool, options: dict[str, Any], shown: Progress
+) -> None:
     from posefit.tracking.live import track_live, write_live
 
     if options["source"]:
-        raise InputError(f"SOURCE must be left out with --live, got {' '.join(options['source'])}")
-    if useless := [name for name in ("force", "resume", "without_subject") if options[name]]:
-        raise InputError(f"--{useless[0].replace('_', '-')} must be left out with --live")
+        raise InputError(
+            f"SOURCE must be left out with --live, got {' '.join(options['source'])}"
+        )
+    if useless := [
+        name for name in ("force", "resume", "without_subject") if options[name]
+    ]:
+        raise InputError(
+            f"--{useless[0].replace('_', '-')} must be left out with --live"
+        )
     out = options["out"]
     # frames that come are taken as those of a video
-    chosen = {name: value for name, value in _arguments(options, "video").items() if name not in _OF_FILES}
+    chosen = {
+        name: value
+        for name, value in _arguments(options, "video").items()
+        if name not in _OF_FILES
+    }
     frames = track_live(live, progress=shown, **chosen)
-    summary = write_live(frames, out, (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None)
+    summary = write_live(
+        frames,
+        out,
+        (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None,
+    )
     latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"
-    shown.log(f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}")
+    shown.log(
+        f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}"
+    )
 
 
 def _print(
-    content: "Content", as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
+    content: "Content",
+    as_json: bool,
+    more: Mapping[str, Any],
+    out: str | None,
+    verbose: bool,
+    hint: str,
 ) -> None:
     """Print what a track is: as JSON with something more, in three lines, or whole."""
     from posefit.output.text import brief, table
@@ -108,26 +161,49 @@ def _print(
         click.secho(worth, bold=True, fg=COLOURS[grade])
         click.echo("\n".join(work))
     if out or not verbose:
-        click.echo(f"written to {out}: {hint}" if out else "--verbose prints all figures; --out DIR writes files")
+        click.echo(
+            f"written to {out}: {hint}"
+            if out
+            else "--verbose prints all figures; --out DIR writes files"
+        )
 
 
 @click.command()
 @click.argument("video")
-@click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
+@click.option(
+    "--out",
+    required=True,
+    metavar="DIR",
+    help="New folder for masks.npz, preview.mp4 and quality.csv.",
+)
 @options(EXTRACTION)
-@click.option("--set", "settings", multiple=True, metavar="[NAME.]SETTING=VALUE", help="Of the segmenter; repeatable.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="[NAME.]SETTING=VALUE",
+    help="Of the segmenter; repeatable.",
+)
 @FRAMES
 @options(track_flags("person"))
 @JSON
 def extract(
-    video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], person: Any, **options: Any
+    video: str,
+    out: str,
+    as_json: bool,
+    frames: Any,
+    settings: Sequence[str],
+    person: Any,
+    **options: Any,
 ) -> None:
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import kind_of
 
-    how = replace(extraction_of(options, kind_of(video), settings) or Extraction(), person=person)
+    how = replace(
+        extraction_of(options, kind_of(video), settings) or Extraction(), person=person
+    )
     result = run(video, out, how, frames=frames, progress=progress)
     if result["guesses"]:
         say(f"guessed: {'; '.join(result['guesses'])}")
@@ -149,16 +225,21 @@ def _arguments(options: dict[str, Any], kind: "Kind | None" = None) -> dict[str,
     from posefit.tracking.options import TrackOptions
 
     source = options["source"] or ("walk",)
-    options, kind = {**options, "source": source}, kind or kind_of(source[0])
+    options = {**options, "source": source}
+    kind = kind or kind_of(source[0])
     options["extraction"] = extraction_of(options, kind)
     if left_out := options.pop("without_subject"):
-        chosen = TrackOptions(**{name: options[name] for name in ("method", "settings", "train")})
+        chosen = TrackOptions(
+            **{name: options[name] for name in ("method", "settings", "train")}
+        )
         motion = source[0] if kind == "motion" else None
         options["train"] = without_subjects(completed(chosen, motion).train, left_out)
     return options
 
 
-def extraction_of(options: dict[str, Any], kind: "Kind", settings: Sequence[str] | None = None) -> Any:
+def extraction_of(
+    options: dict[str, Any], kind: "Kind", settings: Sequence[str] | None = None
+) -> Any:
     """Return how the person is taken out of a video, by options that are taken out of them; None by default.
 
     `settings` are texts of the segmenter's settings; without them, those of `options` that begin with its name. Raises
@@ -169,7 +250,10 @@ def extraction_of(options: dict[str, Any], kind: "Kind", settings: Sequence[str]
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
-    values = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
+    values = {
+        name: options.pop(name)
+        for name in ("extraction", "background", "roi", "ignore", "width")
+    }
     values = {name: value for name, value in values.items() if value is not None}
     if kind not in ("video", "pictures"):
         for name, value in values.items():
@@ -183,7 +267,9 @@ def extraction_of(options: dict[str, Any], kind: "Kind", settings: Sequence[str]
         settings = [text for text in texts if text.partition(".")[0] == name]
         options["settings"] = tuple(text for text in texts if text not in settings)
     if settings:
-        values["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, settings)
+        values["settings"] = parse_texts(
+            name, registry().offer("segmenter", name).factory, settings
+        )
     return Extraction(**values) if values else None
 
 
@@ -192,5 +278,10 @@ def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]
     from posefit.motion import recorded
 
     if not any(recorded.is_library(clips) for clips in train):
-        raise InputError(f"without_subject must be given with --train library, got {', '.join(train)}")
-    return [recorded.leaving_out(clips, subjects) if recorded.is_library(clips) else clips for clips in train]
+        raise InputError(
+            f"without_subject must be given with --train library, got {', '.join(train)}"
+        )
+    return [
+        recorded.leaving_out(clips, subjects) if recorded.is_library(clips) else clips
+        for clips in train
+    ]

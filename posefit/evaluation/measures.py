@@ -33,7 +33,9 @@ class Measure:
 
     def shown(self, value: float | None) -> str:
         """Return a value with its label and unit, such as `MPJPE 18 mm`."""
-        return " ".join(word for word in (self.label, self.number(value), self.unit) if word)
+        return " ".join(
+            word for word in (self.label, self.number(value), self.unit) if word
+        )
 
 
 def _figure(*figure: Any) -> Any:
@@ -59,28 +61,53 @@ class Measures:
     """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
 
     error_degrees: Spread | None = _figure(
-        "error", "degrees", 2, "mean absolute difference of the 66 angles from the true ones. SAPSO (8)-(10)"
+        "error",
+        "degrees",
+        2,
+        "mean absolute difference of the 66 angles from the true ones. SAPSO (8)-(10)",
     )
     geodesic_degrees: float | None = _figure(
-        "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
+        "geodesic",
+        "degrees",
+        2,
+        "angle between true and estimated rotations of root and joints, the mean",
     )
     free_error_degrees: float | None = _figure(
-        "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
+        "error of free angles",
+        "degrees",
+        2,
+        "the error over those angles alone that the skeleton lets move",
     )
     mpjpe_mm: float | None = _figure(
-        "MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point"
+        "MPJPE",
+        "mm",
+        0,
+        "mean distance of the 27 joints from the true ones, both roots at one point",
     )
     pa_mpjpe_mm: float | None = _figure(
-        "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)"
+        "PA-MPJPE",
+        "mm",
+        0,
+        "the same after the best rotation, scale and translation (Procrustes)",
     )
     iou: float = _figure(
-        "IoU", "", 3, "intersection over union of body and mask, the mean over usable views and frames"
+        "IoU",
+        "",
+        3,
+        "intersection over union of body and mask, the mean over usable views and frames",
     )
-    cost: float = _figure("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
-    swap_rate: float | None = _share("left/right swapped", "share of frames nearer to the truth when mirrored")
-    lost_rate: float | None = _share("lost", "share of frames with an MPJPE above 150 mm")
+    cost: float = _figure(
+        "cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)"
+    )
+    swap_rate: float | None = _share(
+        "left/right swapped", "share of frames nearer to the truth when mirrored"
+    )
+    lost_rate: float | None = _share(
+        "lost", "share of frames with an MPJPE above 150 mm"
+    )
     coverage: Mapping[str, float] | None = _share(
-        "coverage", "share of joints but the root whose truth lies within their 50, 80 and 95 % intervals"
+        "coverage",
+        "share of joints but the root whose truth lies within their 50, 80 and 95 % intervals",
     )
     interval_mm: Mapping[str, float] | None = _figure(
         "interval",
@@ -89,16 +116,25 @@ class Measures:
         "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over all but the root",
     )
     unknown_rate: float | None = _share(
-        "flagged unknown", "share of frames whose left and right the method calls unknown"
+        "flagged unknown",
+        "share of frames whose left and right the method calls unknown",
     )
     swapped_known_rate: float | None = _share(
-        "swapped where known", "share swapped of the frames whose left and right it calls known"
+        "swapped where known",
+        "share swapped of the frames whose left and right it calls known",
     )
-    lost_flagged_rate: float | None = _share("flagged lost", "share of frames that the method calls lost")
+    lost_flagged_rate: float | None = _share(
+        "flagged lost", "share of frames that the method calls lost"
+    )
     acceleration: float | None = _figure(
-        "acceleration", "m/s2", 1, "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter"
+        "acceleration",
+        "m/s2",
+        1,
+        "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter",
     )
-    acceleration_ratio: float | None = _figure("acceleration ratio", "", 1, "the same, over that of the true joints")
+    acceleration_ratio: float | None = _figure(
+        "acceleration ratio", "", 1, "the same, over that of the true joints"
+    )
     foot_slide_mm: float | None = _figure(
         "foot slide",
         "mm a step",
@@ -107,26 +143,51 @@ class Measures:
         "mean over steps: about 20 of motion capture",
     )
     held_frames: int = _figure(
-        "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"
+        "held",
+        "frames",
+        0,
+        "frames that show too little: the pose is held or carried on, not searched",
     )
     skill: Mapping[str, float | None] | None = _figure(
-        "skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline"
+        "skill",
+        "",
+        2,
+        "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline",
     )
     baselines_degrees: Mapping[str, float] | None = _figure(
-        "baselines", "degrees", 2, "errors of trivial methods, given the true root and translation"
+        "baselines",
+        "degrees",
+        2,
+        "errors of trivial methods, given the true root and translation",
     )
     baselines_mm: Mapping[str, float] | None = _figure(
         "baselines' MPJPE", "mm", 0, "MPJPE of trivial methods, given the same"
     )
     prior_floor_degrees: float | None = _figure(
-        "truth projected into the prior", "degrees", 2, "error of the true poses' projection; a floor of linear priors"
+        "truth projected into the prior",
+        "degrees",
+        2,
+        "error of the true poses' projection; a floor of linear priors",
     )
     seconds_per_frame: float = _figure(
-        "time", "ms a frame", 1, "wall time from the first mask to the last pose, over the frames", 1e3
+        "time",
+        "ms a frame",
+        1,
+        "wall time from the first mask to the last pose, over the frames",
+        1e3,
     )
-    cpu_seconds_per_frame: float = _figure("CPU time", "ms a frame", 1, "the same in CPU time of all threads", 1e3)
-    evaluations: int = _figure("evaluations", "", 0, "poses whose cost was computed, in all frames together")
-    evaluations_per_second: float = _figure("speed", "poses a second", 0, "evaluations over that time")
+    cpu_seconds_per_frame: float = _figure(
+        "CPU time", "ms a frame", 1, "the same in CPU time of all threads", 1e3
+    )
+    evaluations: int = _figure(
+        "evaluations", "", 0, "poses whose cost was computed, in all frames together"
+    )
+    evaluations_per_second: float = _figure(
+        "speed", "poses a second", 0, "evaluations over that time"
+    )
 
 
-MEASURES = {figure.name: Measure(figure.name, *figure.metadata["measure"]) for figure in fields(Measures)}
+MEASURES = {
+    figure.name: Measure(figure.name, *figure.metadata["measure"])
+    for figure in fields(Measures)
+}

@@ -24,7 +24,8 @@ class Start:
     spread: Array  # (d,) standard deviations
     velocity: Array  # (d,) v_pred
     weight: float = 1.0  # how likely it is, beside the others
-    others: Sequence["Start"] = ()  # less likely ones, where several are possible; a population is drawn from all
+    # less likely ones, where several are possible; a population is drawn from all
+    others: Sequence["Start"] = ()
 
 
 class Space(Protocol):
@@ -68,7 +69,9 @@ def converted(space: Space, proposals: Array, origin: Space) -> Array:
     A `Filter` needs it in `advance`. A space without a method `moved` is the same box in every frame.
     """
     moved = getattr(space, "moved", None)
-    return np.array(proposals) if moved is None else np.asarray(moved(proposals, origin))
+    return (
+        np.array(proposals) if moved is None else np.asarray(moved(proposals, origin))
+    )
 
 
 def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array:
@@ -86,18 +89,26 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
     if drawn is None and space.start is not None:
         drawn = _drawn(space, None, rng, count)
     if drawn is None:
-        raise InputError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
+        raise InputError(
+            f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws"
+        )
     return drawn
 
 
-def _drawn(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array | None:
-    drawn, broken = _redrawn(space, lambda rows: _sample(space, start, rng, len(rows)), count)
+def _drawn(
+    space: Space, start: Start | None, rng: np.random.Generator, count: int
+) -> Array | None:
+    drawn, broken = _redrawn(
+        space, lambda rows: _sample(space, start, rng, len(rows)), count
+    )
     if start is not None and space.feasible(start.mean[None])[0]:
         drawn[broken] = start.mean
     elif len(broken) == count > 0:
         return None
     elif len(broken):
-        drawn[broken] = drawn[rng.choice(np.setdiff1d(np.arange(count), broken), len(broken))]
+        drawn[broken] = drawn[
+            rng.choice(np.setdiff1d(np.arange(count), broken), len(broken))
+        ]
     return drawn
 
 
@@ -106,43 +117,60 @@ def _redrawn(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Return what `draw` draws for rows (count,), each redrawn until it is feasible, and the rows that never are."""
     drawn = draw(np.arange(count))
-    broken, remaining = np.flatnonzero(~space.feasible(drawn)), REDRAWS - 1
+    broken = np.flatnonzero(~space.feasible(drawn))
+    remaining = REDRAWS - 1
     while remaining and len(broken):
         shape = len(broken), min(remaining, batch)
         again = draw(np.repeat(broken, shape[1]))
         works = space.feasible(again).reshape(shape)
-        drawn[broken] = first_that_works(again.reshape(*shape, -1), works, drawn[broken])
-        broken, remaining = broken[~works.any(axis=1)], remaining - shape[1]
+        drawn[broken] = first_that_works(
+            again.reshape(*shape, -1), works, drawn[broken]
+        )
+        broken = broken[~works.any(axis=1)]
+        remaining = remaining - shape[1]
     return drawn, broken
 
 
-def first_that_works(attempts: Array, works: NDArray[np.bool_], otherwise: Array | float) -> Array:
+def first_that_works(
+    attempts: Array, works: NDArray[np.bool_], otherwise: Array | float
+) -> Array:
     """Return the first of each row's attempts (n, k, d) that works (n, k), and where none does `otherwise` (n, d)."""
     first = attempts[np.arange(len(works)), works.argmax(axis=1)]
     return np.where(np.asarray(works.any(axis=1))[:, None], first, otherwise)
 
 
-def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array:
+def _sample(
+    space: Space, start: Start | None, rng: np.random.Generator, count: int
+) -> Array:
     """Return proposals (count, d) from the start or uniform, in the box, feasible or not."""
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
-    mean, spread = start.mean, start.spread
+    mean = start.mean
+    spread = start.spread
     if start.others:
         starts = [start, *start.others]
         weights = np.array([each.weight for each in starts])
         rows = rng.choice(len(starts), count, p=weights / weights.sum())
-        mean, spread = (np.array([getattr(each, name) for each in starts])[rows] for name in ("mean", "spread"))
-    mean, spread = (np.broadcast_to(values, (count, space.dimensions)) for values in (mean, spread))
+        mean, spread = (
+            np.array([getattr(each, name) for each in starts])[rows]
+            for name in ("mean", "spread")
+        )
+    mean, spread = (
+        np.broadcast_to(values, (count, space.dimensions)) for values in (mean, spread)
+    )
     drawn = wrap(space, rng.normal(mean, spread))  # SAPSO (6)
     for _ in range(REDRAWS):
         outside = np.abs(drawn) > 1.0
         if not outside.any():
             return drawn
-        drawn[outside] = rng.normal(mean[outside], spread[outside])  # periodic ones are never among them
+        # periodic ones are never among them
+        drawn[outside] = rng.normal(mean[outside], spread[outside])
     return fold(space, drawn)
 
 
-def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:
+def sample_normal(
+    space: Space, rng: np.random.Generator, means: Array, spread: Array
+) -> Array:
     """Return a normal draw (n, d) around each of n feasible means, standard deviations `spread` (d,) or (n, d).
 
     A coordinate that leaves the box is folded back into it, as at a mirror; what is infeasible is redrawn
@@ -151,7 +179,11 @@ def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: 
     spread = np.broadcast_to(spread, means.shape)
 
     def draw(rows: NDArray[np.int64]) -> Array:
-        return fold(space, means[rows] + spread[rows] * rng.standard_normal((len(rows), means.shape[1])))
+        return fold(
+            space,
+            means[rows]
+            + spread[rows] * rng.standard_normal((len(rows), means.shape[1])),
+        )
 
     drawn, broken = _redrawn(space, draw, len(means), BATCH)
     drawn[broken] = means[broken]
@@ -161,7 +193,11 @@ def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: 
 def fold(space: Space, proposals: Array) -> Array:
     """Return proposals (n, d) folded into the box: mirrored at its sides, periodic coordinates wrapped."""
     folded = np.abs((proposals + 3.0) % 4.0 - 2.0) - 1.0
-    return np.where(space.periodic, wrap(space, proposals), folded) if space.periodic.any() else folded
+    return (
+        np.where(space.periodic, wrap(space, proposals), folded)
+        if space.periodic.any()
+        else folded
+    )
 
 
 def repair(space: Space, proposals: Array, home: Array) -> Array:
@@ -176,8 +212,13 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
     if len(broken):
         home = np.broadcast_to(home, repaired.shape)[broken]
         shares = np.arange(REPAIR_STEPS - 1, 0, -1)[:, None] / REPAIR_STEPS
-        line = home[:, None] + shares * displacement(space, home, repaired[broken])[:, None]
+        line = (
+            home[:, None]
+            + shares * displacement(space, home, repaired[broken])[:, None]
+        )
         line = np.clip(wrap(space, line), -1.0, 1.0)
-        works = space.feasible(line.reshape(-1, space.dimensions)).reshape(line.shape[:2])
+        works = space.feasible(line.reshape(-1, space.dimensions)).reshape(
+            line.shape[:2]
+        )
         repaired[broken] = first_that_works(line, works, home)
     return repaired

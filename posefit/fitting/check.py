@@ -17,11 +17,17 @@ def at_least(name: str, value: float, least: float) -> None:
         raise InputError(f"{name} must be at least {least:g}, got {value}")
 
 
-def between(name: str, value: float, low: float, high: float, *, ends: bool = True) -> None:
+def between(
+    name: str, value: float, low: float, high: float, *, ends: bool = True
+) -> None:
     """Raise InputError where a number is not in low to high, with or without the ends."""
     inside = low <= value <= high if ends else low < value < high
     if not inside:
-        way = f"lie in {low:g} to {high:g}" if ends else f"lie between {low:g} and {high:g}"
+        way = (
+            f"lie in {low:g} to {high:g}"
+            if ends
+            else f"lie between {low:g} and {high:g}"
+        )
         raise InputError(f"{name} must {way}, got {cut(str(value))}")
 
 
@@ -33,17 +39,29 @@ def positive(name: str, value: float) -> None:
 
 def whole(name: str, value: object, least: int) -> int:
     """Return a whole number as an int. Raises InputError where it is none, or below the least it may be."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or int(value).bit_length() > MAX_BITS:
-        raise InputError(f"{name} must be a whole number of at least {least}, got {quoted(value)}")
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, Integral)
+        or int(value).bit_length() > MAX_BITS
+    ):
+        raise InputError(
+            f"{name} must be a whole number of at least {least}, got {quoted(value)}"
+        )
     if value < least:
-        raise InputError(f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}")
+        raise InputError(
+            f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}"
+        )
     return int(value)
 
 
 def finite_number(name: str, value: object) -> float:
     """Return a finite number as a float. Raises InputError where it is none."""
     try:
-        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+        number = (
+            float(value)
+            if isinstance(value, Real) and not isinstance(value, bool)
+            else math.nan
+        )
     except OverflowError:  # a whole number of any size
         number = math.inf
     if not math.isfinite(number):
@@ -64,7 +82,9 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
     known = tuple(known)
     if value not in known:
         hint = suggestion(value, map(str, known)) if isinstance(value, str) else ""
-        raise InputError(f"{name} must be one of {', '.join(map(str, known))}, got {quoted(value)}{hint}")
+        raise InputError(
+            f"{name} must be one of {', '.join(map(str, known))}, got {quoted(value)}{hint}"
+        )
 
 
 def choices(settings: object, values: Mapping[str, object]) -> None:

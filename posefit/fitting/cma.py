@@ -21,11 +21,19 @@ from posefit.reading import cut
 ALPHA_COV = 2.0
 LAG = 0.1  # of the decomposition, appendix B.2
 GROWTH = 2  # IPOP: a restart has a population so many times as large
-SURPLUS, MIN_SHARE = 1.25, 0.25  # ours: draws over those needed, and the least share of feasible ones assumed
+# ours: draws over those needed, and the least share of feasible ones assumed
+SURPLUS = 1.25
+MIN_SHARE = 0.25
 CHECKED = 10  # ours: generations after which a search may have ended
-TOL_FUN, TOL_X, TOL_X_UP = 1e-12, 1e-12, 1e4  # as cmaes has them; TolX in first step sizes
-CONDITION = 1e14  # longest axis over the shortest, as cmaes has it; the tutorial means their squares
-SMALL = 1e-8  # ours, as cmaes has it: replaces eigenvalues that rounding makes negative, and keeps divisors from 0
+# as cmaes has them; TolX in first step sizes
+TOL_FUN = 1e-12
+TOL_X = 1e-12
+TOL_X_UP = 1e4
+# longest axis over the shortest, as cmaes has it; the tutorial means their squares
+CONDITION = 1e14
+# ours, as cmaes has it: replaces eigenvalues that rounding makes negative, and keeps
+# divisors from 0
+SMALL = 1e-8
 
 
 class Rates(NamedTuple):
@@ -47,23 +55,37 @@ def default_population_size(dimensions: int) -> int:
 
 def constants(dimensions: int, population: int) -> tuple[Array, Rates]:
     """Return the weights (lambda,) of a population of 4 or more, best first, and the rates that follow from them."""
-    n, mu = dimensions, population // 2
-    raw = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))  # HANSEN2016 (49)
-    mu_eff, mu_eff_minus = effective_sample_size(raw[:mu]), effective_sample_size(raw[mu:])  # HANSEN2016 (8)
+    n = dimensions
+    mu = population // 2
+    # HANSEN2016 (49)
+    raw = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))
+    # HANSEN2016 (8)
+    mu_eff = effective_sample_size(raw[:mu])
+    mu_eff_minus = effective_sample_size(raw[mu:])
     c_sigma = (mu_eff + 2.0) / (n + mu_eff + 5.0)  # HANSEN2016 (55)
-    d_sigma = 1.0 + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (n + 1.0)) - 1.0) + c_sigma
+    d_sigma = (
+        1.0 + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (n + 1.0)) - 1.0) + c_sigma
+    )
     c_c = (4.0 + mu_eff / n) / (n + 4.0 + 2.0 * mu_eff / n)  # HANSEN2016 (56)
     c_1 = ALPHA_COV / ((n + 1.3) ** 2 + mu_eff)  # HANSEN2016 (57)
-    c_mu = ALPHA_COV * (mu_eff - 2.0 + 1.0 / mu_eff) / ((n + 2.0) ** 2 + ALPHA_COV * mu_eff / 2.0)  # HANSEN2016 (58)
+    # HANSEN2016 (58)
+    c_mu = (
+        ALPHA_COV
+        * (mu_eff - 2.0 + 1.0 / mu_eff)
+        / ((n + 2.0) ** 2 + ALPHA_COV * mu_eff / 2.0)
+    )
     c_mu = min(1.0 - c_1 - SMALL, c_mu)
     negative = min(
         1.0 + c_1 / c_mu,  # HANSEN2016 (50)
         1.0 + 2.0 * mu_eff_minus / (mu_eff + 2.0),  # HANSEN2016 (51)
         (1.0 - c_1 - c_mu) / (n * c_mu),  # HANSEN2016 (52)
     )
-    better, worse = raw[raw > 0.0].sum(), -raw[raw < 0.0].sum()
-    weights = np.where(raw >= 0.0, raw / better, negative * raw / worse)  # HANSEN2016 (53)
-    chi = math.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))  # HANSEN2016 (chi)
+    better = raw[raw > 0.0].sum()
+    worse = -raw[raw < 0.0].sum()
+    # HANSEN2016 (53)
+    weights = np.where(raw >= 0.0, raw / better, negative * raw / worse)
+    # HANSEN2016 (chi)
+    chi = math.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))
     return weights, Rates(mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi)
 
 
@@ -77,13 +99,21 @@ class Strategy:
     def __init__(self, mean: Array, spread: Array, population: int) -> None:
         """Start around `mean` (d,) with standard deviations `spread` (d,), generations of `population` proposals."""
         d = len(mean)
-        self.mean, self.sigma = np.array(mean, dtype=np.float64), math.sqrt(float((spread**2).mean()))
-        self.covariance = np.diag(np.maximum(spread / self.sigma, 1e-6) ** 2)  # the least is ours
+        self.mean, self.sigma = (
+            np.array(mean, dtype=np.float64),
+            math.sqrt(float((spread**2).mean())),
+        )
+        # the least is ours
+        self.covariance = np.diag(np.maximum(spread / self.sigma, 1e-6) ** 2)
         self.step_path, self.path, self.generation = np.zeros(d), np.zeros(d), 0
         self.weights, self.rates = constants(d, population)
         self.total = float(self.weights.sum())
-        self.every = max(1, math.floor(LAG / (d * (self.rates.c_1 + self.rates.c_mu))))  # HANSEN2016 (B.2)
-        self.tol_x, self.recent = TOL_X * self.sigma, deque[Array](maxlen=10 + math.ceil(30 * d / population))
+        # HANSEN2016 (B.2)
+        self.every = max(1, math.floor(LAG / (d * (self.rates.c_1 + self.rates.c_mu))))
+        self.tol_x, self.recent = (
+            TOL_X * self.sigma,
+            deque[Array](maxlen=10 + math.ceil(30 * d / population)),
+        )
         self.decompose()
 
     def decompose(self) -> None:
@@ -94,7 +124,8 @@ class Strategy:
             squares = np.where(squares < 0.0, SMALL, squares)
             self.covariance = self.axes * squares @ self.axes.T
         self.lengths = np.sqrt(squares)
-        self.scaled, self.whitening = self.axes * self.lengths, self.axes / self.lengths @ self.axes.T
+        self.scaled = self.axes * self.lengths
+        self.whitening = self.axes / self.lengths @ self.axes.T
 
     def sample(self, rng: np.random.Generator, count: int) -> Array:
         """Return so many draws (count, d)."""
@@ -104,8 +135,13 @@ class Strategy:
 
     def learn(self, proposals: Array, costs: Array) -> None:
         """Adapt to a generation of proposals (n, d), drawn here or moved since, and their finite costs (n,)."""
-        weights, (mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi) = self.weights, self.rates
-        d, mu, order = len(self.mean), len(costs) // 2, costs.argsort(kind="stable")
+        weights, (mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi) = (
+            self.weights,
+            self.rates,
+        )
+        d = len(self.mean)
+        mu = len(costs) // 2
+        order = costs.argsort(kind="stable")
         self.recent.append(costs[order[[0, -1]]])
         self.generation += 1
         y = (proposals[order] - self.mean) / self.sigma
@@ -114,22 +150,33 @@ class Strategy:
         white = math.sqrt(c_sigma * (2.0 - c_sigma) * mu_eff) * (self.whitening @ step)
         self.step_path = (1.0 - c_sigma) * self.step_path + white  # HANSEN2016 (43)
         length = math.sqrt(self.step_path @ self.step_path)
-        self.sigma *= math.exp(c_sigma / d_sigma * (length / chi - 1.0))  # HANSEN2016 (44)
-        usual = math.sqrt(1.0 - (1.0 - c_sigma) ** (2.0 * (self.generation + 1.0))) * chi
-        h_sigma = 1.0 if length < (1.4 + 2.0 / (d + 1.0)) * usual else 0.0  # HANSEN2016 (h_sigma)
+        # HANSEN2016 (44)
+        self.sigma *= math.exp(c_sigma / d_sigma * (length / chi - 1.0))
+        usual = (
+            math.sqrt(1.0 - (1.0 - c_sigma) ** (2.0 * (self.generation + 1.0))) * chi
+        )
+        # HANSEN2016 (h_sigma)
+        h_sigma = 1.0 if length < (1.4 + 2.0 / (d + 1.0)) * usual else 0.0
         fresh = h_sigma * math.sqrt(c_c * (2.0 - c_c) * mu_eff) * step
         self.path = (1.0 - c_c) * self.path + fresh  # HANSEN2016 (45)
-        white, signed = y[mu:] @ self.whitening, weights.copy()
-        signed[mu:] *= d / (np.einsum("ij,ij->i", white, white) + SMALL)  # HANSEN2016 (46)
-        retained = 1.0 + c_1 * (1.0 - h_sigma) * c_c * (2.0 - c_c) - c_1 - c_mu * self.total
-        rank_one, rank_mu = self.path[:, None] * self.path, y.T * signed @ y
-        self.covariance = retained * self.covariance + c_1 * rank_one + c_mu * rank_mu  # HANSEN2016 (47)
+        white = y[mu:] @ self.whitening
+        signed = weights.copy()
+        # HANSEN2016 (46)
+        signed[mu:] *= d / (np.einsum("ij,ij->i", white, white) + SMALL)
+        retained = (
+            1.0 + c_1 * (1.0 - h_sigma) * c_c * (2.0 - c_c) - c_1 - c_mu * self.total
+        )
+        rank_one = self.path[:, None] * self.path
+        rank_mu = y.T * signed @ y
+        # HANSEN2016 (47)
+        self.covariance = retained * self.covariance + c_1 * rank_one + c_mu * rank_mu
         if self.generation % self.every == 0:
             self.decompose()
 
     def ended(self) -> bool:
         """Return whether the search has come to an end: nothing changes any more, or it diverges."""
-        variances, axis = self.covariance.diagonal(), self.scaled[:, self.generation % len(self.mean)]
+        variances = self.covariance.diagonal()
+        axis = self.scaled[:, self.generation % len(self.mean)]
         return bool(  # HANSEN2016 (B.3)
             (self.generation > len(self.recent) and np.ptp(self.recent) < TOL_FUN)
             or self.sigma * max(variances.max(), self.path.max()) < self.tol_x
@@ -153,34 +200,54 @@ class CMAES:
     """
 
     def __init__(
-        self, space: Space, rng: np.random.Generator, *, population_size: int = 0, spread: float = 0.5
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        population_size: int = 0,
+        spread: float = 0.5,
     ) -> None:
         if population_size != 0:
             at_least("population_size", population_size, 5)
         positive("spread", spread)
-        self.space, self.rng, self.waiting = space, rng, 0
-        self.population_size = population_size or max(default_population_size(space.dimensions), 5)
+        self.space = space
+        self.rng = rng
+        self.waiting = 0
+        self.population_size = population_size or max(
+            default_population_size(space.dimensions), 5
+        )
         self.anywhere = np.full(space.dimensions, spread)
         self._start(self.anywhere if space.start is None else space.start.spread)
 
     def _start(self, spread: Array) -> None:
         """Start around a feasible prediction, or else around a fresh draw."""
         if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
-            raise InputError(f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}")
-        start, self.home = self.space.start, draw_population(self.space, self.rng, 1)[0]
+            raise InputError(
+                f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}"
+            )
+        start = self.space.start
+        self.home = draw_population(self.space, self.rng, 1)[0]
         if start is not None and self.space.feasible(start.mean[None])[0]:
             self.home = start.mean
-        self.strategy, self.share = Strategy(self.home, spread, self.population_size), MIN_SHARE
+        self.strategy = Strategy(self.home, spread, self.population_size)
+        self.share = MIN_SHARE
         self.asked = self._drawn()
 
     def _drawn(self) -> Array:
         n = self.population_size
-        drawn = wrap(self.space, self.strategy.sample(self.rng, math.ceil(SURPLUS * n / self.share)))
+        drawn = wrap(
+            self.space,
+            self.strategy.sample(self.rng, math.ceil(SURPLUS * n / self.share)),
+        )
         feasible = self.space.feasible(drawn)
         self.share = max(np.count_nonzero(feasible) / len(drawn), MIN_SHARE)
         population = drawn[feasible][:n]
         moved = drawn[~feasible][: n - len(population)]
-        return np.concatenate([population, repair(self.space, moved, self.home)]) if len(moved) else population
+        return (
+            np.concatenate([population, repair(self.space, moved, self.home)])
+            if len(moved)
+            else population
+        )
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
@@ -191,9 +258,11 @@ class CMAES:
         """Adapt mean, step size and covariance, and start again where the search has come to an end."""
         check_tell(self.waiting, proposals, costs)
         self.waiting = 0
-        known, mean = finite_costs(costs), self.strategy.mean
+        known = finite_costs(costs)
+        mean = self.strategy.mean
         self.home = self.asked[known.argmin()]
-        if self.space.periodic.any():  # the mean goes on past the end of a circle, and so must what it learns from
+        # the mean goes on past the end of a circle, and so must what it learns from
+        if self.space.periodic.any():
             proposals = mean + displacement(self.space, mean, proposals)
         self.strategy.learn(proposals, known)
         if self.strategy.generation % CHECKED == 0 and self.strategy.ended():

@@ -16,12 +16,15 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
 NUMBERS = 3 + ANGLES  # of a place and a pose
-BORDER_DEVIATION = 0.01  # metres that a point of the border may be off: standard deviation, as the next
+# metres that a point of the border may be off: standard deviation, as the next
+BORDER_DEVIATION = 0.01
 PIXEL_DEVIATION = 0.5  # pixels, besides
-CORRELATION_LENGTH = 0.09  # metres of the border that are off together, so that they are one measurement
+# metres of the border that are off together, so that they are one measurement
+CORRELATION_LENGTH = 0.09
 MIN_ROBUST_SCALE = 3.0  # pixels: what is farther off counts less
 CAP = 2  # points of a quarter, about, of the disc at a bone's end
-COVERED = 0.25  # pixels within another bone from which on a point of a bone's border is hidden
+# pixels within another bone from which on a point of a bone's border is hidden
+COVERED = 0.25
 TINY = 1e-9
 
 
@@ -51,14 +54,18 @@ class Growth(NamedTuple):
 
     joints: Array  # (F, 27, 3), or (T, F, 27, 3): how joints change
     radii: Array  # (F, 26, 2): how radii change
-    squares: Array  # (1 + F, 1 + F): in its first column half the gradient, in the rest half the second derivatives
+    # (1 + F, 1 + F): in its first column half the gradient, in the rest half the second
+    # derivatives
+    squares: Array
 
 
 class BoneSquares(NamedTuple):
     """Half the Hessians of each joint's bone, or of T frames', and forces, over twists."""
 
     hessians: Array  # (27, 6, 6), or (T, 27, 6, 6)
-    forces: Array  # (27, 6, 1 + F), or (T, 27, 6, 1 + F): half the gradient, and half the derivatives by F factors
+    # (27, 6, 1 + F), or (T, 27, 6, 1 + F): half the gradient, and half the derivatives
+    # by F factors
+    forces: Array
 
 
 @jit
@@ -69,26 +76,44 @@ def write_cones(parents, centres, radii, cones, discs):
     and that of its sides; 0 where one of its discs covers the other.
     """
     for b in range(parents.size):
-        x, y, r0, r1 = centres[parents[b], 0], centres[parents[b], 1], radii[b, 0], radii[b, 1]
-        dx, dy, dr = centres[b + 1, 0] - x, centres[b + 1, 1] - y, r0 - r1
+        x = centres[parents[b], 0]
+        y = centres[parents[b], 1]
+        r0 = radii[b, 0]
+        r1 = radii[b, 1]
+        dx = centres[b + 1, 0] - x
+        dy = centres[b + 1, 1] - y
+        dr = r0 - r1
         square = dx * dx + dy * dy
-        length, side = math.sqrt(square), math.sqrt(square - dr * dr) if square > dr * dr + TINY else 0.0
+        length = math.sqrt(square)
+        side = math.sqrt(square - dr * dr) if square > dr * dr + TINY else 0.0
         for i, value in enumerate((x, y, r0, dx, dy, dr, length, side)):
             cones[b, i] = value
-        discs[b, 0], discs[b, 1], discs[b, 2] = x + 0.5 * dx, y + 0.5 * dy, 0.5 * length + max(r0, r1)
+        discs[b, 0], discs[b, 1], discs[b, 2] = (
+            x + 0.5 * dx,
+            y + 0.5 * dy,
+            0.5 * length + max(r0, r1),
+        )
 
 
 @inlined
 def cone_distance(x, y, cone):
     """Return how far a point is outside a cone, below 0 within, the share of the bone it is at, and its normal."""
-    x0, y0, r0, dx, dy, dr, length, side = cone[0], cone[1], cone[2], cone[3], cone[4], cone[5], cone[6], cone[7]
+    x0 = cone[0]
+    y0 = cone[1]
+    r0 = cone[2]
+    dx = cone[3]
+    dy = cone[4]
+    dr = cone[5]
+    length = cone[6]
+    side = cone[7]
     if side == 0.0:
         share = 0.0 if dr >= 0.0 else 1.0
     else:
         along = ((x - x0) * dx + (y - y0) * dy) / length
         across = abs((y - y0) * dx - (x - x0) * dy) / length
         share = min(max((along - across * dr / side) / length, 0.0), 1.0)
-    ox, oy = x - (x0 + share * dx), y - (y0 + share * dy)
+    ox = x - (x0 + share * dx)
+    oy = y - (y0 + share * dy)
     off = math.sqrt(ox * ox + oy * oy)
     return off - (r0 - share * dr), share, ox / max(off, TINY), oy / max(off, TINY)
 
@@ -97,7 +122,14 @@ def cone_distance(x, y, cone):
 def _add(block, gradient, share, across, down, radius_change, off, weight):
     """Add the square of one distance, which moves by (across, down) with its axis and by `radius_change`."""
     rest = 1.0 - share
-    values = (across * rest, down * rest, across * share, down * share, radius_change * rest, radius_change * share)
+    values = (
+        across * rest,
+        down * rest,
+        across * share,
+        down * share,
+        radius_change * rest,
+        radius_change * share,
+    )
     for i in range(6):
         gradient[i] += weight * off * values[i]
         for j in range(6):
@@ -107,7 +139,8 @@ def _add(block, gradient, share, across, down, radius_change, off, weight):
 @jit
 def _nearest_bone(x, y, first, cones, discs):
     """Return the bone whose border is nearest to a point; begin with `first`."""
-    least, bone = np.inf, first
+    least = np.inf
+    bone = first
     for k in range(-1, discs.shape[0]):
         b = first if k < 0 else k
         reach = least + discs[b, 2]
@@ -115,7 +148,8 @@ def _nearest_bone(x, y, first, cones, discs):
             continue
         off = cone_distance(x, y, cones[b])[0]
         if off < least:
-            least, bone = off, b
+            least = off
+            bone = b
     return bone
 
 
@@ -135,7 +169,9 @@ def _write_neighbours(bone, discs, neighbours):
 @jit
 def _covered(x, y, neighbours, cones, discs):
     for b in neighbours:
-        near = (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[b, 2]
+        near = (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[
+            b, 2
+        ]
         if near and cone_distance(x, y, cones[b])[0] < -COVERED:
             return True
     return False
@@ -148,15 +184,26 @@ def add_pulls(parents, centres, radii, contour, scale, blocks, gradients):
     Those of a bone go to its half of a second derivative, 6 x 6, and half of a gradient: by the column and row of its
     two joints, and by both radii.
     """
-    cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
+    cones = np.empty((parents.size, 8))
+    discs = np.empty((parents.size, 3))
     write_cones(parents, centres, radii, cones, discs)
     _add_mask_border(contour, scale, cones, discs, blocks, gradients)
     neighbours = np.empty(parents.size, np.int64)
     for b in range(parents.size):
-        if cones[b, 6] > abs(cones[b, 5]) + TINY:  # else one of its discs covers the other
+        # else one of its discs covers the other
+        if cones[b, 6] > abs(cones[b, 5]) + TINY:
             others = neighbours[: _write_neighbours(b, discs, neighbours)]
-            start, end = centres[parents[b]], centres[b + 1]
-            _add_bone_border(start, end, radii[b], contour, scale, (others, cones, discs), (blocks[b], gradients[b]))
+            start = centres[parents[b]]
+            end = centres[b + 1]
+            _add_bone_border(
+                start,
+                end,
+                radii[b],
+                contour,
+                scale,
+                (others, cones, discs),
+                (blocks[b], gradients[b]),
+            )
 
 
 @inlined
@@ -164,7 +211,8 @@ def _add_mask_border(contour, scale, cones, discs, blocks, gradients):
     """Add the squares of the distances of the mask's border from the nearest bones."""
     bone = 0
     for i in range(contour.points.shape[0]):
-        x, y = contour.points[i, 0], contour.points[i, 1]
+        x = contour.points[i, 0]
+        y = contour.points[i, 1]
         bone = _nearest_bone(x, y, bone, cones, discs)
         off, share, nx, ny = cone_distance(x, y, cones[bone])
         weight = contour.step / (1.0 + (off / scale) ** 2)
@@ -176,47 +224,76 @@ def _add_bone_border(start, end, ends, contour, scale, others, square):
     """Add the squares of the distances of a bone's visible border, both sides and both ends, from the mask's."""
     neighbours, cones, discs = others
     block, gradient = square
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    r0, r1 = ends[0], ends[1]
+    dx = end[0] - start[0]
+    dy = end[1] - start[1]
+    r0 = ends[0]
+    r1 = ends[1]
     length = math.sqrt(dx * dx + dy * dy)
-    dx, dy = dx / length, dy / length
+    dx = dx / length
+    dy = dy / length
     cosine = (r0 - r1) / length
     sine = math.sqrt(1.0 - cosine * cosine)
     tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
     sides = max(int(length / (2.0 * contour.step)) + 1, 2)
     for k in range(2 * (sides + 1 + 2 * CAP)):
-        i, side = k // 2, 1.0 - 2.0 * (k % 2)
+        i = k // 2
+        side = 1.0 - 2.0 * (k % 2)
         if i <= sides:
-            share, along, aside = i / sides, cosine, sine
+            share = i / sides
+            along = cosine
+            aside = sine
             stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
         elif side > 0.0:
             share = 1.0 if i <= sides + CAP else 0.0
             if share > 0.0:
-                angle, stands = tilt * (i - sides - 0.5) / CAP, r1 * tilt / CAP
+                angle = tilt * (i - sides - 0.5) / CAP
+                stands = r1 * tilt / CAP
             else:
                 rest = math.pi - tilt
-                angle, stands = tilt + rest * (i - sides - CAP - 0.5) / CAP, r0 * rest / CAP
-            along, aside = math.cos(angle), math.sin(angle)
-        nx, ny = along * dx - side * aside * dy, along * dy + side * aside * dx
+                angle = tilt + rest * (i - sides - CAP - 0.5) / CAP
+                stands = r0 * rest / CAP
+            along = math.cos(angle)
+            aside = math.sin(angle)
+        nx = along * dx - side * aside * dy
+        ny = along * dy + side * aside * dx
         radius = r0 + share * (r1 - r0)
         x = start[0] + share * length * dx + radius * nx
         y = start[1] + share * length * dy + radius * ny
         known, off, across, down = _mask_distance(x, y, contour)
         if known and not _covered(x, y, neighbours, cones, discs):
             weight = stands / (1.0 + (off / scale) ** 2)
-            _add(block, gradient, share, across, down, across * nx + down * ny, off, weight)
+            _add(
+                block,
+                gradient,
+                share,
+                across,
+                down,
+                across * nx + down * ny,
+                off,
+                weight,
+            )
 
 
 @inlined
 def _mask_distance(x, y, contour):
     """Return whether a point lies in the field, how far it is from the mask's border there, and the slope of that."""
-    known, off, across, down = False, 0.0, 0.0, 0.0
-    column, row = x - contour.corner[0] - 0.5, y - contour.corner[1] - 0.5
-    left, top = math.floor(column), math.floor(row)
+    known = False
+    off = 0.0
+    across = 0.0
+    down = 0.0
+    column = x - contour.corner[0] - 0.5
+    row = y - contour.corner[1] - 0.5
+    left = math.floor(column)
+    top = math.floor(row)
     if 0 <= left < contour.size[1] - 1 and 0 <= top < contour.size[0] - 1:
-        u, v = column - left, row - top
-        upper, lower = contour.field[top], contour.field[top + 1]
-        f00, f01, f10, f11 = upper[left], upper[left + 1], lower[left], lower[left + 1]
+        u = column - left
+        v = row - top
+        upper = contour.field[top]
+        lower = contour.field[top + 1]
+        f00 = upper[left]
+        f01 = upper[left + 1]
+        f10 = lower[left]
+        f11 = lower[left + 1]
         off = (f00 * (1.0 - u) + f01 * u) * (1.0 - v) + (f10 * (1.0 - u) + f11 * u) * v
         across = (f01 - f00) * (1.0 - v) + (f11 - f10) * v
         down = (f10 - f00) * (1.0 - u) + (f11 - f01) * u
@@ -233,14 +310,38 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     rotation, translation, focal, centre = camera
     hessians, forces = sums
     bones = parents.size
-    centres, depth, wide = np.empty((bones + 1, 2)), np.empty(bones + 1), np.empty((bones, 2))
-    moves = np.empty((bones + 1, 3, 3))  # of each joint: how its pixel and its size change with its place
+    centres = np.empty((bones + 1, 2))
+    depth = np.empty(bones + 1)
+    wide = np.empty((bones, 2))
+    # of each joint: how its pixel and its size change with its place
+    moves = np.empty((bones + 1, 3, 3))
     for j in range(bones + 1):
-        x, y, z = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
-        a = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
-        b = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
-        c = max(rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2], NEAR)
-        centres[j, 0], centres[j, 1] = a / c * focal[0] + centre[0], b / c * focal[1] + centre[1]
+        x = frames[j, 3, 0]
+        y = frames[j, 3, 1]
+        z = frames[j, 3, 2]
+        a = (
+            rotation[0, 0] * x
+            + rotation[0, 1] * y
+            + rotation[0, 2] * z
+            + translation[0]
+        )
+        b = (
+            rotation[1, 0] * x
+            + rotation[1, 1] * y
+            + rotation[1, 2] * z
+            + translation[1]
+        )
+        c = max(
+            rotation[2, 0] * x
+            + rotation[2, 1] * y
+            + rotation[2, 2] * z
+            + translation[2],
+            NEAR,
+        )
+        centres[j, 0], centres[j, 1] = (
+            a / c * focal[0] + centre[0],
+            b / c * focal[1] + centre[1],
+        )
         depth[j] = math.sqrt(focal[0] * focal[1]) / c
         for i in range(3):
             moves[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
@@ -248,23 +349,45 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
             moves[j, 2, i] = -depth[j] / c * rotation[2, i]
     metres = depth[0]  # pixels of one, where the root is
     for b in range(bones):
-        wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
-    blocks, gradients = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
-    add_pulls(parents, centres, wide, contour, max(reach * metres, MIN_ROBUST_SCALE), blocks, gradients)
+        wide[b, 0], wide[b, 1] = (
+            depth[parents[b]] * radii[b, 0],
+            depth[b + 1] * radii[b, 1],
+        )
+    blocks = np.zeros((bones, 6, 6))
+    gradients = np.zeros((bones, 6))
+    add_pulls(
+        parents,
+        centres,
+        wide,
+        contour,
+        max(reach * metres, MIN_ROBUST_SCALE),
+        blocks,
+        gradients,
+    )
     deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
     worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
-    rows, turned = np.empty((6, 6)), np.empty((6, 6))
+    rows = np.empty((6, 6))
+    turned = np.empty((6, 6))
     for b in range(bones):
         p = parents[b]
-        for k in range(6):  # how each of the six numbers changes with a twist: velocity, then rotation
+        # how each of the six numbers changes with a twist: velocity, then rotation
+        for k in range(6):
             j = p if k in (0, 1, 4) else b + 1
             size = radii[b, 0] if k == 4 else radii[b, 1]
             which = k % 2 if k < 4 else 2
             factor = 1.0 if k < 4 else size
-            mx, my, mz = factor * moves[j, which, 0], factor * moves[j, which, 1], factor * moves[j, which, 2]
-            x, y, z = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
+            mx = factor * moves[j, which, 0]
+            my = factor * moves[j, which, 1]
+            mz = factor * moves[j, which, 2]
+            x = frames[j, 3, 0]
+            y = frames[j, 3, 1]
+            z = frames[j, 3, 2]
             rows[k, 0], rows[k, 1], rows[k, 2] = mx, my, mz
-            rows[k, 3], rows[k, 4], rows[k, 5] = y * mz - z * my, z * mx - x * mz, x * my - y * mx
+            rows[k, 3], rows[k, 4], rows[k, 5] = (
+                y * mz - z * my,
+                z * mx - x * mz,
+                x * my - y * mx,
+            )
         for i in range(6):
             for j in range(6):
                 total = 0.0
@@ -282,7 +405,16 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
                     total += rows[k, i] * turned[k, j]
                 hessians[b + 1, i, j] += worth * total
         if len(grown.joints):
-            _add_growth(b, p, rows, depth, (blocks[b], gradients[b]), worth, grown, forces[b + 1])
+            _add_growth(
+                b,
+                p,
+                rows,
+                depth,
+                (blocks[b], gradients[b]),
+                worth,
+                grown,
+                forces[b + 1],
+            )
 
 
 @jit
@@ -290,7 +422,8 @@ def _add_growth(b, p, rows, depth, square, worth, grown, forces):
     """Add what bone b, from joint p, has to do with factors of the build, see `add_view`."""
     block, gradient = square
     factors = len(grown.joints)
-    changes, changed = np.zeros((6, 1 + factors)), np.zeros((6, 1 + factors))
+    changes = np.zeros((6, 1 + factors))
+    changed = np.zeros((6, 1 + factors))
     for k in range(6):
         j = p if k in (0, 1, 4) else b + 1
         for f in range(factors):
@@ -319,7 +452,11 @@ def write_screws(chain, frames, sines, cosines, screws):
     axes = np.empty((3, 3))
     axes[0, 0], axes[0, 1], axes[0, 2] = 0.0, 1.0, 0.0
     axes[1, 0], axes[1, 1], axes[1, 2] = cosines[0], 0.0, -sines[0]
-    axes[2, 0], axes[2, 1], axes[2, 2] = frames[0, 2, 0], frames[0, 2, 1], frames[0, 2, 2]
+    axes[2, 0], axes[2, 1], axes[2, 2] = (
+        frames[0, 2, 0],
+        frames[0, 2, 1],
+        frames[0, 2, 2],
+    )
     for k in range(3):
         screws[k, k] = 1.0
         _screw(screws[3 + k], axes[k], root)
@@ -327,9 +464,12 @@ def write_screws(chain, frames, sines, cosines, screws):
         a = chain.angles[b]
         if a < 0:
             continue
-        pivot, frame = frames[chain.parents[b], 3], frames[b + 1]
+        pivot = frames[chain.parents[b], 3]
+        frame = frames[b + 1]
         for i in range(3):
-            u, v, w = frame[0, i], frame[1, i], frame[2, i]
+            u = frame[0, i]
+            v = frame[1, i]
+            w = frame[2, i]
             axes[0, i] = u
             axes[1, i] = v * cosines[a] - w * sines[a]
             before = w * cosines[a] + v * sines[a]
@@ -405,7 +545,13 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
         k = min(i, len(starts) - 2)
         if starts[k] < starts[k + 1]:
             points = contours.points[starts[k] : starts[k + 1]]
-            contour = Contour(contours.fields[k], contours.corners[k], contours.sizes[k], points, contours.step)
+            contour = Contour(
+                contours.fields[k],
+                contours.corners[k],
+                contours.sizes[k],
+                points,
+                contours.step,
+            )
             grows = Growth(grown.joints[i], grown.radii, grown.squares)
             bones = BoneSquares(sums.hessians[i], sums.forces[i])
             add_view(parents, radii, camera, frames[i], contour, reach, grows, bones)
@@ -421,8 +567,10 @@ def add_all_bones(chain, placed, bones, free, out):
     frames, sines, cosines = placed
     hessians, forces = bones
     matrices, gradients = out
-    all_screws, screws = np.empty((NUMBERS, 6)), np.zeros((NUMBERS, 6))
-    matrix, gradient = np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, gradients.shape[2]))
+    all_screws = np.empty((NUMBERS, 6))
+    screws = np.zeros((NUMBERS, 6))
+    matrix = np.empty((NUMBERS, NUMBERS))
+    gradient = np.empty((NUMBERS, gradients.shape[2]))
     for k in range(len(frames)):
         write_screws(chain, frames[k], sines[k], cosines[k], all_screws)
         for a in free:

@@ -14,9 +14,15 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.silhouette.mask import Mask, coarser_camera, padded_box, without_small_pieces
+from posefit.silhouette.mask import (
+    Mask,
+    coarser_camera,
+    padded_box,
+    without_small_pieces,
+)
 
-FINE_PIXELS = 80.0  # pixels of a metre; of finer masks only every second pixel, third, ... is used
+# pixels of a metre; of finer masks only every second pixel, third, ... is used
+FINE_PIXELS = 80.0
 FIELD_MARGIN = 48  # pixels around a mask whose distance from it is known
 
 Distances = NDArray[np.float32]
@@ -30,15 +36,24 @@ class MaskContours:
     camera: Camera  # whose pixels these are: of fine masks a coarser one than theirs
     metres: Array  # (T,) pixels of a metre where the person is
     step: float  # pixels of the border that a point stands for
-    fields: Distances = field(repr=False)  # (T, h, w) pixels outside the mask, below 0 within; 0 where it is unknown
-    corners: Integers = field(repr=False)  # (T, 2) column and row of each field's first pixel
+    # (T, h, w) pixels outside the mask, below 0 within; 0 where it is unknown
+    fields: Distances = field(repr=False)
+    # (T, 2) column and row of each field's first pixel
+    corners: Integers = field(repr=False)
     sizes: Integers = field(repr=False)  # (T, 2) rows and columns of each field
-    points: Array = field(repr=False)  # (n, 2) pixels: of the borders, frame after frame
-    starts: Integers = field(repr=False)  # (T + 1,) where the points of each frame begin
+    # (n, 2) pixels: of the borders, frame after frame
+    points: Array = field(repr=False)
+    # (T + 1,) where the points of each frame begin
+    starts: Integers = field(repr=False)
 
     @classmethod
     def of(
-        cls, camera: Camera, view: int, observations: Sequence[Observation], places: Array, spacing: float = 0.0
+        cls,
+        camera: Camera,
+        view: int,
+        observations: Sequence[Observation],
+        places: Array,
+        spacing: float = 0.0,
     ) -> Self:
         """Return the borders of a person whose root is about at `places` (T, 3), from a camera, number `view`.
 
@@ -48,50 +63,101 @@ class MaskContours:
         metres = np.sqrt(camera.focal.prod()) / far
         factor = max(int(np.median(metres) / FINE_PIXELS), 1)
         factor = min(factor, camera.width, camera.height)
-        camera, metres = coarser_camera(camera, factor), metres / factor
+        camera = coarser_camera(camera, factor)
+        metres = metres / factor
         step = max(round(float(np.median(metres)) * spacing), 1)
-        traced = [_border(observation, view, factor, step) for observation in observations]
+        traced = [
+            _border(observation, view, factor, step) for observation in observations
+        ]
         points, corners, distances = zip(*traced, strict=True)
         sizes = np.array([part.shape for part in distances])
         fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
         for whole, part in zip(fields, distances, strict=True):
             whole[: part.shape[0], : part.shape[1]] = part
         starts = np.cumsum([0, *map(len, points)])
-        return cls(camera, metres, float(step), fields, np.array(corners), sizes, np.concatenate(points), starts)
+        return cls(
+            camera,
+            metres,
+            float(step),
+            fields,
+            np.array(corners),
+            sizes,
+            np.concatenate(points),
+            starts,
+        )
 
     def seen_by(self, camera: Camera) -> Self:
         """Return the same borders as a camera sees them that stands and looks elsewhere."""
-        return replace(self, camera=replace(self.camera, rotation=camera.rotation, translation=camera.translation))
+        return replace(
+            self,
+            camera=replace(
+                self.camera, rotation=camera.rotation, translation=camera.translation
+            ),
+        )
 
-    def add(self, body: Body, frames: Array, scale: float, grown: kernels.Growth, sums: kernels.BoneSquares) -> None:
+    def add(
+        self,
+        body: Body,
+        frames: Array,
+        scale: float,
+        grown: kernels.Growth,
+        sums: kernels.BoneSquares,
+    ) -> None:
         """Add the squares of the distances between these borders and those of bodies, see `kernels.add_frames`."""
-        camera = tuple(writeable(getattr(self.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
-        contours = kernels.Contours(self.fields, self.corners, self.sizes, self.points, self.starts, self.step)
-        kernels.add_frames(body.skeleton.chain.parents, body.radii, camera, frames, contours, scale, grown, sums)
+        camera = tuple(
+            writeable(getattr(self.camera, name))
+            for name in ("rotation", "translation", "focal", "centre")
+        )
+        contours = kernels.Contours(
+            self.fields, self.corners, self.sizes, self.points, self.starts, self.step
+        )
+        kernels.add_frames(
+            body.skeleton.chain.parents,
+            body.radii,
+            camera,
+            frames,
+            contours,
+            scale,
+            grown,
+            sums,
+        )
 
 
-def _border(observation: Observation, view: int, factor: int, step: int) -> tuple[Array, tuple[int, int], Distances]:
+def _border(
+    observation: Observation, view: int, factor: int, step: int
+) -> tuple[Array, tuple[int, int], Distances]:
     """Return every `step`th point of a mask's border (n, 2), and the corner and the distances about it."""
     nothing = np.empty((0, 2)), (0, 0), np.zeros((1, 1), dtype=np.float32)
     if not observation.usable:
         return nothing
-    silhouette, first = observation.silhouettes[view], factor // 2
+    silhouette = observation.silhouettes[view]
+    first = factor // 2
     pictures = silhouette.mask, silhouette.valid
-    mask, valid = (np.ascontiguousarray(picture[first::factor, first::factor]) for picture in pictures)
+    mask, valid = (
+        np.ascontiguousarray(picture[first::factor, first::factor])
+        for picture in pictures
+    )
     mask = without_small_pieces(mask)
     box = rows, columns = padded_box(mask, FIELD_MARGIN)
     mask, around = mask[box], valid[box] & ~mask[box]  # the background there is known
     if not mask.any() or not around.any():
         return nothing
-    pixels = np.concatenate([_between(mask, around), _between(mask.T, around.T)[:, ::-1]])
+    pixels = np.concatenate(
+        [_between(mask, around), _between(mask.T, around.T)[:, ::-1]]
+    )
     corner = columns.start, rows.start
     return pixels[::step] + np.array(corner), corner, distances_outside(mask, around)
 
 
 def distances_outside(mask: Mask, around: Mask) -> Distances:
     """Return how far pixels (h, w) are outside a mask's border, below 0 within, and 0 where neither is true."""
-    out, within = (cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) - 0.5 for part in (mask, around))
-    return np.asarray(np.where(mask, -within, np.where(around, out, 0.0)), dtype=np.float32)
+    out, within = (
+        cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) - 0.5
+        for part in (mask, around)
+    )
+    return np.asarray(
+        np.where(mask, -within, np.where(around, out, 0.0)), dtype=np.float32
+    )
 
 
 def _between(mask: Mask, around: Mask) -> Array:
@@ -127,8 +193,11 @@ def contour_squares(
     Views have T frames, or one that all poses belong to. Distances beyond `scale` metres count less. `grown` says of
     each view how joints (T, F, 27, 3) and radii (F, 26, 2) change with the factors; without it there are none.
     """
-    skeleton, count = body.skeleton, len(poses)
-    grown = grown or [(np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))] * len(views)
+    skeleton = body.skeleton
+    count = len(poses)
+    grown = grown or [
+        (np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))
+    ] * len(views)
     factors = len(grown[0][1])
     placed = skeleton.frames(poses, places)
     squares = np.zeros((1 + factors, 1 + factors))
@@ -137,16 +206,22 @@ def contour_squares(
     for view, (wider, larger) in zip(views, grown, strict=True):
         view.add(body, placed[0], scale, kernels.Growth(wider, larger, squares), sums)
     free = np.flatnonzero(np.append([True] * 3, skeleton.free))
-    hessians, gradients = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))
+    hessians, gradients = (
+        np.empty((count, len(free), size)) for size in (len(free), 1 + factors)
+    )
     kernels.add_all_bones(skeleton.chain, placed, sums, free, (hessians, gradients))
-    return ContourSquares(hessians, gradients[..., 0], gradients[..., 1:], squares[1:, 1:], squares[1:, 0])
+    return ContourSquares(
+        hessians, gradients[..., 0], gradients[..., 1:], squares[1:, 1:], squares[1:, 0]
+    )
 
 
 # metres, step by step: what is farther off counts less, as it may be another person's, or a bag's
 ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
 MAX_ANGLE_STEP = np.radians(20.0)  # of a step
-POINT_SPACING = 0.04  # metres, about, between two points of a mask's border, where one frame is fitted
-STEP_EVALUATIONS = 27.0  # that a step of one frame counts as; docs/studies/follow.py measures how many it takes
+# metres, about, between two points of a mask's border, where one frame is fitted
+POINT_SPACING = 0.04
+# that a step of one frame counts as; docs/studies/follow.py measures how many it takes
+STEP_EVALUATIONS = 27.0
 
 
 def fitted(
@@ -163,12 +238,16 @@ def fitted(
     Contours farther off than a scale, metres, count less.
     """
     angles = np.flatnonzero(body.skeleton.free)
-    poses, places, weights = start[0].copy(), start[1].copy(), precisions[np.append([0, 1, 2], 3 + angles)]
+    poses = start[0].copy()
+    places = start[1].copy()
+    weights = precisions[np.append([0, 1, 2], 3 + angles)]
     for scale in scales:
         hessians, gradients, *_ = contour_squares(body, views, poses, places, scale)
         off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
         np.einsum("nii->ni", hessians)[:] += weights  # on the diagonals
-        steps = np.linalg.solve(hessians, (gradients + weights * off)[..., None])[..., 0]
+        steps = np.linalg.solve(hessians, (gradients + weights * off)[..., None])[
+            ..., 0
+        ]
         places -= steps[:, :3]
         poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
     return poses, places
@@ -180,7 +259,11 @@ def precisions(turn: float, shift: float) -> Array:
 
 
 def contour_fit(
-    task: Task, observation: Observation, start: tuple[Array, Array], deviations: tuple[float, float], evaluations: int
+    task: Task,
+    observation: Observation,
+    start: tuple[Array, Array],
+    deviations: tuple[float, float],
+    evaluations: int,
 ) -> tuple[Array, Array, int]:
     """Return a pose (66,) and a place (3,) moved until the body's contours are those of the masks, and what it costs.
 
@@ -190,6 +273,11 @@ def contour_fit(
     pose, place = (np.array(part, dtype=np.float64)[None] for part in start)
     scales = ROBUST_SCALES[: max(int(evaluations // STEP_EVALUATIONS), 0)]
     cameras = enumerate(task.cameras)
-    views = [MaskContours.of(camera, view, [observation], place, POINT_SPACING) for view, camera in cameras]
-    poses, places = fitted(task.body, views, (pose, place), pose, precisions(*deviations), scales)
+    views = [
+        MaskContours.of(camera, view, [observation], place, POINT_SPACING)
+        for view, camera in cameras
+    ]
+    poses, places = fitted(
+        task.body, views, (pose, place), pose, precisions(*deviations), scales
+    )
     return poses[0], places[0], int(len(scales) * STEP_EVALUATIONS)

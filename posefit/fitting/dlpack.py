@@ -38,4 +38,6 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
     kind = array.dtype if array.dtype.kind == "f" else np.dtype(np.float64)
     # CuPy has no argument for the device: it uses the current one
     place = {} if here or library.__name__ == "cupy" else {"device": values.device}
-    return array, lambda results: library.asarray(results.astype(kind, copy=False), **place)
+    return array, lambda results: library.asarray(
+        results.astype(kind, copy=False), **place
+    )

@@ -19,8 +19,10 @@ from posefit.reading import quoted
 from posefit.silhouette.cost import pose_costs
 from posefit.silhouette.drawn import PoseCount, uncounted
 
-UNCOUNTED_POSES = 10  # ours: a frame may draw so many beyond its evaluations, as to draw its result once more
-COST_TOLERANCE = 1e-6  # ours: costs are rounded where they are added up in another order
+# ours: a frame may draw so many beyond its evaluations, as to draw its result once more
+UNCOUNTED_POSES = 10
+# ours: costs are rounded where they are added up in another order
+COST_TOLERANCE = 1e-6
 
 
 @dataclass(eq=False)
@@ -32,12 +34,16 @@ class Audit:
 
     name: str
     beta: float
-    _findings: dict[str, tuple[str, int]] = field(default_factory=dict)  # by kind: the first of them, and how many
+    # by kind: the first of them, and how many
+    _findings: dict[str, tuple[str, int]] = field(default_factory=dict)
 
     @property
     def warnings(self) -> list[str]:
         """One line for each kind: the first of it, and how many frames it concerns."""
-        return [f"{first} ({count} such frame{'s' if count > 1 else ''})" for first, count in self._findings.values()]
+        return [
+            f"{first} ({count} such frame{'s' if count > 1 else ''})"
+            for first, count in self._findings.values()
+        ]
 
     def clear(self) -> None:
         """Forget all findings."""
@@ -45,7 +51,9 @@ class Audit:
 
     def note(self, kind: str, number: int, what: str) -> None:
         """Add a finding about a frame; only the first of a kind is kept in full."""
-        first, count = self._findings.get(kind, (f"{self.name}: frame {number} must {what}", 0))
+        first, count = self._findings.get(
+            kind, (f"{self.name}: frame {number} must {what}", 0)
+        )
         self._findings[kind] = first, count + 1
 
     def broken(self, rule: str) -> BrokenRuleError:
@@ -54,31 +62,44 @@ class Audit:
 
 
 def drive(
-    tracker: Tracker, task: Task, observations: Iterable[Observation], rng: np.random.Generator, audit: Audit
+    tracker: Tracker,
+    task: Task,
+    observations: Iterable[Observation],
+    rng: np.random.Generator,
+    audit: Audit,
 ) -> Iterator[Frame]:
     """Yield the tracker's frame for each observation, with the time that it took.
 
     Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
     pose. An honest frame stays as it is. Raises BrokenRuleError where a frame is missing or wrong.
     """
-    reader, drawn = _Reader(observations), PoseCount()
+    reader = _Reader(observations)
+    drawn = PoseCount()
     frames: Iterator[Frame] | None = None
     yielded = evaluations = 0
     while True:
         start = clocks() - reader.clocks
         try:
-            with drawn.counting(), plugin_errors(audit.name, "it", passed=(InputError, ImportError, GeneratorExit)):
+            with (
+                drawn.counting(),
+                plugin_errors(
+                    audit.name, "it", passed=(InputError, ImportError, GeneratorExit)
+                ),
+            ):
                 frames = iter(tracker.track(reader, rng)) if frames is None else frames
                 frame = next(frames, None)
         except BrokenRuleError as broken:
             if reader.error is not None and broken.__cause__ is reader.error:
-                raise reader.error from None  # what could not be read is not the tracker's fault
+                # what could not be read is not the tracker's fault
+                raise reader.error from None
             raise
         if frame is None:
             break
         seconds, cpu_seconds = (clocks() - reader.clocks - start).tolist()
         if not reader.waiting:
-            raise audit.broken(f"track must yield a frame for each observation, got {yielded + 1} for {yielded}")
+            raise audit.broken(
+                f"track must yield a frame for each observation, got {yielded + 1} for {yielded}"
+            )
         observation = reader.waiting.popleft()
         _check(frame, audit)
         # it may have drawn poses for observations that it looks at ahead
@@ -86,15 +107,26 @@ def drive(
         counted = math.ceil(drawn.poses / len(task.cameras)) - evaluations - ahead
         leeway = UNCOUNTED_POSES * (yielded + 1 + len(reader.waiting))
         if counted > frame.evaluations + leeway:
-            audit.note("evaluations", yielded, f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
+            audit.note(
+                "evaluations",
+                yielded,
+                f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}",
+            )
             frame = with_evaluations(frame, counted)
         if frame.evaluations > task.evaluations:
-            audit.note("budget", yielded, f"use at most {task.evaluations:,} evaluations, got {frame.evaluations:,}")
+            audit.note(
+                "budget",
+                yielded,
+                f"use at most {task.evaluations:,} evaluations, got {frame.evaluations:,}",
+            )
         frame = _with_true_cost(frame, yielded, task, observation, audit)
-        yielded, evaluations = yielded + 1, evaluations + frame.evaluations
+        yielded = yielded + 1
+        evaluations = evaluations + frame.evaluations
         yield replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
     if reader.waiting or next(reader, None) is not None:
-        raise audit.broken(f"track must yield a frame for each observation, got {yielded} and then no more")
+        raise audit.broken(
+            f"track must yield a frame for each observation, got {yielded} and then no more"
+        )
 
 
 class _Reader:
@@ -132,27 +164,52 @@ def clocks() -> Array:
 
 def _check(frame: Frame, audit: Audit) -> None:
     if np.shape(frame.pose) != (66,) or not np.isfinite(frame.pose).all():
-        raise audit.broken(f"a pose must be 66 finite angles, got shape {np.shape(frame.pose)}")
+        raise audit.broken(
+            f"a pose must be 66 finite angles, got shape {np.shape(frame.pose)}"
+        )
     if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
-        raise audit.broken(f"a translation must be 3 finite metres, got {frame.translation}")
+        raise audit.broken(
+            f"a translation must be 3 finite metres, got {frame.translation}"
+        )
     if not isinstance(frame.evaluations, int | np.integer) or frame.evaluations < 0:
-        raise audit.broken(f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}")
+        raise audit.broken(
+            f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}"
+        )
     if np.ndim(frame.trace) != 2 or np.shape(frame.trace)[1] != 2:
-        raise audit.broken(f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}")
+        raise audit.broken(
+            f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}"
+        )
 
 
-def _with_true_cost(frame: Frame, number: int, task: Task, observation: Observation, audit: Audit) -> Frame:
+def _with_true_cost(
+    frame: Frame, number: int, task: Task, observation: Observation, audit: Audit
+) -> Frame:
     """Return the frame with the areas and the cost of its pose, and note where it reports others."""
-    pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
-    observed = [replace(silhouette) for silhouette in observation.silhouettes]  # without bits that it may change
-    costs, counts = pose_costs(task.body, task.cameras, observed, pose, place, audit.beta)
+    pose = np.asarray(frame.pose, np.float64)[None]
+    place = np.asarray(frame.translation, np.float64)[None]
+    # without bits that it may change
+    observed = [replace(silhouette) for silhouette in observation.silhouettes]
+    costs, counts = pose_costs(
+        task.body, task.cameras, observed, pose, place, audit.beta
+    )
     true = counts[:, 0]
     if not np.array_equal(true, frame.areas):
-        audit.note("areas", number, f"have its pose's areas, {true.tolist()}, got {_short(frame.areas)}")
+        audit.note(
+            "areas",
+            number,
+            f"have its pose's areas, {true.tolist()}, got {_short(frame.areas)}",
+        )
         frame = replace(frame, areas=true)
     cost = float(costs[0])
-    if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= COST_TOLERANCE):
-        audit.note("cost", number, f"have its pose's cost, {cost:.6g}, got {_short(frame.cost)}")
+    if not (
+        isinstance(frame.cost, float | int | np.number)
+        and abs(frame.cost - cost) <= COST_TOLERANCE
+    ):
+        audit.note(
+            "cost",
+            number,
+            f"have its pose's cost, {cost:.6g}, got {_short(frame.cost)}",
+        )
         frame = replace(frame, cost=cost, trace=np.array([[frame.evaluations, cost]]))
     return frame
 
@@ -165,5 +222,7 @@ def with_evaluations(frame: Frame, evaluations: int) -> Frame:
 
 
 def _short(value: object) -> str:
-    text = f"{value:.6g}" if isinstance(value, float) else str(np.asarray(value).tolist())
+    text = (
+        f"{value:.6g}" if isinstance(value, float) else str(np.asarray(value).tolist())
+    )
     return text if len(text) <= 80 else text[:77] + "..."

@@ -6,19 +6,24 @@ from posefit.arrays import jit
 
 ROUNDS = 3  # which joint is outermost depends a little on where the body stands
 DAMPING = 1e-9  # keeps the 3 x 3 system solvable where a silhouette has too few borders
-NEAREST = 1e-3  # metres; a joint that is nearer, or behind the camera, counts as that far
+# metres; a joint that is nearer, or behind the camera, counts as that far
+NEAREST = 1e-3
 
 
 @jit
-def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders, translations):
+def move_to_borders(
+    joints, radii, rotations, offsets, focals, centres, borders, translations
+):
     """Move translations (n, 3) to where joints (n, 27, 3) fill the borders (views, 4): left, top, right, bottom.
 
     Each known border is one linear equation, r . t = gap. The least squares over all of them solve A t = b, where A,
     here xx to zz, is the sum of r r' and b that of gap r; the damping pulls t towards where it was.
     """
-    views, count = borders.shape[0], joints.shape[1]
+    views = borders.shape[0]
+    count = joints.shape[1]
     relative = np.empty((views, count, 3))  # joints in the camera's axes, from the root
-    reach, outermost = np.empty(4), np.empty(4, np.int64)
+    reach = np.empty(4)
+    outermost = np.empty(4, np.int64)
     for i in range(joints.shape[0]):
         for v in range(views):
             for j in range(count):
@@ -32,9 +37,12 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
         for _ in range(ROUNDS):
             xx = yy = zz = DAMPING
             xy = xz = yz = 0.0
-            bx, by, bz = DAMPING * t[0], DAMPING * t[1], DAMPING * t[2]
+            bx = DAMPING * t[0]
+            by = DAMPING * t[1]
+            bz = DAMPING * t[2]
             for v in range(views):
-                R, o = rotations[v], offsets[v]
+                R = rotations[v]
+                o = offsets[v]
                 scale = np.sqrt(focals[v, 0] * focals[v, 1])
                 x = R[0, 0] * t[0] + R[0, 1] * t[1] + R[0, 2] * t[2] + o[0]
                 y = R[1, 0] * t[0] + R[1, 1] * t[1] + R[1, 2] * t[2] + o[1]
@@ -46,20 +54,26 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
                     across = focals[v, 0] * (relative[v, j, 0] + x) * depth
                     down = focals[v, 1] * (relative[v, j, 1] + y) * depth
                     wide = scale * radii[j] * depth
-                    for side, value in enumerate((wide - across, wide - down, wide + across, wide + down)):
+                    for side, value in enumerate(
+                        (wide - across, wide - down, wide + across, wide + down)
+                    ):
                         if value > reach[side]:
                             reach[side], outermost[side] = value, j
                 for side in range(4):
                     if np.isnan(borders[v, side]):
                         continue
-                    axis, sign = side % 2, -1.0 if side < 2 else 1.0
-                    j, f = outermost[side], focals[v, axis]
+                    axis = side % 2
+                    sign = -1.0 if side < 2 else 1.0
+                    j = outermost[side]
+                    f = focals[v, axis]
                     b = borders[v, side] - centres[v, axis]
                     rx = (f * R[axis, 0] - b * R[2, 0]) / scale
                     ry = (f * R[axis, 1] - b * R[2, 1]) / scale
                     rz = (f * R[axis, 2] - b * R[2, 2]) / scale
                     gap = (
-                        b * (relative[v, j, 2] + o[2]) - f * (relative[v, j, axis] + o[axis]) - sign * scale * radii[j]
+                        b * (relative[v, j, 2] + o[2])
+                        - f * (relative[v, j, axis] + o[axis])
+                        - sign * scale * radii[j]
                     )
                     gap /= scale
                     xx += rx * rx
@@ -72,9 +86,13 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
                     by += gap * ry
                     bz += gap * rz
             # the inverse of a symmetric 3 x 3 matrix, by cofactors
-            cx, cy, cz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+            cx = yy * zz - yz * yz
+            cy = xz * yz - xy * zz
+            cz = xy * yz - xz * yy
             determinant = xx * cx + xy * cy + xz * cz
-            dy, dz, ez = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+            dy = xx * zz - xz * xz
+            dz = xy * xz - xx * yz
+            ez = xx * yy - xy * xy
             t[0] = (cx * bx + cy * by + cz * bz) / determinant
             t[1] = (cy * bx + dy * by + dz * bz) / determinant
             t[2] = (cz * bx + dz * by + ez * bz) / determinant
@@ -91,21 +109,31 @@ def add_components(latents, components, angles):
 
 
 @jit
-def unpack_proposals(proposals, centre, half, anchor, mean, poses, translations, latents):
+def unpack_proposals(
+    proposals, centre, half, anchor, mean, poses, translations, latents
+):
     """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite.
 
     Pitch and roll are added to the tilt that belongs to the latents, the last coordinates, by `mean` (3 + m, 2) of a
     `Tilt`. The translation is searched where there are coordinates for it, else it is the anchor.
     """
-    first, total = proposals.shape[1] - latents.shape[1], 0.0
+    first = proposals.shape[1] - latents.shape[1]
+    total = 0.0
     for i in range(proposals.shape[0]):
         for j in range(3):
             poses[i, j] = centre[j] + half[j] * proposals[i, j]
-            translations[i, j] = centre[3 + j] + half[3 + j] * proposals[i, 3 + j] if first > 3 else anchor[j]
+            translations[i, j] = (
+                centre[3 + j] + half[3 + j] * proposals[i, 3 + j]
+                if first > 3
+                else anchor[j]
+            )
             total += poses[i, j] + translations[i, j]
-        pitch, roll = mean[2, 0], mean[2, 1]
+        pitch = mean[2, 0]
+        roll = mean[2, 1]
         for j in range(latents.shape[1]):
-            latents[i, j] = centre[first + j] + half[first + j] * proposals[i, first + j]
+            latents[i, j] = (
+                centre[first + j] + half[first + j] * proposals[i, first + j]
+            )
             total += latents[i, j]
             pitch += mean[3 + j, 0] * latents[i, j]
             roll += mean[3 + j, 1] * latents[i, j]

@@ -11,31 +11,50 @@ from posefit.geometry.skeleton import JOINTS, MIRROR, Skeleton
 from posefit.silhouette.rasteriser import NEAR
 
 # joints whose left and right a detector exchanges together or not at all
-_TOGETHER = (("femur", "tibia", "toes"), ("humerus", "radius"), ("clavicle", "hipjoint"))
-LEGS, ARMS = 0, 1  # numbers of groups
-GROUPS = [np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones]) for bones in _TOGETHER]
+_TOGETHER = (
+    ("femur", "tibia", "toes"),
+    ("humerus", "radius"),
+    ("clavicle", "hipjoint"),
+)
+# numbers of groups
+LEGS = 0
+ARMS = 1
+GROUPS = [
+    np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones])
+    for bones in _TOGETHER
+]
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
-DEVIATION = 0.05  # metres between a joint and its landmark; much longer distances count little more
-EXCHANGED = np.array([0.3, 0.13, 0.35])  # share of the frames in which left and right of each group are exchanged
+# metres between a joint and its landmark; much longer distances count little more
+DEVIATION = 0.05
+# share of the frames in which left and right of each group are exchanged
+EXCHANGED = np.array([0.3, 0.13, 0.35])
 PERSISTENCE = 0.5  # correlation of exchanges a thirtieth of a second apart
 
 
 def landmark_likelihoods(
-    skeleton: Skeleton, cameras: Sequence[Camera], landmarks: Array, poses: Array, places: Array
+    skeleton: Skeleton,
+    cameras: Sequence[Camera],
+    landmarks: Array,
+    poses: Array,
+    places: Array,
 ) -> Array:
     """Return how likely poses (n, 66) at places (n, 3) make landmarks (V, 27, 3): logarithms (n, K, 2).
 
     K are the groups of each view; each is as it is, or has left and right exchanged. Landmarks are those of an
     `Observation`. A joint counts by its confidence; distances have a Cauchy distribution.
     """
-    joints, groups = skeleton.joints(poses, places), []
+    joints = skeleton.joints(poses, places)
+    groups = []
     for camera, view in zip(cameras, landmarks, strict=True):
         pixels, depths = camera.project(joints)
         metres = np.maximum(depths, NEAR) / np.sqrt(camera.focal.prod())  # of a pixel
         for group in GROUPS:
             both = []
             for same in (group, MIRRORED[group]):
-                off = np.linalg.norm(pixels[:, group] - view[same, :2], axis=-1) * metres[:, group]
+                off = (
+                    np.linalg.norm(pixels[:, group] - view[same, :2], axis=-1)
+                    * metres[:, group]
+                )
                 both.append(np.log1p(0.5 * (off / DEVIATION) ** 2) @ view[same, 2])
             groups.append(-np.stack(both, axis=-1))
     return np.stack(groups, axis=1)
@@ -51,10 +70,15 @@ def landmark_costs(likelihoods: Array, exchanged: Array | None = None) -> Array:
 
     `exchanged` (..., K) is how likely each group is exchanged; as often as any frame's, where nothing is known.
     """
-    direct, other = likelihoods[..., 0], likelihoods[..., 1]
+    direct = likelihoods[..., 0]
+    other = likelihoods[..., 1]
     if exchanged is None:
         exchanged = usually_exchanged(likelihoods)
-    return np.asarray(-np.logaddexp(np.log1p(-exchanged) + direct, np.log(exchanged) + other).sum(axis=-1))
+    return np.asarray(
+        -np.logaddexp(np.log1p(-exchanged) + direct, np.log(exchanged) + other).sum(
+            axis=-1
+        )
+    )
 
 
 def exchanged_next(exchanged: Array, seconds: float) -> Array:
@@ -65,7 +89,12 @@ def exchanged_next(exchanged: Array, seconds: float) -> Array:
 
 def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
     """Return how likely groups (..., K) are exchanged, by `landmark_likelihoods` and how likely they were before."""
-    return logistic(np.log(exchanged) - np.log1p(-exchanged) + likelihoods[..., 1] - likelihoods[..., 0])
+    return logistic(
+        np.log(exchanged)
+        - np.log1p(-exchanged)
+        + likelihoods[..., 1]
+        - likelihoods[..., 0]
+    )
 
 
 def side_odds(likelihoods: Array) -> Array:
@@ -73,7 +102,8 @@ def side_odds(likelihoods: Array) -> Array:
 
     Unknown landmarks add 0, and each limb of each view at most the odds of its usual share of exchanges.
     """
-    limb, usual = np.arange(len(likelihoods)) % len(GROUPS), usually_exchanged(likelihoods)
+    limb = np.arange(len(likelihoods)) % len(GROUPS)
+    usual = usually_exchanged(likelihoods)
     return np.array(
         [
             landmark_costs(likelihoods[limb == group, ::-1], usual[limb == group])

@@ -4,19 +4,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
+from posefit.geometry.rotation import (
+    geodesic,
+    rotation_from_joint_angles,
+    rotation_from_root_angles,
+    wrapped,
+)
 from posefit.geometry.skeleton import joint_distances
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 
 
-def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.bool_] | None = None) -> Array:
+def pose_error_degrees(
+    truth: Array, estimate: Array, dimensions: NDArray[np.bool_] | None = None
+) -> Array:
     """Return the mean absolute difference of the angles (T,) in degrees, wrapped. SAPSO (8), Interpretation S13.
 
     All 66 angles count, padding too, unless `dimensions` (66,) chooses some.
     """
     difference = np.degrees(np.abs(wrapped(truth - estimate)))
-    return np.asarray((difference if dimensions is None else difference[:, dimensions]).mean(axis=1))  # SAPSO (8)
+    # SAPSO (8)
+    return np.asarray(
+        (difference if dimensions is None else difference[:, dimensions]).mean(axis=1)
+    )
 
 
 def mean_error(errors: Array) -> float:
@@ -31,9 +41,17 @@ def error_spread(errors: Array) -> float:
 
 def geodesic_degrees(truth: Array, estimate: Array) -> Array:
     """Return the mean angle (T,) in degrees between true and estimated rotations of the root and 21 inner joints."""
-    root = geodesic(rotation_from_root_angles(truth[:, :3]), rotation_from_root_angles(estimate[:, :3]))
-    inner = [rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3)) for poses in (truth, estimate)]
-    return np.asarray(np.degrees(np.column_stack([root, geodesic(*inner)])).mean(axis=1))
+    root = geodesic(
+        rotation_from_root_angles(truth[:, :3]),
+        rotation_from_root_angles(estimate[:, :3]),
+    )
+    inner = [
+        rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3))
+        for poses in (truth, estimate)
+    ]
+    return np.asarray(
+        np.degrees(np.column_stack([root, geodesic(*inner)])).mean(axis=1)
+    )
 
 
 def mpjpe_mm(truth: Array, joints: Array) -> Array:

@@ -63,7 +63,13 @@ def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
     for name, values, dimensions in (("costs", costs, 1), ("proposals", proposals, 2)):
         shape = np.shape(values)
         if len(shape) != dimensions or shape[0] != waiting:
-            came = "one number" if not shape else shape[0] if len(shape) == dimensions else f"an array of shape {shape}"
+            came = (
+                "one number"
+                if not shape
+                else shape[0]
+                if len(shape) == dimensions
+                else f"an array of shape {shape}"
+            )
             raise InputError(f"tell must get {waiting} {name}, got {came}")
 
 
@@ -74,7 +80,8 @@ class Adapter(ABC):
     """
 
     def __init__(self, space: Space, home: Array) -> None:
-        self._space, self._home = space, home
+        self._space = space
+        self._home = home
         self._asked: Array | None = None  # as the library proposed them
 
     @abstractmethod
@@ -105,7 +112,8 @@ class Minimum:
     proposal: Array  # (d,) the best one
     cost: float
     evaluations: int
-    trace: Array = field(repr=False)  # (populations, 2) evaluations so far and best cost, after each population
+    # (populations, 2) evaluations so far and best cost, after each population
+    trace: Array = field(repr=False)
 
 
 class BudgetError(InputError):
@@ -126,16 +134,28 @@ def populations(
         used += len(proposals)
         costs = evaluate(proposals)  # SAPSO A1.2a
         if not isinstance(costs, np.ndarray) or costs.shape != (len(proposals),):
-            came = f"shape {costs.shape}" if isinstance(costs, np.ndarray) else type(costs).__name__
-            raise TypeError(f"evaluate must return an array of costs of shape ({len(proposals)},), got {came}")
+            came = (
+                f"shape {costs.shape}"
+                if isinstance(costs, np.ndarray)
+                else type(costs).__name__
+            )
+            raise TypeError(
+                f"evaluate must return an array of costs of shape ({len(proposals)},), got {came}"
+            )
         yield proposals, costs
         optimiser.tell(proposals, costs)
     if not used:
-        raise BudgetError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
+        raise BudgetError(
+            f"evaluations must hold one population of {len(proposals)}, got {evaluations}"
+        )
 
 
 def minimise(
-    evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int, *, budget_known: bool = False
+    evaluate: Callable[[Array], Array],
+    optimiser: Optimiser,
+    evaluations: int,
+    *,
+    budget_known: bool = False,
 ) -> Minimum:
     """Return the best proposal of a search within a budget of whole populations.
 
@@ -159,15 +179,21 @@ def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
 
     A cost that is nan never counts as best. Raises InputError where every cost is nan.
     """
-    best, cost, used, trace = None, np.inf, 0, list[tuple[int, float]]()
+    best = None
+    cost = np.inf
+    used = 0
+    trace = list[tuple[int, float]]()
     for proposals, costs in searched:
         used += len(proposals)
         lowest = costs.argmin()
-        if math.isnan(least := float(costs[lowest])):  # argmin prefers nan to any number
+        # argmin prefers nan to any number
+        if math.isnan(least := float(costs[lowest])):
             lowest = np.where(np.isnan(costs), np.inf, costs).argmin()
             least = float(costs[lowest])
         if best is None or math.isnan(cost) or least < cost:
-            best, cost = proposals[lowest].copy(), least  # SAPSO (5)
+            # SAPSO (5)
+            best = proposals[lowest].copy()
+            cost = least
         trace.append((used, cost))
     if best is None or math.isnan(cost):
         raise InputError(f"costs must be numbers, got nan for all {used} proposals")

@@ -18,7 +18,8 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
 
 RIDGE = 0.05  # ours: of the regression, where a latent's range is 2
-TURNS_OVER = 0.75 * np.pi  # ours: radians to either side, from which on any tilt is allowed
+# ours: radians to either side, from which on any tilt is allowed
+TURNS_OVER = 0.75 * np.pi
 
 
 class Latents(Protocol):
@@ -66,13 +67,15 @@ class Components:
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63)."""
-        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)  # SAPSO 2.1.3 projection
+        # SAPSO 2.1.3 projection
+        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
         angles = np.tile(self.mean, (len(latents), 1))
         # a matrix product's last bits depend on rows and machine
-        add_components(writeable(latents), writeable(self.components), angles)  # SAPSO 2.1.3 recovery
+        # SAPSO 2.1.3 recovery
+        add_components(writeable(latents), writeable(self.components), angles)
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
@@ -91,35 +94,49 @@ class Tilt:
     The mean is affine in the latents, and never beyond its range for the training poses.
     """
 
-    mean: Array  # (3 + m, 2) radians: the least and most of the mean, where all latents are 0, and a unit of each
-    low: Array  # (2,) radians: the range of what is added to the mean; pi to either side is the whole circle
+    # (3 + m, 2) radians: the least and most of the mean, where all latents are 0, and a
+    # unit of each
+    mean: Array
+    # (2,) radians: the range of what is added to the mean; pi to either side is the
+    # whole circle
+    low: Array
     high: Array  # (2,)
 
     @classmethod
-    def of(cls, prior: Latents, motions: Sequence[Motion], share: float, margin: float) -> Self:
+    def of(
+        cls, prior: Latents, motions: Sequence[Motion], share: float, margin: float
+    ) -> Self:
         """Learn from the poses of one motion or more.
 
         The range holds a `share` of the residuals of each of the two angles, and `margin` radians more to either side.
         """
         tilts = np.concatenate([motion.poses[:, 1:3] for motion in motions])
-        latents = np.asarray(prior.transform(np.concatenate([motion.poses[:, 3:] for motion in motions])))
+        latents = np.asarray(
+            prior.transform(np.concatenate([motion.poses[:, 3:] for motion in motions]))
+        )
         scales = 0.5 * (np.asarray(prior.high) - np.asarray(prior.low))
         scaled = latents / np.where(scales > 0.0, scales, 1.0)
         middle = np.arctan2(np.sin(tilts).mean(axis=0), np.cos(tilts).mean(axis=0))
         around = wrapped(tilts - middle)
-        centre, offset = scaled.mean(axis=0), around.mean(axis=0)
+        centre = scaled.mean(axis=0)
+        offset = around.mean(axis=0)
         scaled -= centre
         gram = scaled.T @ scaled + RIDGE * len(scaled) * np.eye(len(scales))
         slopes = np.linalg.solve(gram, scaled.T @ (around - offset))
         mean = offset + scaled @ slopes
         base = middle + offset - centre @ slopes
         residuals = wrapped(around - mean)
-        low, high = np.quantile(residuals, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0)
-        low, high = low - margin, high + margin
+        low, high = np.quantile(
+            residuals, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0
+        )
+        low = low - margin
+        high = high + margin
         whole = high - low > 2.0 * TURNS_OVER
         slopes /= np.where(scales > 0.0, scales, 1.0)[:, None]
         rows = middle + mean.min(axis=0), middle + mean.max(axis=0), base, slopes
-        return cls(np.vstack(rows), np.where(whole, -np.pi, low), np.where(whole, np.pi, high))
+        return cls(
+            np.vstack(rows), np.where(whole, -np.pi, low), np.where(whole, np.pi, high)
+        )
 
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
         """Return the middle and the half sides (2,) of the box around what was added last (2,).
@@ -128,4 +145,6 @@ class Tilt:
         """
         half = np.minimum(reach, 0.5 * (self.high - self.low))
         whole = self.high - self.low >= 2.0 * np.pi - 1e-12
-        return np.where(whole, added, np.clip(added, self.low + half, self.high - half)), half
+        return np.where(
+            whole, added, np.clip(added, self.low + half, self.high - half)
+        ), half

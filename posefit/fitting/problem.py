@@ -15,13 +15,25 @@ from posefit.fitting.kernels import move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.silhouette.cost import BETA, Areas, costs_in, drawing_of, known_views, mean_over_views, pose_costs
+from posefit.silhouette.cost import (
+    BETA,
+    Areas,
+    costs_in,
+    drawing_of,
+    known_views,
+    mean_over_views,
+    pose_costs,
+)
 from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette
 from posefit.silhouette.sharing import parts_of, work_through
 
 
 def align(
-    body: Body, cameras: Sequence[Camera], silhouettes: Sequence[Silhouette], poses: Array, anchors: Array
+    body: Body,
+    cameras: Sequence[Camera],
+    silhouettes: Sequence[Silhouette],
+    poses: Array,
+    anchors: Array,
 ) -> Array:
     """Return the translations (n, 3) that bring poses (n, 66) to the silhouettes' boxes. Interpretation S4, `aligned`.
 
@@ -56,17 +68,26 @@ class PoseProblem:
     space: SearchSpace
     beta: float = BETA
     threads: int = 1
-    blank: bool = False  # whether silhouettes may be empty, as they may be in the middle of a track
-    _coarser: dict[int, "PoseProblem"] = field(init=False, repr=False, default_factory=dict)
+    # whether silhouettes may be empty, as they may be in the middle of a track
+    blank: bool = False
+    _coarser: dict[int, "PoseProblem"] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         if len(self.cameras) != len(self.silhouettes) or not self.cameras:
-            raise InputError(f"silhouettes must be one a camera ({len(self.cameras)}), got {len(self.silhouettes)}")
+            raise InputError(
+                f"silhouettes must be one a camera ({len(self.cameras)}), got {len(self.silhouettes)}"
+            )
         for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
             if silhouette.size != (camera.width, camera.height):
                 size = (camera.height, camera.width)
-                raise InputError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
-        if not self.blank and not any(silhouette.mask.any() for silhouette in self.silhouettes):
+                raise InputError(
+                    f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}"
+                )
+        if not self.blank and not any(
+            silhouette.mask.any() for silhouette in self.silhouettes
+        ):
             raise InputError("silhouettes must show a person, got an empty mask")
         between("beta", self.beta, 0.0, 1.0)
         at_least("threads", self.threads, 1)
@@ -81,7 +102,8 @@ class PoseProblem:
 
     def _evaluated(self, proposals: Array) -> Array:
         if proposals.shape[1:] != (self.space.dimensions,):
-            self.space.decode(proposals)  # raises InputError with this shape, not that of one thread's part
+            # raises InputError with this shape, not that of one thread's part
+            self.space.decode(proposals)
         if self.on_device:
             return self.cost_and_areas(*self.decode(proposals))[0]
         parts = parts_of(len(proposals), self.threads)
@@ -92,7 +114,9 @@ class PoseProblem:
         def count(part: slice, poses: Array, translations: Array) -> None:
             costs[part] = self._cost(poses, self._aligned(poses, translations))
 
-        work_through(parts, self.threads, lambda part: self.space.decode(proposals[part]), count)
+        work_through(
+            parts, self.threads, lambda part: self.space.decode(proposals[part]), count
+        )
         return costs
 
     def coarser(self, factor: int) -> "PoseProblem":
@@ -104,7 +128,10 @@ class PoseProblem:
             self._coarser[factor] = replace(
                 self,
                 cameras=[coarser_camera(camera, factor) for camera in self.cameras],
-                silhouettes=[coarser_silhouette(silhouette, factor) for silhouette in self.silhouettes],
+                silhouettes=[
+                    coarser_silhouette(silhouette, factor)
+                    for silhouette in self.silhouettes
+                ],
                 blank=True,  # a small silhouette may be empty
             )
         return self._coarser[factor]
@@ -116,7 +143,15 @@ class PoseProblem:
 
     def cost_and_areas(self, poses: Array, translations: Array) -> tuple[Array, Areas]:
         """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
-        return pose_costs(self.body, self.cameras, self.silhouettes, poses, translations, self.beta, self.threads)
+        return pose_costs(
+            self.body,
+            self.cameras,
+            self.silhouettes,
+            poses,
+            translations,
+            self.beta,
+            self.threads,
+        )
 
     @cached_property
     def on_device(self) -> bool:
@@ -133,7 +168,9 @@ class PoseProblem:
 
     def _cost(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
-        return mean_over_views([costs_in(*view, poses, translations, self.beta) for view in self._drawings])
+        return mean_over_views(
+            [costs_in(*view, poses, translations, self.beta) for view in self._drawings]
+        )
 
     def _aligned(self, poses: Array, translations: Array) -> Array:
         """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""

@@ -38,7 +38,11 @@ GIRTHS = {
     "head": ("lowerneck", "upperneck", "head"),
     "arms": ("humerus", "radius", "wrist", "hand"),
 }
-NAMES = ("scale", *(f"{name} length" for name in LENGTHS), *(f"{name} girth" for name in GIRTHS))
+NAMES = (
+    "scale",
+    *(f"{name} length" for name in LENGTHS),
+    *(f"{name} girth" for name in GIRTHS),
+)
 
 # How far adults differ: standard deviations and correlations of the logarithms of lengths over stature, of the 4082 men
 # and 1986 women of ANSUR II (Gordon et al. 2014, NATICK/TR-15/007) with either sex weighing the same. Computed from its
@@ -68,8 +72,12 @@ PROPORTIONS_CORRELATION = np.array(
         [0.23, 0.31, 0.56, -0.25, -0.31, 0.26, 0.33, 1.00],
     ]
 )
-SCALE_SPREAD, HIPS_SPREAD, GIRTH_SPREAD = 0.10, 0.06, 0.30
-JOINT_SPREAD = 0.01  # by how much more a length between joints differs than one between landmarks on the skin; ours
+SCALE_SPREAD = 0.10
+HIPS_SPREAD = 0.06
+GIRTH_SPREAD = 0.30
+# by how much more a length between joints differs than one between landmarks on the
+# skin; ours
+JOINT_SPREAD = 0.01
 REACH = 3.0  # spreads to either side that are searched
 PULL = 0.15  # cost of a build that is one spread away from the average
 # Of poses with the body, then of the body with the poses: the spread of CMA-ES's first draws, in spreads of
@@ -79,27 +87,41 @@ ROUNDS = ((0.5, 60), (0.2, 20))
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
     """Return which bones (26, groups) belong to which group, as 0 and 1."""
-    return np.array([[float(kind(bone) in group) for group in groups.values()] for bone in BONES])
+    return np.array(
+        [[float(kind(bone) in group) for group in groups.values()] for bone in BONES]
+    )
 
 
 def _covariance() -> Array:
     """Return the covariance (17, 17) of the logarithms of people's factors, in the order of `NAMES`."""
-    spread = np.array([SCALE_SPREAD, HIPS_SPREAD, *PROPORTIONS_SPREAD.values(), *[GIRTH_SPREAD] * len(GIRTHS)])
-    correlation, proportions = np.eye(len(NAMES)), slice(2, 2 + len(PROPORTIONS_SPREAD))
+    spread = np.array(
+        [
+            SCALE_SPREAD,
+            HIPS_SPREAD,
+            *PROPORTIONS_SPREAD.values(),
+            *[GIRTH_SPREAD] * len(GIRTHS),
+        ]
+    )
+    correlation = np.eye(len(NAMES))
+    proportions = slice(2, 2 + len(PROPORTIONS_SPREAD))
     correlation[proportions, proportions] = PROPORTIONS_CORRELATION
     covariance = correlation * np.outer(spread, spread)
-    covariance[proportions, proportions] += JOINT_SPREAD**2 * np.eye(len(PROPORTIONS_SPREAD))
+    covariance[proportions, proportions] += JOINT_SPREAD**2 * np.eye(
+        len(PROPORTIONS_SPREAD)
+    )
     return np.asarray(covariance)
 
 
-_LENGTHS, _GIRTHS = _members(LENGTHS), _members(GIRTHS)
+_LENGTHS = _members(LENGTHS)
+_GIRTHS = _members(GIRTHS)
 COVARIANCE = _covariance()
 SPREAD = np.sqrt(np.diag(COVARIANCE))
 PRECISION = np.linalg.inv(COVARIANCE)
 # What any length may be off although contours agree, as people are no cones: about the least that four cameras leave
 # of people whose radii differ bone by bone, 2.0 to 3.5 % on average (docs/studies/builds.py).
 MODEL_SPREAD = np.array([0.0, *[0.03] * len(LENGTHS), *[0.0] * len(GIRTHS)])
-_ROOT = np.linalg.cholesky(COVARIANCE)  # of independent factors of deviation 1, those of people
+# of independent factors of deviation 1, those of people
+_ROOT = np.linalg.cholesky(COVARIANCE)
 
 
 def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
@@ -110,7 +132,11 @@ def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
     lengths = factors[0] * np.exp(_LENGTHS @ np.log(factors[1 : 1 + len(LENGTHS)]))
     girths = factors[0] * np.exp(_GIRTHS @ np.log(factors[1 + len(LENGTHS) :]))
     scaled = body.scaled(lengths, girths)
-    return scaled if height is None else scaled.scaled(height / scaled.stature, height / scaled.stature)
+    return (
+        scaled
+        if height is None
+        else scaled.scaled(height / scaled.stature, height / scaled.stature)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,14 +145,24 @@ class Shape:
 
     body: Body
     factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
-    spread: Array = field(repr=False)  # (17,) standard deviation of each factor's logarithm
+    # (17,) standard deviation of each factor's logarithm
+    spread: Array = field(repr=False)
     cost: float  # mean over the frames
-    height: float | None = None  # metres, to which it was scaled; None where it was fitted
+    # metres, to which it was scaled; None where it was fitted
+    height: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the build as summary.json holds it."""
-        factors, spread = (dict(zip(NAMES, values.tolist(), strict=True)) for values in (self.factors, self.spread))
-        return {"stature_m": self.body.stature, "cost": self.cost, "factors": factors, "spread": spread}
+        factors, spread = (
+            dict(zip(NAMES, values.tolist(), strict=True))
+            for values in (self.factors, self.spread)
+        )
+        return {
+            "stature_m": self.body.stature,
+            "cost": self.cost,
+            "factors": factors,
+            "spread": spread,
+        }
 
 
 def fit_shape(
@@ -149,12 +185,17 @@ def fit_shape(
 
     def cost(factors: Array) -> float:
         """Return the mean cost of the frames, whose poses are held."""
-        tried, total = shaped(body, factors, height), 0.0
+        tried = shaped(body, factors, height)
+        total = 0.0
         for frame, observation in zip(frames, observations, strict=True):
-            pose, translation, silhouettes = frame.pose[None], frame.translation[None], observation.silhouettes
+            pose = frame.pose[None]
+            translation = frame.translation[None]
+            silhouettes = observation.silhouettes
             if aligned:
                 translation = align(tried, cameras, silhouettes, pose, translation)
-            total += float(pose_costs(tried, cameras, silhouettes, pose, translation, beta)[0][0])
+            total += float(
+                pose_costs(tried, cameras, silhouettes, pose, translation, beta)[0][0]
+            )
         return total / len(observations)
 
     factors = np.ones(len(NAMES))
@@ -170,7 +211,9 @@ class FactorBox:
 
     start: Start
     dimensions: int = len(NAMES)
-    periodic: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(len(NAMES), dtype=bool))
+    periodic: NDArray[np.bool_] = field(
+        default_factory=lambda: np.zeros(len(NAMES), dtype=bool)
+    )
 
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, 17) lie in the box (n,)."""
@@ -178,16 +221,27 @@ class FactorBox:
 
 
 def _search(
-    cost: Callable[[Array], float], start: Array, rng: np.random.Generator, width: float, generations: int
+    cost: Callable[[Array], float],
+    start: Array,
+    rng: np.random.Generator,
+    width: float,
+    generations: int,
 ) -> Array:
     """Return the factors (17,) of least cost, by CMA-ES from the factors `start` (17,)."""
 
     def evaluate(proposals: Array) -> Array:
         points = REACH * proposals  # in spreads of people
-        return np.array([cost(np.exp(_ROOT @ point)) + PULL * float(point @ point) for point in points])
+        return np.array(
+            [
+                cost(np.exp(_ROOT @ point)) + PULL * float(point @ point)
+                for point in points
+            ]
+        )
 
     mean = np.clip(np.linalg.solve(_ROOT, np.log(start)) / REACH, -1.0, 1.0)
-    box = FactorBox(Start(mean, np.full(len(NAMES), width / REACH), np.zeros(len(NAMES))))
+    box = FactorBox(
+        Start(mean, np.full(len(NAMES), width / REACH), np.zeros(len(NAMES)))
+    )
     population = default_population_size(len(NAMES))
     optimiser = CMAES(box, rng, population_size=population)
     best = minimise(evaluate, optimiser, population * generations, budget_known=True)

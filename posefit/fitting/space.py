@@ -20,7 +20,8 @@ Translation = Literal["known", "searched", "aligned"]  # Interpretation S4
 RootOrder = Literal["yaw_first", "xyz"]
 TRANSLATIONS: tuple[Translation, ...] = ("known", "searched", "aligned")
 
-ROOT_RANGE_DEGREES = (45.0, 15.0, 15.0)  # ours: how far yaw, pitch and roll are searched to either side
+# ours: how far yaw, pitch and roll are searched to either side
+ROOT_RANGE_DEGREES = (45.0, 15.0, 15.0)
 TRANSLATION_RANGE = (0.5, 0.5, 0.5)  # ours: metres to either side
 
 
@@ -36,26 +37,43 @@ class SearchSpace:
     prior: Latents = field(repr=False)
     root_centre: Array  # (3,) radians: the middle of the root's range
     root_range: Array  # (3,) radians to either side; a range of pi wraps around
-    anchor: Array  # (3,) metres: the known translation, the middle of the searched range, or where aligning starts
+    # (3,) metres: the known translation, the middle of the searched range, or where
+    # aligning starts
+    anchor: Array
     translation: Translation = "known"
-    translation_range: Array = field(default_factory=lambda: np.array(TRANSLATION_RANGE))  # (3,) metres
-    start: Start | None = None  # None: the first population is drawn uniformly from the box
-    tilt: Tilt | None = field(default=None, repr=False)  # None: pitch and roll are those of the pose
+    # (3,) metres
+    translation_range: Array = field(
+        default_factory=lambda: np.array(TRANSLATION_RANGE)
+    )
+    # None: the first population is drawn uniformly from the box
+    start: Start | None = None
+    # None: pitch and roll are those of the pose
+    tilt: Tilt | None = field(default=None, repr=False)
     root_order: RootOrder = "yaw_first"  # Interpretation S3; "xyz" has no tilt
-    centre: Array = field(init=False, repr=False)  # (d,) coordinates of the box's middle
+    # (d,) coordinates of the box's middle
+    centre: Array = field(init=False, repr=False)
     half: Array = field(init=False, repr=False)  # (d,) half its sides
-    periodic: NDArray[np.bool_] = field(init=False, repr=False)  # (d,) coordinates that wrap around
+    # (d,) coordinates that wrap around
+    periodic: NDArray[np.bool_] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         one_of("translation", self.translation, TRANSLATIONS)
         if self.root_order == "xyz" and self.tilt is not None:
-            raise InputError('tilt must be "box" where the root is in the order xyz, got a learned one')
+            raise InputError(
+                'tilt must be "box" where the root is in the order xyz, got a learned one'
+            )
         for name in ("root_range", "translation_range"):
             reach = np.asarray(getattr(self, name))
-            if reach.shape != (3,) or not (np.isfinite(reach).all() and (reach >= 0.0).all()):
-                raise InputError(f"{name} must be 3 numbers of 0 or more, got {quoted(reach.tolist())}")
-        low, high = np.asarray(self.prior.low), np.asarray(self.prior.high)
-        middle, half = [self.root_centre, 0.5 * (low + high)], [self.root_range, 0.5 * (high - low)]
+            if reach.shape != (3,) or not (
+                np.isfinite(reach).all() and (reach >= 0.0).all()
+            ):
+                raise InputError(
+                    f"{name} must be 3 numbers of 0 or more, got {quoted(reach.tolist())}"
+                )
+        low = np.asarray(self.prior.low)
+        high = np.asarray(self.prior.high)
+        middle = [self.root_centre, 0.5 * (low + high)]
+        half = [self.root_range, 0.5 * (high - low)]
         if self.translation == "searched":
             middle.insert(1, self.anchor)
             half.insert(1, self.translation_range)
@@ -71,7 +89,12 @@ class SearchSpace:
         """How many coordinates a proposal has."""
         return len(self.centre)
 
-    def around(self, coordinates: Array, start: Start | None = None, anchor: Array | None = None) -> "SearchSpace":
+    def around(
+        self,
+        coordinates: Array,
+        start: Start | None = None,
+        anchor: Array | None = None,
+    ) -> "SearchSpace":
         """Return the space whose yaw range, and searched translation, are centred on coordinates (d,).
 
         With a tilt so are pitch and roll, within its range.
@@ -81,7 +104,12 @@ class SearchSpace:
             root[1:] = self.tilt.around(coordinates[1:3], self.root_range[1:])[0]
         if self.translation == "searched":
             anchor = coordinates[3:6]
-        return replace(self, root_centre=root, anchor=self.anchor if anchor is None else anchor, start=start)
+        return replace(
+            self,
+            root_centre=root,
+            anchor=self.anchor if anchor is None else anchor,
+            start=start,
+        )
 
     def coordinates(self, proposals: Array) -> Array:
         """Return the coordinates (..., d), in radians, metres and latents, of proposals (..., d)."""
@@ -100,13 +128,27 @@ class SearchSpace:
         Raises InputError where the shape does not fit or a proposal is not finite.
         """
         proposals = writeable(proposals)
-        d, m = len(self.centre), len(self.prior.low)
+        d = len(self.centre)
+        m = len(self.prior.low)
         if proposals.shape[1:] != (d,):
-            raise InputError(f"proposals must have shape (n, {d}), got {proposals.shape}")
+            raise InputError(
+                f"proposals must have shape (n, {d}), got {proposals.shape}"
+            )
         n = len(proposals)
-        poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
+        poses = np.empty((n, ANGLES))
+        translations = np.empty((n, 3))
+        latents = np.empty((n, m))
         tilt = np.zeros((3 + m, 2)) if self.tilt is None else self.tilt.mean
-        if not unpack_proposals(proposals, self.centre, self.half, self.anchor, tilt, poses, translations, latents):
+        if not unpack_proposals(
+            proposals,
+            self.centre,
+            self.half,
+            self.anchor,
+            tilt,
+            poses,
+            translations,
+            latents,
+        ):
             raise InputError("proposals must be finite, got nan or infinity")
         if self.root_order == "xyz":
             poses[:, :3] = yaw_first(poses[:, :3])
@@ -116,7 +158,9 @@ class SearchSpace:
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
         latents = slice(self.dimensions - len(self.prior.low), None)
-        allowed = self.prior.feasible(self.centre[latents] + self.half[latents] * proposals[:, latents])
+        allowed = self.prior.feasible(
+            self.centre[latents] + self.half[latents] * proposals[:, latents]
+        )
         return np.asarray(allowed & (np.abs(proposals) <= 1.0).all(axis=1))
 
     def moved(self, proposals: Array, origin: "SearchSpace") -> Array:

@@ -18,21 +18,34 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.uncertainty.modes import Posterior, clusters_of, poses_apart
 
 MAX_MODES = 8
-MODE_RADIUS = 0.2  # metres, the mean over joints, beyond which poses are of different modes: a library is that rough
+# metres, the mean over joints, beyond which poses are of different modes: a library is
+# that rough
+MODE_RADIUS = 0.2
 MODE_SPREAD = 0.08  # standard deviation of a mode, in half-ranges of the box
 MIN_SMALL_SIDE = 60  # pixels of the picture in which projected poses are compared
 TEMPERATURE = 2.0  # divides their costs
 INFEASIBLE_COST = 5.0  # added to the cost of a pose that the prior does not allow
 
 
-def modes_apart(skeleton: Skeleton, posterior: Posterior) -> list[tuple[float, Posterior]]:
+def modes_apart(
+    skeleton: Skeleton, posterior: Posterior
+) -> list[tuple[float, Posterior]]:
     """Return the modes of weighted poses, the likeliest first: each with its weight and its poses, its medoid first."""
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
     clusters = clusters_of(distances, posterior.weights, MODE_RADIUS)[:MAX_MODES]
     modes = []
     for weight, medoid, members in clusters:
         rows = np.append(medoid, members[members != medoid])
-        modes.append((weight, Posterior(posterior.poses[rows], posterior.translations[rows], posterior.weights[rows])))
+        modes.append(
+            (
+                weight,
+                Posterior(
+                    posterior.poses[rows],
+                    posterior.translations[rows],
+                    posterior.weights[rows],
+                ),
+            )
+        )
     return modes
 
 
@@ -42,12 +55,21 @@ def start_in(problem: PoseProblem, modes: Sequence[tuple[float, Posterior]]) -> 
     Each mode is around that of its poses which, projected onto the latents, costs least in a small picture; these costs
     weigh the modes again, as a space that cannot show a pose need not be searched there.
     """
-    space, factor = problem.space, max(min(problem.silhouettes[0].size) // MIN_SMALL_SIDE, 1)
-    projected = [space.proposals(coordinates_of(space, mode.poses, mode.translations)) for _, mode in modes]
-    costs = [problem.coarser(factor).evaluate(poses) + INFEASIBLE_COST * ~space.feasible(poses) for poses in projected]
+    space = problem.space
+    factor = max(min(problem.silhouettes[0].size) // MIN_SMALL_SIDE, 1)
+    projected = [
+        space.proposals(coordinates_of(space, mode.poses, mode.translations))
+        for _, mode in modes
+    ]
+    costs = [
+        problem.coarser(factor).evaluate(poses)
+        + INFEASIBLE_COST * ~space.feasible(poses)
+        for poses in projected
+    ]
     least = min(float(each.min()) for each in costs)
     weights = [float(np.exp((least - each) / TEMPERATURE).sum()) for each in costs]
-    spread, velocity = np.full(space.dimensions, MODE_SPREAD), np.zeros(space.dimensions)
+    spread = np.full(space.dimensions, MODE_SPREAD)
+    velocity = np.zeros(space.dimensions)
     starts = [
         Start(poses[each.argmin()], spread, velocity, weight)
         for poses, each, weight in zip(projected, costs, weights, strict=True)

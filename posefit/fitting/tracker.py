@@ -22,13 +22,18 @@ from posefit.silhouette.cost import BETA, Areas
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
-SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted step
+# k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted
+# step
+SPREAD = 1.0
 HISTORY_FRAMES = 3  # how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
 RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
-COORDINATES = "coordinates"  # in the details of a frame: (d,) of its pose in the search space
-FLOOR = 0.05  # Interpretation S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
+# in the details of a frame: (d,) of its pose in the search space
+COORDINATES = "coordinates"
+# Interpretation S5: their floor, in half-ranges of the box, so that a still subject
+# keeps some spread
+FLOOR = 0.05
 
 
 @dataclass(frozen=True)
@@ -37,8 +42,10 @@ class Observation:
 
     silhouettes: Sequence[Silhouette] = field(repr=False)
     translation: Array | None = None  # (3,) metres
-    usable: bool = True  # False: it shows too little to learn from, and a tracker holds its pose
-    yaw: float | None = None  # radians: about which way the person faces; None where it is unknown
+    # False: it shows too little to learn from, and a tracker holds its pose
+    usable: bool = True
+    # radians: about which way the person faces; None where it is unknown
+    yaw: float | None = None
     # (V, 27, 3) of joints: column and row, pixels, and confidence, 0 to 1, 0 for an unknown joint; None for none at all
     landmarks: Array | None = field(default=None, repr=False)
     # of an earlier track, to be tried among others: the pose (66,) and the root's place (3,) metres
@@ -56,12 +63,17 @@ class Frame:
     evaluations: int
     # (populations, 2) the evaluations so far and the best cost, after each population of the search
     trace: Array = field(default_factory=lambda: np.empty((0, 2)), repr=False)
-    posterior: Posterior | None = field(default=None, repr=False)  # what else it may be, where a tracker reports it
-    lost: float | None = None  # how likely it is that the frame is lost, 0 to 1, where a tracker reports it
-    activity: str | None = None  # what the person does, such as "walk", where a tracker reports it
-    details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker reports
+    # what else it may be, where a tracker reports it
+    posterior: Posterior | None = field(default=None, repr=False)
+    # how likely it is that the frame is lost, 0 to 1, where a tracker reports it
+    lost: float | None = None
+    # what the person does, such as "walk", where a tracker reports it
+    activity: str | None = None
+    # whatever else a tracker reports
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     seconds: float = 0.0
-    cpu_seconds: float = 0.0  # of all threads of the process: unlike `seconds` it does not grow on a busy machine
+    # of all threads of the process: unlike `seconds` it does not grow on a busy machine
+    cpu_seconds: float = 0.0
 
     @property
     def modes(self) -> Sequence[Mode]:
@@ -80,23 +92,34 @@ class Task:
     body: Body
     cameras: Sequence[Camera]
     evaluations: int  # the budget of a frame
-    yaw: float | None  # radians: about where the person faces in the first frame; None for anywhere
-    anchor: Array  # (3,) metres: about where the person's root is in the first frame, unless observations tell
+    # radians: about where the person faces in the first frame; None for anywhere
+    yaw: float | None
+    # (3,) metres: about where the person's root is in the first frame, unless
+    # observations tell
+    anchor: Array
     translation: Translation = "known"  # Interpretation S4
     fps: float = 30.0
-    training: Sequence[Motion] = field(default=(), repr=False)  # what may be learned from
-    first_pose: Array | None = None  # (63,) joint angles in the first frame, where they are known
+    # what may be learned from
+    training: Sequence[Motion] = field(default=(), repr=False)
+    # (63,) joint angles in the first frame, where they are known
+    first_pose: Array | None = None
     # what the first frame may show, where it was guessed: modes with their weights, see `posefit.fitting.start`
     modes: Sequence[tuple[float, Posterior]] = field(default=(), repr=False)
-    start: "InitialiserFactory | None" = field(default=None, repr=False)  # guesses them; None for a blind search
-    before: Sequence[Frame] = field(default=(), repr=False)  # earlier ones, where an interrupted track goes on
+    # guesses them; None for a blind search
+    start: "InitialiserFactory | None" = field(default=None, repr=False)
+    # earlier ones, where an interrupted track goes on
+    before: Sequence[Frame] = field(default=(), repr=False)
     threads: int = 1
-    backwards: bool = False  # whether observations and training come in reverse, the last one first
-    fastest_turn: float | None = None  # radians a second that the yaw turns at most; None where it is unknown
+    # whether observations and training come in reverse, the last one first
+    backwards: bool = False
+    # radians a second that the yaw turns at most; None where it is unknown
+    fastest_turn: float | None = None
 
     def __post_init__(self) -> None:
         """Count the angles of all training about the axes of the body's skeleton: turns in space stay what they are."""
-        training = [motion.about_axes_of(self.body.skeleton) for motion in self.training]
+        training = [
+            motion.about_axes_of(self.body.skeleton) for motion in self.training
+        ]
         object.__setattr__(self, "training", training)
 
     @property
@@ -111,7 +134,9 @@ class Tracker(Protocol):
     It takes one observation before it yields a frame, unless it is registered as one that looks ahead.
     """
 
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+    def track(
+        self, observations: Iterable[Observation], rng: np.random.Generator
+    ) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, as it comes."""
 
 
@@ -131,7 +156,9 @@ class Initialiser(Protocol):
 InitialiserFactory = Callable[..., Initialiser]
 
 
-def guessed_modes(task: Task, observation: Observation) -> Sequence[tuple[float, Posterior]]:
+def guessed_modes(
+    task: Task, observation: Observation
+) -> Sequence[tuple[float, Posterior]]:
     """Return the modes of what an observation may show; none where nothing guesses them, or the pose is known."""
     if task.start is None or task.first_pose is not None or not observation.usable:
         return ()
@@ -166,7 +193,8 @@ class Prediction:
     variant: Literal["default", "paper"] = "default"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
+        # 1 is 1.0, to compiled loops and in a summary
+        object.__setattr__(self, "beta", float(self.beta))
         choices(Prediction, vars(self))
         one_of("tilt", self.tilt or "learned", ("learned", "box"))
         positive("floor", self.floor)
@@ -178,9 +206,13 @@ class Prediction:
 
     def tilted(self, prior: Latents, training: Sequence[Motion]) -> Tilt | None:
         """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""
-        if (self.tilt or ("box" if self.variant == "paper" else "learned")) == "box" or not training:
+        if (
+            self.tilt or ("box" if self.variant == "paper" else "learned")
+        ) == "box" or not training:
             return None
-        return Tilt.of(prior, training, TILT_SHARE, float(np.radians(TILT_MARGIN_DEGREES)))
+        return Tilt.of(
+            prior, training, TILT_SHARE, float(np.radians(TILT_MARGIN_DEGREES))
+        )
 
 
 class Predictor:
@@ -189,8 +221,16 @@ class Predictor:
     A `tilt` that was learned from the task's training before is not learned again.
     """
 
-    def __init__(self, task: Task, prior: Latents, prediction: Prediction, tilt: Tilt | None = None) -> None:
-        self._task, self._prior, self._prediction = task, prior, prediction
+    def __init__(
+        self,
+        task: Task,
+        prior: Latents,
+        prediction: Prediction,
+        tilt: Tilt | None = None,
+    ) -> None:
+        self._task = task
+        self._prior = prior
+        self._prediction = prediction
         self._tilt = tilt or prediction.tilted(prior, task.training)
         reach = np.radians(prediction.root_range_degrees)
         if task.yaw is None:
@@ -207,35 +247,58 @@ class Predictor:
             tilt=self._tilt,
             root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )
-        earlier = [frame.details[COORDINATES] for frame in task.before if COORDINATES in frame.details]
-        self._latest: list[Array] = earlier[-HISTORY_FRAMES:]  # coordinates of the latest gbest, the newest last
+        earlier = [
+            frame.details[COORDINATES]
+            for frame in task.before
+            if COORDINATES in frame.details
+        ]
+        # coordinates of the latest gbest, the newest last
+        self._latest: list[Array] = earlier[-HISTORY_FRAMES:]
 
     def space(self, observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
-        self._space = self._next_space(observation.translation) if self._latest else self._first_space(observation)
+        self._space = (
+            self._next_space(observation.translation)
+            if self._latest
+            else self._first_space(observation)
+        )
         return self._space
 
     def commit(self, proposal: Array) -> None:
         """Take the best proposal (d,) of the latest space."""
-        self._latest = [*self._latest, self._space.coordinates(proposal)][-HISTORY_FRAMES:]
+        self._latest = [*self._latest, self._space.coordinates(proposal)][
+            -HISTORY_FRAMES:
+        ]
 
     def _first_space(self, observation: Observation) -> SearchSpace:
         """Return the box of the first frame: it starts around guessed modes, a known pose, or anywhere."""
-        task, space = self._task, self._space
+        task = self._task
+        space = self._space
         if observation.translation is not None:
             space = space.around(space.centre, anchor=observation.translation)
         if modes := task.modes or guessed_modes(task, observation):
             beta = self._prediction.beta
-            problem = PoseProblem(task.body, task.cameras, observation.silhouettes, space, beta=beta, blank=True)
+            problem = PoseProblem(
+                task.body,
+                task.cameras,
+                observation.silhouettes,
+                space,
+                beta=beta,
+                blank=True,
+            )
             return replace(space, start=start_in(problem, modes))
         if task.first_pose is not None:
-            return replace(space, start=self._start_at_known_pose(space, task.first_pose))
+            return replace(
+                space, start=self._start_at_known_pose(space, task.first_pose)
+            )
         return space
 
     def _next_space(self, anchor: Array | None) -> SearchSpace:
         """Return the box around the last result, whose start is spread as wide as the last step."""
-        latest, space = self._latest, self._space
-        if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
+        latest = self._latest
+        space = self._space
+        # only the first frame looks all around
+        if self._task.yaw is None or self._tilt is not None:
             reach = np.radians(self._prediction.root_range_degrees)
             if self._tilt is not None:
                 reach[1:] = self._tilt.around(space.root_centre[1:], reach[1:])[1]
@@ -245,10 +308,14 @@ class Predictor:
         back = 2 if self._prediction.variant == "paper" else 1
         step = np.zeros(space.dimensions)
         if len(latest) > back:
-            half = np.where(space.half > 0.0, space.half, 1.0)  # as in proposals: 0 where nothing is searched
+            # as in proposals: 0 where nothing is searched
+            half = np.where(space.half > 0.0, space.half, 1.0)
             step = displacement(space, latest[-back - 1] / half, latest[-back] / half)
         mean = space.proposals(latest[-1])
-        spread = np.maximum(self._prediction.spread * np.abs(step), self._prediction.floor)  # Interpretation S5
+        # Interpretation S5
+        spread = np.maximum(
+            self._prediction.spread * np.abs(step), self._prediction.floor
+        )
         return space.around(latest[-1], Start(mean, spread, step), anchor)
 
     def _start_at_known_pose(self, space: SearchSpace, angles: Array) -> Start:
@@ -276,11 +343,15 @@ class SynthesisTracker:
     make: Callable[[Space, np.random.Generator], Optimiser]
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
-    tilt: Tilt | None = field(default=None, repr=False)  # of the prior and the training, where it was learned before
+    # of the prior and the training, where it was learned before
+    tilt: Tilt | None = field(default=None, repr=False)
 
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+    def track(
+        self, observations: Iterable[Observation], rng: np.random.Generator
+    ) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
-        task, predictor = self.task, Predictor(self.task, self.prior, self.prediction, self.tilt)
+        task = self.task
+        predictor = Predictor(self.task, self.prior, self.prediction, self.tilt)
         optimiser: Optimiser | None = None
         latest: Frame | None = task.before[-1] if task.before else None
         for observation in observations:
@@ -292,18 +363,28 @@ class SynthesisTracker:
             if self.next_frame == "carry" and optimiser is not None:
                 cast(Filter, optimiser).advance(space)
             else:
-                optimiser = self.make(replace(space, start=None) if self.next_frame == "forget" else space, rng)
+                optimiser = self.make(
+                    replace(space, start=None)
+                    if self.next_frame == "forget"
+                    else space,
+                    rng,
+                )
             problem = self.problem(space, observation)
-            best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
+            best = minimise(
+                problem.evaluate, optimiser, task.evaluations, budget_known=True
+            )
             predictor.commit(best.proposal)
             latest = _frame(problem, best)
             yield latest
 
-    def _held(self, latest: Frame | None, space: SearchSpace, observation: Observation) -> Frame:
+    def _held(
+        self, latest: Frame | None, space: SearchSpace, observation: Observation
+    ) -> Frame:
         """Return the latest frame once more, at no evaluation; before the first one, the middle of the box."""
         poses, places = space.decode(np.zeros((1, space.dimensions)))
         if latest is not None:
-            poses, places = latest.pose[None], latest.translation[None]
+            poses = latest.pose[None]
+            places = latest.translation[None]
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
         problem = self.problem(space, observation)
@@ -312,13 +393,30 @@ class SynthesisTracker:
 
     def problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
         """Return the problem that a frame is."""
-        task, beta = self.task, self.prediction.beta
+        task = self.task
+        beta = self.prediction.beta
         silhouettes = observation.silhouettes
-        return PoseProblem(task.body, task.cameras, silhouettes, space, beta=beta, threads=task.threads, blank=True)
+        return PoseProblem(
+            task.body,
+            task.cameras,
+            silhouettes,
+            space,
+            beta=beta,
+            threads=task.threads,
+            blank=True,
+        )
 
 
 def _frame(problem: PoseProblem, best: Minimum) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
     counts = problem.cost_and_areas(poses, translations)[1][:, 0]
     details = {COORDINATES: problem.space.coordinates(best.proposal)}
-    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, best.trace, details=details)
+    return Frame(
+        poses[0],
+        translations[0],
+        best.cost,
+        counts,
+        best.evaluations,
+        best.trace,
+        details=details,
+    )

@@ -29,8 +29,16 @@ class CheckedOptimiser:
     `evaluations` is the budget of a search, which has to hold the first population.
     """
 
-    def __init__(self, optimiser: Optimiser, space: Space, name: str, evaluations: int | None = None) -> None:
-        self._optimiser, self._space, self._name = optimiser, space, name
+    def __init__(
+        self,
+        optimiser: Optimiser,
+        space: Space,
+        name: str,
+        evaluations: int | None = None,
+    ) -> None:
+        self._optimiser = optimiser
+        self._space = space
+        self._name = name
         self._evaluations, self._first, self._drawn = evaluations, True, PoseCount()
 
     def ask(self) -> Array:
@@ -38,11 +46,16 @@ class CheckedOptimiser:
         with self._called("ask"):
             proposals = self._optimiser.ask()
         check_population(proposals, self._space, self._name)
-        count, budget = len(proposals), self._evaluations
+        count = len(proposals)
+        budget = self._evaluations
         if self._first and not count:
-            raise self._broken("ask must return a first population of one proposal or more, got none")
+            raise self._broken(
+                "ask must return a first population of one proposal or more, got none"
+            )
         if self._first and budget is not None and count > budget:
-            raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {budget}")
+            raise BudgetError(
+                f"{self._name}: evaluations must hold one population of {count}, got {budget}"
+            )
         return proposals
 
     def tell(self, proposals: Array, costs: Array) -> None:
@@ -53,7 +66,8 @@ class CheckedOptimiser:
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
-        self._space, self._first = space, True
+        self._space = space
+        self._first = True
         with self._called("advance"):
             self._optimiser.advance(space)  # type: ignore[attr-defined]
 
@@ -63,7 +77,9 @@ class CheckedOptimiser:
         with self._drawn.counting(), plugin_errors(self._name, what):
             yield
         if self._drawn.poses:
-            raise self._broken(f"{what} must leave evaluations to the search, got {self._drawn.poses:g} of its own")
+            raise self._broken(
+                f"{what} must leave evaluations to the search, got {self._drawn.poses:g} of its own"
+            )
 
     def _broken(self, rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{self._name}: {rule}")
@@ -71,7 +87,8 @@ class CheckedOptimiser:
 
 def check_population(proposals: Any, space: Space, name: str) -> None:
     """Raise BrokenRuleError, which begins with `name`, where proposals are not (n, d) in the box."""
-    plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
+    # neither a matrix nor a masked array, which calculate otherwise
+    plain = type(proposals) is np.ndarray
     rule = ""
     if not plain or proposals.shape[1:] != (space.dimensions,):
         came = f"shape {proposals.shape}" if plain else type(proposals).__name__
@@ -87,7 +104,9 @@ def check_population(proposals: Any, space: Space, name: str) -> None:
 
 
 @contextmanager
-def plugin_errors(name: str, what: str, passed: tuple[type[BaseException], ...] = ()) -> Iterator[None]:
+def plugin_errors(
+    name: str, what: str, passed: tuple[type[BaseException], ...] = ()
+) -> Iterator[None]:
     """Raise BrokenRuleError, naming the plugin, for whatever the body raises, SystemExit too, but for what is `passed`.
 
     A BrokenRuleError stays as it is: it names another plugin, which this one called.
@@ -106,19 +125,36 @@ def plugin_errors(name: str, what: str, passed: tuple[type[BaseException], ...] 
 
 def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
     if isinstance(error, SystemExit):
-        return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
+        return BrokenRuleError(
+            f"{name}: {what} must not end the program, got SystemExit: {error.code}"
+        )
     # where the plugin raised it, or passed it on from a library
-    frames = [frame for frame in extract_tb(error.__traceback__) if POSEFIT not in Path(frame.filename).parents]
-    of_plugin = [frame for frame in frames if Path(frame.filename).parent == Path(frames[0].filename).parent]
-    place = f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})" if of_plugin else ""
-    return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}{place}")
+    frames = [
+        frame
+        for frame in extract_tb(error.__traceback__)
+        if POSEFIT not in Path(frame.filename).parents
+    ]
+    of_plugin = [
+        frame
+        for frame in frames
+        if Path(frame.filename).parent == Path(frames[0].filename).parent
+    ]
+    place = (
+        f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})"
+        if of_plugin
+        else ""
+    )
+    return BrokenRuleError(
+        f"{name}: {what} must not fail, got {type(error).__name__}: {error}{place}"
+    )
 
 
 class CheckedPrior:
     """A prior that has learned; an error in it names it, whichever plugin called it."""
 
     def __init__(self, prior: Latents, name: str) -> None:
-        self._prior, self._name = prior, name
+        self._prior = prior
+        self._name = name
         self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
 
     def transform(self, angles: Array) -> Any:
@@ -149,14 +185,24 @@ def check_prior(prior: Latents, training: Array, name: str) -> None:
     def broken(rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{name}: {rule}")
 
-    low, high = np.asarray(prior.low), np.asarray(prior.high)
-    if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
-        raise broken(f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}")
+    low = np.asarray(prior.low)
+    high = np.asarray(prior.high)
+    if (
+        low.ndim != 1
+        or low.shape != high.shape
+        or not (np.isfinite(low).all() and np.isfinite(high).all())
+    ):
+        raise broken(
+            f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}"
+        )
     for k in np.flatnonzero(low > high):
-        raise broken(f"low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}")
+        raise broken(
+            f"low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}"
+        )
     angles = training[:3]
     latents = np.asarray(prior.transform(angles))
-    back, feasible = prior.inverse_transform(latents), prior.feasible(latents)
+    back = prior.inverse_transform(latents)
+    feasible = prior.feasible(latents)
     for method, value, shape in (
         ("transform", latents, (len(angles), len(low))),
         ("inverse_transform", back, angles.shape),
@@ -166,8 +212,17 @@ def check_prior(prior: Latents, training: Array, name: str) -> None:
             raise broken(f"{method} must return shape {shape}, got {np.shape(value)}")
         if not np.isfinite(value).all():
             raise broken(f"{method} must return finite numbers, got some that are not")
-    sample = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
+    sample = training[
+        np.unique(
+            np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64)
+        )
+    ]
     drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
-    if not (np.any(feasible) or any(np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn))):
+    if not (
+        np.any(feasible)
+        or any(
+            np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn)
+        )
+    ):
         came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
         raise broken(f"feasible must allow some poses, got {came}")

@@ -17,7 +17,10 @@ def weigh(costs: Array, sharpness: float) -> Array:
     if not known.any():
         return np.full(costs.size, 1.0 / costs.size)
     rises = np.where(known, costs, np.inf) - costs[known].min()
-    weights: Array = np.exp(-sharpness * rises) if sharpness else known.astype(np.float64)  # GORDON1993 (likelihood)
+    # GORDON1993 (likelihood)
+    weights: Array = (
+        np.exp(-sharpness * rises) if sharpness else known.astype(np.float64)
+    )
     return np.asarray(weights / weights.sum())
 
 
@@ -37,4 +40,6 @@ def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
 
 def logistic(log_odds: Array) -> Array:
     """Return the probabilities of logarithms of odds, of any shape; none is 0 or 1."""
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS))))
+    return np.asarray(
+        1.0 / (1.0 + np.exp(-np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS)))
+    )

@@ -14,10 +14,22 @@ from posefit.errors import InputError
 from posefit.footage.images import IMAGES
 from posefit.footage.masks import ARRAYS, PackedMasks, Views, undistorted
 from posefit.footage.people import Persons, part_at, paste
-from posefit.footage.quality import apparent_size, apparent_sizes, disagreement, extent_of, meeting
+from posefit.footage.quality import (
+    apparent_size,
+    apparent_sizes,
+    disagreement,
+    extent_of,
+    meeting,
+)
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Up, guessed_up, read_calibrations, upright
+from posefit.geometry.calibration import (
+    Calibration,
+    Up,
+    guessed_up,
+    read_calibrations,
+    upright,
+)
 from posefit.geometry.camera import Camera
 from posefit.geometry.units import METRES, UNIT_NAMES, Unit
 from posefit.motion.clips import FPS
@@ -26,9 +38,12 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
 AROUND = 0.5  # seconds before and after a frame whose facings are averaged
-AGREEMENT = 0.6  # the mean of unit vectors is at least so long: facings may not contradict each other
+# the mean of unit vectors is at least so long: facings may not contradict each other
+AGREEMENT = 0.6
 GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
-FAR, FARTHER = 100.0, 1000.0  # of a camera from its world's origin: no metres, and no centimetres either
+# of a camera from its world's origin: no metres, and no centimetres either
+FAR = 100.0
+FARTHER = 1000.0
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
 
@@ -39,9 +54,11 @@ class CameraView:
     masks: PackedMasks
     warnings: Sequence[str]
     name: str  # of the source
-    filmed: tuple[int, int] | None = None  # size of the video, where the masks were taken from one
+    # size of the video, where the masks were taken from one
+    filmed: tuple[int, int] | None = None
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
-    facings: Array | Sequence[float] = ()  # of each frame, as `Segmenter.facing`; NaN where unknown
+    # of each frame, as `Segmenter.facing`; NaN where unknown
+    facings: Array | Sequence[float] = ()
     moves: bool = False  # whether the camera seems to
 
 
@@ -66,11 +83,18 @@ def combined(
     if not stated and len(views[0].masks) > 1:
         guesses.append(f"{rate:g} frames a second")
     if not known:
-        guesses.append("a level camera, 40 degrees across: distances and sizes are as good as that")
+        guesses.append(
+            "a level camera, 40 degrees across: distances and sizes are as good as that"
+        )
     world, metres, of_cameras = world_of(known, up, unit)
-    unit_is_open = unit is None and any(isinstance(camera, Calibration) for camera in known)
+    unit_is_open = unit is None and any(
+        isinstance(camera, Calibration) for camera in known
+    )
     if known:
-        cameras, views = map(list, zip(*map(partial(_straight, world, metres), known, views), strict=True))
+        cameras, views = map(
+            list,
+            zip(*map(partial(_straight, world, metres), known, views), strict=True),
+        )
     else:
         cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].masks.size)]
     # several cameras distinguish front and back themselves
@@ -79,12 +103,18 @@ def combined(
     if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
         miss, tall = apparent
         if unit_is_open and np.median(tall) > 0.0:
-            likely_unit = unit_of_heights(float(np.median(tall)) / metres / body.stature)
+            likely_unit = unit_of_heights(
+                float(np.median(tall)) / metres / body.stature
+            )
             if METRES[likely_unit] != metres:
                 of_cameras["unit"] = f"the calibration is in {UNIT_NAMES[likely_unit]}"
             factor = METRES[likely_unit] / metres
-            cameras = [replace(camera, translation=factor * camera.translation) for camera in cameras]
-            miss, tall = factor * miss, factor * tall
+            cameras = [
+                replace(camera, translation=factor * camera.translation)
+                for camera in cameras
+            ]
+            miss = factor * miss
+            tall = factor * tall
         if wrong := disagreement(miss, tall, body.stature):
             raise InputError(f"{name}: {wrong}")
     first = observations[observations.first]
@@ -103,7 +133,8 @@ def combined(
         truth=None,
         observations=observations,
         placing="given" if known else "guessed",
-        warnings=[warning for view in views for warning in view.warnings] + _unequal(views),
+        warnings=[warning for view in views for warning in view.warnings]
+        + _unequal(views),
         guesses=[*guesses, *of_cameras.values()],
         pictures=views[0].pictures,
         first=views[0].masks.first,
@@ -111,7 +142,9 @@ def combined(
     )
 
 
-def _straight(world: Array, metres: float, known: Camera | Calibration, view: CameraView) -> tuple[Camera, CameraView]:
+def _straight(
+    world: Array, metres: float, known: Camera | Calibration, view: CameraView
+) -> tuple[Camera, CameraView]:
     """Return the camera of a view, and the view as a pinhole camera has it. Raises InputError where they do not fit."""
     size = view.masks.size
     if isinstance(known, Calibration):
@@ -119,15 +152,26 @@ def _straight(world: Array, metres: float, known: Camera | Calibration, view: Ca
         known = calibration.in_metres(metres).camera(size, world)
         if calibration.distorted:
             maps = calibration.maps(size)
-            pictures = None if view.pictures is None else partial(_straightened, view.pictures, maps)
-            view = replace(view, masks=undistorted(view.masks, calibration, maps), pictures=pictures)
+            pictures = (
+                None
+                if view.pictures is None
+                else partial(_straightened, view.pictures, maps)
+            )
+            view = replace(
+                view,
+                masks=undistorted(view.masks, calibration, maps),
+                pictures=pictures,
+            )
     if (known.width, known.height) != size:
         raise _of_another_size("", size, (known.width, known.height))
     return known, view
 
 
 def same_person(
-    known: Sequence[Camera | Calibration], first: CameraView, size: tuple[int, int], persons: Persons
+    known: Sequence[Camera | Calibration],
+    first: CameraView,
+    size: tuple[int, int],
+    persons: Persons,
 ) -> int:
     """Return the number of the person in another view who is followed in the first one.
 
@@ -135,9 +179,12 @@ def same_person(
     frames: rays of level cameras meet anyhow. `known` are the cameras of both, and `persons` are the people in the
     other's masks, which have a `size`.
     """
-    sizes, blank = (first.masks.size, size), np.zeros(size[::-1], dtype=bool)
+    sizes = (first.masks.size, size)
+    blank = np.zeros(size[::-1], dtype=bool)
     fitted = [
-        camera if first.filmed or isinstance(camera, Camera) else _fitting(camera, pixels, scaled=True)
+        camera
+        if first.filmed or isinstance(camera, Camera)
+        else _fitting(camera, pixels, scaled=True)
         for camera, pixels in zip(known, sizes, strict=True)
     ]
     cameras = [
@@ -146,7 +193,8 @@ def same_person(
     ]
     differences = list[float]()
     for person in persons:
-        pairs = list[tuple[float, Array]]()  # by how much rays miss each other, and the heights in both views
+        # by how much rays miss each other, and the heights in both views
+        pairs = list[tuple[float, Array]]()
         for k in np.flatnonzero(first.masks.usable).tolist():
             part = part_at(person, k)
             if part is not None and part.detections[k][1] is None:
@@ -155,7 +203,9 @@ def same_person(
                 pairs.append(apparent_size(cameras, [*map(_extent, fitted, views)]))
         heights = np.array([np.maximum(tall, 1e-9) for _, tall in pairs])
         misses = [miss / float(np.median(heights)) for miss, _ in pairs]
-        differences.append(float(np.median(misses) + np.std(np.log(heights))) if pairs else np.inf)
+        differences.append(
+            float(np.median(misses) + np.std(np.log(heights))) if pairs else np.inf
+        )
     return 1 + int(np.argmin(differences))
 
 
@@ -172,19 +222,34 @@ def world_of(
 ) -> tuple[Array, float, dict[str, str]]:
     """Return how the world of calibrations is turned upright, their unit in metres, and what is guessed of both."""
     calibrations = [camera for camera in known if isinstance(camera, Calibration)]
-    guesses = {"up": guess} if up is None and (guess := guessed_up(calibrations)) else {}
+    guesses = (
+        {"up": guess} if up is None and (guess := guessed_up(calibrations)) else {}
+    )
     distances = [
-        float(np.linalg.norm(place)) for calibration in calibrations if (place := calibration.translation) is not None
+        float(np.linalg.norm(place))
+        for calibration in calibrations
+        if (place := calibration.translation) is not None
     ]
     if unit is None and distances:
-        unit = "m" if max(distances) <= FAR else "cm" if max(distances) <= FARTHER else "mm"
-        if unit != "m" or not all(calibration.upright for calibration in calibrations):  # ours are in metres
+        unit = (
+            "m"
+            if max(distances) <= FAR
+            else "cm"
+            if max(distances) <= FARTHER
+            else "mm"
+        )
+        # ours are in metres
+        if unit != "m" or not all(calibration.upright for calibration in calibrations):
             guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
     for calibration in calibrations:
         if calibration.rotation is None:
-            guesses["place"] = "the camera stands level, which its calibration does not state"
+            guesses["place"] = (
+                "the camera stands level, which its calibration does not state"
+            )
         if calibration.size is None:
-            guesses["size"] = "the calibration is for pictures of this size, which it does not state"
+            guesses["size"] = (
+                "the calibration is for pictures of this size, which it does not state"
+            )
     return upright(calibrations, up), METRES[unit or "m"], guesses
 
 
@@ -199,21 +264,30 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
     `facings` (T,) are a segmenter's, as `Segmenter.facing`. Each frame gets the mean direction of the second around it,
     so that a few wrong ones do not count.
     """
-    values, reach = np.asarray(facings, dtype=np.float64), max(round(AROUND * fps), 1)
+    values = np.asarray(facings, dtype=np.float64)
+    reach = max(round(AROUND * fps), 1)
     towards = np.arctan2(-camera.rotation[2, 0], -camera.rotation[2, 2])
     known = np.isfinite(values)
     directions = np.where(known, np.exp(1j * (np.nan_to_num(values) + towards)), 0.0)
     around = [slice(max(k - reach, 0), k + reach + 1) for k in range(len(values))]
-    total, count = (np.array([each[rows].sum() for rows in around]) for each in (directions, known))
-    return np.where(np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9), np.angle(total), np.nan)
+    total, count = (
+        np.array([each[rows].sum() for rows in around]) for each in (directions, known)
+    )
+    return np.where(
+        np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9), np.angle(total), np.nan
+    )
 
 
 def _unequal(views: Sequence[CameraView]) -> list[str]:
     lengths = [len(view.masks) for view in views]
     if len(set(lengths)) == 1:
         return []
-    came = ", ".join(f"{view.name} {length}" for view, length in zip(views, lengths, strict=True))
-    return [f"the videos differ in length; the first {min(lengths)} frames are used of {came}"]
+    came = ", ".join(
+        f"{view.name} {length}" for view, length in zip(views, lengths, strict=True)
+    )
+    return [
+        f"the videos differ in length; the first {min(lengths)} frames are used of {came}"
+    ]
 
 
 def _rate(views: Sequence[CameraView], fps: float | None) -> tuple[float, bool]:
@@ -228,15 +302,21 @@ def _rate(views: Sequence[CameraView], fps: float | None) -> tuple[float, bool]:
             raise InputError(f"views must have the same frames, got {came}")
     if fps is not None:
         return fps, True
-    stated = [(view.masks.fps, view.name) for view in views if view.masks.fps is not None]
+    stated = [
+        (view.masks.fps, view.name) for view in views if view.masks.fps is not None
+    ]
     for rate, name in stated[1:]:
         if views[0].filmed is None and rate != stated[0][0]:
             came = f"{stated[0][0]:g} of {stated[0][1]} and {rate:g} of {name}"
-            raise InputError(f"views must have one frame rate, frames a second, got {came}")
+            raise InputError(
+                f"views must have one frame rate, frames a second, got {came}"
+            )
     return (stated[0][0], True) if stated else (FPS, False)
 
 
-def place_of(silhouettes: Sequence[Silhouette], cameras: Sequence[Camera], stature: float) -> Array:
+def place_of(
+    silhouettes: Sequence[Silhouette], cameras: Sequence[Camera], stature: float
+) -> Array:
     """Return about where (3,) the root of a person of so many metres is, whom one camera or several see."""
     shown = [
         (camera, *extent_of(silhouette))
@@ -244,19 +324,25 @@ def place_of(silhouettes: Sequence[Silhouette], cameras: Sequence[Camera], statu
         if silhouette.mask.any()
     ]
     if len(shown) > 1:
-        return meeting([camera for camera, _, _ in shown], [middle for _, middle, _ in shown])[0]
+        return meeting(
+            [camera for camera, _, _ in shown], [middle for _, middle, _ in shown]
+        )[0]
     camera, middle, tall = shown[0]
     depth = camera.focal[1] * stature / tall
     place = np.array([*((middle - camera.centre) / camera.focal * depth), depth])
     return np.asarray(camera.rotation.T @ (place - camera.translation))
 
 
-def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]) -> Iterator[Image]:
+def _straightened(
+    pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
+) -> Iterator[Image]:
     for image in pictures():
         yield np.asarray(cv2.remap(image, *maps, cv2.INTER_LINEAR), dtype=np.uint8)
 
 
-def listed(cameras: Sequence[Camera | Calibration | str | Path]) -> list[Camera | Calibration]:
+def listed(
+    cameras: Sequence[Camera | Calibration | str | Path],
+) -> list[Camera | Calibration]:
     """Return cameras, those of files read; a file with several cameras serves for several views, in its order.
 
     Raises InputError where a file is one of masks.
@@ -265,49 +351,85 @@ def listed(cameras: Sequence[Camera | Calibration | str | Path]) -> list[Camera 
     for camera in cameras:
         if isinstance(camera, Camera | Calibration):
             known.append(camera)
-        elif (suffix := Path(camera).suffix.lower()) in (*IMAGES, *ARRAYS) or Path(camera).is_dir():
-            came = "a file of masks" if suffix in ARRAYS else "an image" if suffix in IMAGES else "a folder"
-            raise InputError(f"{camera}: expected a calibration of the camera, got {came}")
+        elif (suffix := Path(camera).suffix.lower()) in (*IMAGES, *ARRAYS) or Path(
+            camera
+        ).is_dir():
+            came = (
+                "a file of masks"
+                if suffix in ARRAYS
+                else "an image"
+                if suffix in IMAGES
+                else "a folder"
+            )
+            raise InputError(
+                f"{camera}: expected a calibration of the camera, got {came}"
+            )
         else:
             known += read_calibrations(camera)
     return known
 
 
 def calibrated(
-    cameras: Sequence[Camera | Calibration | str | Path], filmed: Sequence[tuple[int, int] | None]
+    cameras: Sequence[Camera | Calibration | str | Path],
+    filmed: Sequence[tuple[int, int] | None],
 ) -> list[Camera | Calibration]:
     """Return the cameras of as many views, none for a single view without one; `filmed` are the sizes of videos.
 
     Raises InputError where cameras and views do not fit each other.
     """
-    known, views = listed(cameras), len(filmed)
+    known = listed(cameras)
+    views = len(filmed)
     if not known and views > 1:
-        raise InputError(f"camera must be given for each of several views, {views}, got none")
+        raise InputError(
+            f"camera must be given for each of several views, {views}, got none"
+        )
     if known and len(known) != views:
-        names = ", ".join(camera.name for camera in known if isinstance(camera, Calibration))
-        chosen = f": {cut(names)}; FILE:NAME is one of a file" if len(known) > views and names else ""
-        raise InputError(f"camera must be given for each view, {views}, got {len(known)}{chosen}")
-    if views > 1 and any(isinstance(camera, Calibration) and camera.rotation is None for camera in known):
-        raise InputError("camera must say where each of several cameras stands, got a file without rotation")
+        names = ", ".join(
+            camera.name for camera in known if isinstance(camera, Calibration)
+        )
+        chosen = (
+            f": {cut(names)}; FILE:NAME is one of a file"
+            if len(known) > views and names
+            else ""
+        )
+        raise InputError(
+            f"camera must be given for each view, {views}, got {len(known)}{chosen}"
+        )
+    if views > 1 and any(
+        isinstance(camera, Calibration) and camera.rotation is None for camera in known
+    ):
+        raise InputError(
+            "camera must say where each of several cameras stands, got a file without rotation"
+        )
     return [
-        _fitting(camera, size) if isinstance(camera, Calibration) and size is not None else camera
+        _fitting(camera, size)
+        if isinstance(camera, Calibration) and size is not None
+        else camera
         for camera, size in zip(known, filmed, strict=False)
     ]
 
 
-def _fitting(calibration: Calibration, size: tuple[int, int], *, scaled: bool = False) -> Calibration:
+def _fitting(
+    calibration: Calibration, size: tuple[int, int], *, scaled: bool = False
+) -> Calibration:
     """Return the calibration of pictures of a size, or of this shape where they may be scaled; else InputError."""
     padded = calibration.padded(size)
     if padded is not None:
         return padded
     if calibration.size is None:
         middle = "x".join(f"{value:g}" for value in calibration.matrix[:2, 2])
-        raise InputError(f"camera {quoted(calibration.name)} must be of {size[0]}x{size[1]}, got a centre of {middle}")
+        raise InputError(
+            f"camera {quoted(calibration.name)} must be of {size[0]}x{size[1]}, got a centre of {middle}"
+        )
     width, height = calibration.size
     if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
         return calibration
     raise _of_another_size(f" {quoted(calibration.name)}", size, (width, height))
 
 
-def _of_another_size(name: str, size: tuple[int, int], came: tuple[int, int]) -> InputError:
-    return InputError(f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {came[0]}x{came[1]}")
+def _of_another_size(
+    name: str, size: tuple[int, int], came: tuple[int, int]
+) -> InputError:
+    return InputError(
+        f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {came[0]}x{came[1]}"
+    )

@@ -33,15 +33,20 @@ def extract(
     target = Path(out)
     check_new(target)
     opencv_name(target)  # a name that it cannot write is refused before the work
-    video, how = Video.of(source), how or Extraction()
+    video = Video.of(source)
+    how = how or Extraction()
     segmentation = Segmentation(video, how, frames)
     with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
         masks, rows, _, warnings, *_ = segmentation.read(progress)
         with VideoWriter(building / "preview.mp4", video.fps, masks.size) as preview:
-            for k, image in enumerate(video.frames(segmentation.start, segmentation.stop, masks.size)):
-                preview.write(_painted(image, masks.silhouette(k), bool(masks.usable[k])))
+            for k, image in enumerate(
+                video.frames(segmentation.start, segmentation.stop, masks.size)
+            ):
+                preview.write(
+                    _painted(image, masks.silhouette(k), bool(masks.usable[k]))
+                )
         _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(rows[0]))
@@ -63,14 +68,26 @@ def extract(
 
 def _write_npz(path: Path, masks: PackedMasks) -> None:
     """Write masks.npz frame by frame, as there may be more than memory holds unpacked."""
-    header = {"descr": "|u1", "fortran_order": False, "shape": (len(masks), masks.size[1], masks.size[0])}
+    header = {
+        "descr": "|u1",
+        "fortran_order": False,
+        "shape": (len(masks), masks.size[1], masks.size[0]),
+    }
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for kind, attribute in (("masks", "mask"), ("valid", "valid")):
             with archive.open(f"{kind}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_1_0(member, header)
                 for k in range(len(masks)):
-                    member.write(getattr(masks.silhouette(k), attribute).astype(np.uint8).tobytes())
-        rest = {"usable": masks.usable, "fps": np.array(masks.fps), "landmarks": masks.landmarks}
+                    member.write(
+                        getattr(masks.silhouette(k), attribute)
+                        .astype(np.uint8)
+                        .tobytes()
+                    )
+        rest = {
+            "usable": masks.usable,
+            "fps": np.array(masks.fps),
+            "landmarks": masks.landmarks,
+        }
         for name, value in rest.items():
             if value is None:
                 continue

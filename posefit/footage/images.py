@@ -22,11 +22,15 @@ LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
 FORMATS = "PNG, JPEG, BMP, TIFF, PGM, GIF or WebP"
 _JPEG = ("JPEG", "MPO")  # the latter of phones, with a preview
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "GIF", "WEBP")  # as Pillow calls them
-COLOUR_RANGE, COLOUR_SHARE = 32, 0.02  # of 255, and the share of an image's pixels: with more it is no grey one
+# of 255, and the share of an image's pixels: with more it is no grey one
+COLOUR_RANGE = 32
+COLOUR_SHARE = 0.02
 CHROMA_RANGE = 15  # the same, as a JPEG has it
 MANY_COLOURS = 64  # a picture of a place has more; so many labels are rare
-_GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")  # as Pillow calls what has no colours
-logging.getLogger("PIL").addHandler(logging.NullHandler())  # what is wrong with a file is reported by posefit
+# as Pillow calls what has no colours
+_GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")
+# what is wrong with a file is reported by posefit
+logging.getLogger("PIL").addHandler(logging.NullHandler())
 
 
 T = TypeVar("T")
@@ -35,7 +39,9 @@ T = TypeVar("T")
 class Marks(NamedTuple):
     """The values by which a picture marks a person, and of which kind they are."""
 
-    values: NDArray[Any]  # (height, width): grey levels, an alpha channel, indices of a palette, or colours 0xRRGGBB
+    # (height, width): grey levels, an alpha channel, indices of a palette, or colours
+    # 0xRRGGBB
+    values: NDArray[Any]
     soft: bool = False  # whether they are degrees
     photo: bool = False  # a picture in many colours
 
@@ -48,7 +54,9 @@ def read_image(path: str | Path, grey: bool, page: int = 0) -> NDArray[np.uint8]
     return next(_decoded(Path(path), [page], _grey if grey else _colours), None)
 
 
-def read_marks(path: Path, pages: Sequence[int] = (0,), labelled: bool = False) -> Iterator[Marks]:
+def read_marks(
+    path: Path, pages: Sequence[int] = (0,), labelled: bool = False
+) -> Iterator[Marks]:
     """Yield the values by which the pages of a file mark a person; nothing, or too few, where it is no picture.
 
     They are its alpha channel, where it has one that is not all opaque and no label is wanted; else the indices of a
@@ -61,19 +69,29 @@ def page_count(path: Path) -> int:
     """Return how many pictures a file holds; 1 where it is none."""
     if path.suffix.lower() not in PAGED:
         return 1
-    return next(_decoded(path, [0], lambda image: int(getattr(image, "n_frames", 1))), 1)
+    return next(
+        _decoded(path, [0], lambda image: int(getattr(image, "n_frames", 1))), 1
+    )
 
 
 @lru_cache(maxsize=64)
 def is_photo(path: Path) -> bool:
     """Return whether a file is a picture in many colours, without alpha channel: of a place, not of a person's mask."""
     try:
-        return any(_decoded(path, [0], lambda image: image.mode not in _GREY and _marks(image, False).photo))
+        return any(
+            _decoded(
+                path,
+                [0],
+                lambda image: image.mode not in _GREY and _marks(image, False).photo,
+            )
+        )
     except InputError:  # raised again where it is read
         return False
 
 
-def _decoded(path: Path, pages: Sequence[int], decode: Callable[[Image.Image], T]) -> Iterator[T]:
+def _decoded(
+    path: Path, pages: Sequence[int], decode: Callable[[Image.Image], T]
+) -> Iterator[T]:
     """Yield what `decode` makes of pages of a file; no more where there is none. Raises InputError for large ones."""
     if not path.is_file():
         return
@@ -89,7 +107,9 @@ def _decoded(path: Path, pages: Sequence[int], decode: Callable[[Image.Image], T
                     if page:
                         image.seek(page)
                     if image.width * image.height > PIXELS:
-                        raise InputError(f"{expected}, got {image.width}x{image.height}")
+                        raise InputError(
+                            f"{expected}, got {image.width}x{image.height}"
+                        )
                     yield decode(image)
     except Image.DecompressionBombError:
         raise InputError(f"{expected}, got far more") from None
@@ -101,7 +121,9 @@ def _decoded(path: Path, pages: Sequence[int], decode: Callable[[Image.Image], T
 
 def _grey(image: Image.Image) -> NDArray[np.uint8]:
     if image.format not in _JPEG:
-        return np.asarray(cv2.cvtColor(_colours(image), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return np.asarray(
+            cv2.cvtColor(_colours(image), cv2.COLOR_BGR2GRAY), dtype=np.uint8
+        )
     image.draft("L", None)  # which a JPEG has by itself
     return np.asarray(ImageOps.exif_transpose(image).convert("L"))
 
@@ -115,14 +137,19 @@ def _colours(image: Image.Image) -> NDArray[np.uint8]:
 
 def _marks(image: Image.Image, labelled: bool) -> Marks:
     if image.format in _JPEG:
-        if image.mode == "RGB":  # as which a JPEG has brightness and two distances from grey
+        # as which a JPEG has brightness and two distances from grey
+        if image.mode == "RGB":
             image.draft("YCbCr", None)
         image = ImageOps.exif_transpose(image)
         if image.mode != "YCbCr":
             return Marks(np.asarray(image.convert("L")), soft=True)
         bright, *chroma = (np.asarray(channel) for channel in image.split())
-        off = np.maximum(*(cv2.absdiff(channel, np.full_like(channel, 128)) for channel in chroma))
-        return Marks(bright, soft=True, photo=bool((off > CHROMA_RANGE).mean() > COLOUR_SHARE))
+        off = np.maximum(
+            *(cv2.absdiff(channel, np.full_like(channel, 128)) for channel in chroma)
+        )
+        return Marks(
+            bright, soft=True, photo=bool((off > CHROMA_RANGE).mean() > COLOUR_SHARE)
+        )
     if not labelled and image.has_transparency_data:
         alpha = np.asarray(image.convert("RGBA").getchannel("A"))
         if (alpha != np.iinfo(alpha.dtype).max).any():
@@ -133,7 +160,9 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
         grey = np.asarray(image)
         return Marks(grey.astype(grey.dtype.newbyteorder("=")))
     colours = np.asarray(image.convert("RGB"))
-    if (colours[..., 0] == colours[..., 1]).all() and (colours[..., 0] == colours[..., 2]).all():
+    if (colours[..., 0] == colours[..., 1]).all() and (
+        colours[..., 0] == colours[..., 2]
+    ).all():
         return Marks(colours[..., 0])
     if image.format == "WEBP" and not _is_colourful(colours):
         return Marks(np.asarray(image.convert("L")), soft=True)
@@ -143,7 +172,11 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
     for channel in (1, 2):
         numbers <<= 8
         numbers |= colours[..., channel]
-    return Marks(numbers, photo=_is_colourful(colours) and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS)
+    return Marks(
+        numbers,
+        photo=_is_colourful(colours)
+        and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS,
+    )
 
 
 def _is_colourful(colours: NDArray[np.uint8]) -> bool:

@@ -50,7 +50,9 @@ class LiveMask:
     valid: Mask = field(repr=False)
     usable: bool  # whether it shows enough of the person to be searched
     # (27, 3), see `Segmenter`; 0 where it gives none
-    landmarks: Array = field(default_factory=lambda: np.zeros((len(JOINTS), 3)), repr=False)
+    landmarks: Array = field(
+        default_factory=lambda: np.zeros((len(JOINTS), 3)), repr=False
+    )
 
 
 class Stream:
@@ -62,7 +64,9 @@ class Stream:
     """
 
     def __init__(self, source: str, pipe: BinaryIO | None = None) -> None:
-        self.name, self.fps, self.count = source, FPS, 0
+        self.name = source
+        self.fps = FPS
+        self.count = 0
         self.rate: float | None = None  # frames a second, where the source states them
         self._latest: LiveImage | None = None
         self._ended = False
@@ -79,7 +83,9 @@ class Stream:
             address = name if os.path.exists(name) else source
             capture = cv2.VideoCapture(int(source) if source.isdigit() else address)
             if not capture.isOpened():
-                raise InputError(f"live must be a device or an address that can be opened, or -, got {quoted(source)}")
+                raise InputError(
+                    f"live must be a device or an address that can be opened, or -, got {quoted(source)}"
+                )
             rate = capture.get(cv2.CAP_PROP_FPS)
             self.rate = rate if np.isfinite(rate) and 1.0 <= rate <= 1000.0 else None
             self.fps = self.rate or FPS
@@ -89,12 +95,17 @@ class Stream:
     def __iter__(self) -> Iterator[LiveImage]:
         while True:
             with self._changed:
-                came = self._changed.wait_for(lambda: self._latest is not None or self._ended, STALL_SECONDS)
-                image, self._latest = self._latest, None
+                came = self._changed.wait_for(
+                    lambda: self._latest is not None or self._ended, STALL_SECONDS
+                )
+                image = self._latest
+                self._latest = None
             if image is not None:
                 yield image
             elif not came:
-                raise InputError(f"{self.name}: expected a frame, got none for {STALL_SECONDS:g} s")
+                raise InputError(
+                    f"{self.name}: expected a frame, got none for {STALL_SECONDS:g} s"
+                )
             elif self._error is not None:
                 raise self._error
             else:
@@ -122,10 +133,14 @@ def netpbm_images(stream: BinaryIO) -> Iterator[Image]:
     """
     while magic := stream.read(2):
         if magic not in (b"P5", b"P6"):
-            raise InputError(f"expected binary PGM or PPM images, got {quoted(magic.decode('latin-1'))}")
+            raise InputError(
+                f"expected binary PGM or PPM images, got {quoted(magic.decode('latin-1'))}"
+            )
         width, height, most = (_number(stream) for _ in range(3))
         if not (0 < width * height <= PIXELS and most == 255):
-            raise InputError(f"expected an image of at most {PIXELS // 10**6} million pixels in 255 levels")
+            raise InputError(
+                f"expected an image of at most {PIXELS // 10**6} million pixels in 255 levels"
+            )
         shape = (height, width) if magic == b"P5" else (height, width, 3)
         values = stream.read(int(np.prod(shape)))
         if len(values) < np.prod(shape):
@@ -157,7 +172,9 @@ def _captured(capture: Any) -> Iterator[Image]:
     capture.release()
 
 
-def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None]) -> Iterator[LiveMask]:
+def live_masks(
+    stream: Stream, how: Extraction | None, log: Callable[[str], None]
+) -> Iterator[LiveMask]:
     """Yield the person in the frames of a stream: grey frames are masks; others are segmented.
 
     By default each pixel's background is its mean over the first three seconds, which have to show the empty scene.
@@ -167,16 +184,23 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
     if first.image.ndim == 2:
         for live in chain([first], images):
             mask = live.image > MASK_LEVEL
-            yield LiveMask(live, mask, np.ones_like(mask), bool(mask.any() and not mask.all()))
+            yield LiveMask(
+                live, mask, np.ones_like(mask), bool(mask.any() and not mask.all())
+            )
         return
     learned = [first.image]
     if how is None:
         log(f"learning the background: keep the scene empty for {EMPTY_SECONDS:g} s")
-        learned += [live.image for live in islice(images, round(EMPTY_SECONDS * stream.fps) - 1)]
+        learned += [
+            live.image for live in islice(images, round(EMPTY_SECONDS * stream.fps) - 1)
+        ]
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    segmenter, quality = PersonSegmenter(Video.of_images(learned, Path(stream.name), stream.fps), how), None
+    segmenter = PersonSegmenter(
+        Video.of_images(learned, Path(stream.name), stream.fps), how
+    )
+    quality = None
     for live in images:
         image = scaled(live.image, segmenter.size)
         (person, *_), _, landmarks = segmenter.frame(image)
@@ -191,8 +215,12 @@ def _of_one_size(stream: Stream) -> Iterator[LiveImage]:
     for live in stream:
         first = first or live
         if live.image.shape != first.image.shape:
-            expected, came = ("x".join(map(str, frame.image.shape[1::-1])) for frame in (first, live))
-            raise InputError(f"{stream.name}: expected frames of {expected}, got {came}")
+            expected, came = (
+                "x".join(map(str, frame.image.shape[1::-1])) for frame in (first, live)
+            )
+            raise InputError(
+                f"{stream.name}: expected frames of {expected}, got {came}"
+            )
         yield live
     if first is None:
         raise InputError(f"{stream.name}: expected frames, got none")

@@ -19,7 +19,8 @@ from posefit.silhouette.mask import Silhouette
 
 ARRAYS = (".npz", ".npy")  # files of masks
 Range = tuple[int | None, int | None]
-Planes = NDArray[np.uint8]  # (T, bytes): of each frame the bits of its pixels, row by row
+# (T, bytes): of each frame the bits of its pixels, row by row
+Planes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +30,13 @@ class PackedMasks:
     names: Sequence[str] = field(repr=False)  # (T,) of the frames, for messages
     size: tuple[int, int]  # width and height
     masks: Planes = field(repr=False)
-    valid: Planes | None = field(repr=False)  # which pixels are known; None where all are
-    usable: NDArray[np.bool_] = field(repr=False)  # (T,) whether a frame shows enough of the person to be searched
+    # which pixels are known; None where all are
+    valid: Planes | None = field(repr=False)
+    # (T,) whether a frame shows enough of the person to be searched
+    usable: NDArray[np.bool_] = field(repr=False)
     fps: float | None = None  # None where the source does not state it
-    landmarks: Array | None = field(default=None, repr=False)  # (T, 27, 3), see `Segmenter`; None where there are none
+    # (T, 27, 3), see `Segmenter`; None where there are none
+    landmarks: Array | None = field(default=None, repr=False)
     first: int = 0  # the number of the first frame in the footage
     guesses: Sequence[str] = ()  # what the source does not state
 
@@ -48,12 +52,15 @@ class PackedMasks:
 def unpacked(bits: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Return the mask (height, width) of a frame's bits."""
     width, height = size
-    return np.unpackbits(bits, count=width * height).reshape(height, width).view(np.bool_)
+    return (
+        np.unpackbits(bits, count=width * height).reshape(height, width).view(np.bool_)
+    )
 
 
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     """Return room for so many masks. Raises InputError where that is more memory than this process may have."""
-    octets, most = (size[0] * size[1] + 7) // 8, allowed_bytes()
+    octets = (size[0] * size[1] + 7) // 8
+    most = allowed_bytes()
     if count * octets > most:
         raise InputError(
             f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of memory, "
@@ -62,16 +69,21 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     return np.empty((count, octets), dtype=np.uint8)
 
 
-def undistorted(masks: PackedMasks, calibration: Calibration, maps: tuple[Any, Any]) -> PackedMasks:
+def undistorted(
+    masks: PackedMasks, calibration: Calibration, maps: tuple[Any, Any]
+) -> PackedMasks:
     """Return masks, and landmarks, as of a pinhole camera; pixels that the lens did not cover are unknown.
 
     `maps` are those of the calibration for pictures of the masks' size.
     """
-    straight, valid = empty_planes(len(masks), masks.size), empty_planes(len(masks), masks.size)
+    straight = empty_planes(len(masks), masks.size)
+    valid = empty_planes(len(masks), masks.size)
     for k in range(len(masks)):
         silhouette = masks.silhouette(k)
         for planes, plane in ((straight, silhouette.mask), (valid, silhouette.valid)):
-            planes[k] = np.packbits(cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) != 0)
+            planes[k] = np.packbits(
+                cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) != 0
+            )
     bent = masks.landmarks
     landmarks = None if bent is None else calibration.straightened(bent, masks.size)
     return replace(masks, masks=straight, valid=valid, landmarks=landmarks)
@@ -100,7 +112,12 @@ class Views(Sequence[Observation]):
         landmarks = None
         if any(masks.landmarks is not None for masks in self.masks):
             unknown = np.zeros((len(JOINTS), 3))
-            landmarks = np.array([unknown if view.landmarks is None else view.landmarks[k] for view in self.masks])
+            landmarks = np.array(
+                [
+                    unknown if view.landmarks is None else view.landmarks[k]
+                    for view in self.masks
+                ]
+            )
         yaw = float(self.yaws[k]) if known else None
         return Observation(silhouettes, usable=usable, yaw=yaw, landmarks=landmarks)
 
@@ -111,7 +128,9 @@ class Views(Sequence[Observation]):
             for k in range(len(self)):
                 if enough(masks.usable[k] for masks in self.masks):
                     return k
-        raise InputError(f"{self.masks[0].names[0]}: expected a frame that is usable, got none from there on")
+        raise InputError(
+            f"{self.masks[0].names[0]}: expected a frame that is usable, got none from there on"
+        )
 
     def _silhouette(self, masks: PackedMasks, k: int) -> Silhouette:
         silhouette = masks.silhouette(k)
@@ -125,5 +144,7 @@ def span(frames: Range, count: int) -> tuple[int, int]:
     start, stop, _ = slice(*frames).indices(count)
     if start >= stop:
         low, high = ("" if value is None else value for value in frames)
-        raise InputError(f"frames must choose some of the {count} frames, got {low}:{high}")
+        raise InputError(
+            f"frames must choose some of the {count} frames, got {low}:{high}"
+        )
     return start, stop

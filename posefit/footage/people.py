@@ -20,7 +20,8 @@ from posefit.silhouette.mask import Mask, padded_box
 MAX_STEP = 1.0  # times the height: farther from where they are expected a person is not
 MAX_GAP_SECONDS = 1.0  # without a detection, after which a person is another one
 MEMORY = 0.8  # of the last step, size and colours that is kept with each frame
-COVERED = 0.3  # of where a person is expected: a blob that covers so much shows them, too
+# of where a person is expected: a blob that covers so much shows them, too
+COVERED = 0.3
 SLACK = 0.04  # of the height: so far around where they are expected people may be
 AROUND = 0.3  # of the height: so far around where they are a network looks for a person
 LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
@@ -60,26 +61,38 @@ class _Blob:
         self.place = np.array([moments["m10"], moments["m01"]]) / max(self.area, 1.0)
         rows = np.flatnonzero(mask.any(axis=1))
         self.height = float(np.ptp(rows)) + 1.0
-        self.colours = np.zeros(6)  # blue, green and red of the upper half, and of the lower
+        # blue, green and red of the upper half, and of the lower
+        self.colours = np.zeros(6)
         if image is not None:
-            middle, halves = int(self.place[1]), (mask.copy(), mask.copy())
+            middle = int(self.place[1])
+            halves = (mask.copy(), mask.copy())
             halves[0][middle:], halves[1][:middle] = False, False
-            self.colours = np.concatenate([cv2.mean(image, half.astype(np.uint8))[:3] for half in halves])
+            self.colours = np.concatenate(
+                [cv2.mean(image, half.astype(np.uint8))[:3] for half in halves]
+            )
 
 
 class Tracklet:
     """One person of a film, from where they are visible first until they are lost."""
 
     def __init__(self, blob: _Blob, frame: int) -> None:
-        self.detections: dict[int, tuple[Cut, Cut | None]] = {}  # by frame: their mask, and what is unknown of a blob
+        # by frame: their mask, and what is unknown of a blob
+        self.detections: dict[int, tuple[Cut, Cut | None]] = {}
         self.rows: dict[int, dict[str, Any]] = {}  # by frame, of `FrameQuality`
         self.quality: Any = None
-        self.first = (frame, *blob.place.tolist())  # where they are visible first: frame, across and down
-        self.latest, self.last = blob, frame  # the latest blob that shows them alone, and its frame
+        # where they are visible first: frame, across and down
+        self.first = (frame, *blob.place.tolist())
+        # the latest blob that shows them alone, and its frame
+        self.latest = blob
+        self.last = frame
         self.alone = 0  # frames that show them alone
-        self.height, self.area, self.colours = blob.height, blob.area, blob.colours  # smoothed over these
+        # smoothed over these
+        self.height = blob.height
+        self.area = blob.area
+        self.colours = blob.colours
         self._step = np.zeros(2)  # pixels a frame
-        self._usable, self._large = 0, False
+        self._usable = 0
+        self._large = False
 
     def expected(self, frame: int) -> Array:
         """Return where (2,) their middle is expected."""
@@ -89,12 +102,20 @@ class Tracklet:
         """Return how far a blob is from what is expected, in heights; infinite where it is too far away."""
         away = float(np.linalg.norm(blob.place - self.expected(frame))) / self.height
         colour = float(np.abs(blob.colours - self.colours).mean()) / 100.0
-        return away + COLOUR * colour + AREA * abs(np.log(blob.area / self.area)) if away <= MAX_STEP else np.inf
+        return (
+            away + COLOUR * colour + AREA * abs(np.log(blob.area / self.area))
+            if away <= MAX_STEP
+            else np.inf
+        )
 
     def outline(self, frame: int) -> Mask:
         """Return where they are expected, and a little around."""
-        (across, down), width = self.expected(frame) - self.latest.place, 2 * round(SLACK * self.height) + 1
-        shift, mask = np.array([[1.0, 0.0, across], [0.0, 1.0, down]]), self.latest.mask.astype(np.uint8)
+        (across, down), width = (
+            self.expected(frame) - self.latest.place,
+            2 * round(SLACK * self.height) + 1,
+        )
+        shift = np.array([[1.0, 0.0, across], [0.0, 1.0, down]])
+        mask = self.latest.mask.astype(np.uint8)
         moved = cv2.warpAffine(mask, shift, mask.shape[::-1], flags=cv2.INTER_NEAREST)
         return cv2.dilate(moved, np.ones((width, width), dtype=np.uint8)) > 0
 
@@ -105,14 +126,22 @@ class Tracklet:
             share = MEMORY if self.alone > 1 else 0.0
             self._step = share * self._step + (1.0 - share) * step
             for name in ("area", "colours", "height"):
-                setattr(self, name, MEMORY * getattr(self, name) + (1.0 - MEMORY) * getattr(blob, name))
-        self.alone, self.last, self.latest = self.alone + 1, frame, blob
+                setattr(
+                    self,
+                    name,
+                    MEMORY * getattr(self, name) + (1.0 - MEMORY) * getattr(blob, name),
+                )
+        self.alone = self.alone + 1
+        self.last = frame
+        self.latest = blob
         self._large = self._large or self.height > LARGE * len(blob.mask)
         self.detections[frame] = cut_out(blob.mask), None
 
     def confirmed(self, least: float = MIN_DETECTIONS) -> bool:
         """Return whether they are visible so often, and as a person, that they are no noise."""
-        return self._large and (self._usable if self.rows else self.alone) >= min(MIN_DETECTIONS, least)
+        return self._large and (self._usable if self.rows else self.alone) >= min(
+            MIN_DETECTIONS, least
+        )
 
     def add_row(self, frame: int, row: dict[str, Any]) -> None:
         """Take the row of `FrameQuality` of a frame."""
@@ -130,28 +159,36 @@ class People:
     def __init__(self, fps: float) -> None:
         self.tracklets: list[Tracklet] = []
         self.active: list[Tracklet] = []  # those who may be in the next frame
-        self._frame, self._patience = -1, MAX_GAP_SECONDS * fps
+        self._frame = -1
+        self._patience = MAX_GAP_SECONDS * fps
 
     def add(self, masks: Sequence[Mask], image: Image | None = None) -> list[Tracklet]:
         """Return who is in the next frame, of which the blobs (height, width) are the largest first."""
         self._frame += 1
-        frame, blobs = self._frame, [_Blob(mask, image) for mask in masks]
+        frame = self._frame
+        blobs = [_Blob(mask, image) for mask in masks]
         active = []
         for tracklet in self.active:
             if frame - max(tracklet.detections) <= self._patience:
                 active.append(tracklet)
             else:
                 # only the next frame would need them, and memory would grow with noise
-                tracklet.latest.mask, tracklet.quality = np.empty((0, 0), dtype=bool), None
+                tracklet.latest.mask = np.empty((0, 0), dtype=bool)
+                tracklet.quality = None
         owners = _owners(active, blobs, frame)
-        confirmed = [tracklet for tracklet in active if tracklet.confirmed() and tracklet not in owners.values()]
+        confirmed = [
+            tracklet
+            for tracklet in active
+            if tracklet.confirmed() and tracklet not in owners.values()
+        ]
         outlines = [tracklet.outline(frame) for tracklet in confirmed] if blobs else []
         present = []
         for k, blob in enumerate(blobs):
             hidden = [
                 tracklet
                 for tracklet, outline in zip(confirmed, outlines, strict=True)
-                if tracklet.area >= RIVAL_AREA * blob.area and (outline & blob.mask).sum() > COVERED * outline.sum()
+                if tracklet.area >= RIVAL_AREA * blob.area
+                and (outline & blob.mask).sum() > COVERED * outline.sum()
             ]
             owner = owners.get(k)
             if owner is None and not hidden:
@@ -170,22 +207,34 @@ class People:
 
     def persons(self) -> Persons:
         """Return the people, the longest and steadiest first: those parts of each that follow each other in time."""
-        persons, least = Persons(), 0.5 * (self._frame + 1)
-        for tracklet in sorted(self.tracklets, key=lambda tracklet: tracklet.score, reverse=True):
+        persons = Persons()
+        least = 0.5 * (self._frame + 1)
+        for tracklet in sorted(
+            self.tracklets, key=lambda tracklet: tracklet.score, reverse=True
+        ):
             apart = [
                 person
                 for person in persons
-                if not any(tracklet.detections.keys() & part.detections.keys() for part in person)
+                if not any(
+                    tracklet.detections.keys() & part.detections.keys()
+                    for part in person
+                )
             ]
             if apart and tracklet.confirmed(least):
-                min(apart, key=lambda person: min(_distance(tracklet, part) for part in person)).append(tracklet)
+                min(
+                    apart,
+                    key=lambda person: min(
+                        _distance(tracklet, part) for part in person
+                    ),
+                ).append(tracklet)
             else:
                 persons.append([tracklet])
         scores = [sum(part.score for part in person) for person in persons]
         confirmed = [
             k
             for k, person in enumerate(persons)
-            if scores[k] >= MIN_SCORE * max(scores) and any(part.confirmed(least) for part in person)
+            if scores[k] >= MIN_SCORE * max(scores)
+            and any(part.confirmed(least) for part in person)
         ]
         if not confirmed:  # whatever there is
             return [[part for person in persons for part in person]] if persons else []
@@ -193,10 +242,15 @@ class People:
 
     def others(self, parts: Sequence[Tracklet]) -> list[Tracklet]:
         """Return the parts of all people but those of one."""
-        return [part for person in self.persons() for part in person if part not in parts]
+        return [
+            part for person in self.persons() for part in person if part not in parts
+        ]
 
     def chosen(
-        self, choice: Choice | Chooser | None, name: Callable[[int], str], scale: float = 1.0
+        self,
+        choice: Choice | Chooser | None,
+        name: Callable[[int], str],
+        scale: float = 1.0,
     ) -> tuple[list[Tracklet], str]:
         """Return the parts of the person who is followed, and what there is to say where there are several.
 
@@ -206,35 +260,55 @@ class People:
         persons = self.persons()
         if not persons:
             return [], ""
-        where = [person[0].first for person in persons]  # of the part that shows them best: the others may be noise
-        number, other = 1, "--person N another"
+        # of the part that shows them best: the others may be noise
+        where = [person[0].first for person in persons]
+        number = 1
+        other = "--person N another"
         if callable(choice):
-            number, other = choice(persons), "as by the first camera"
+            number = choice(persons)
+            other = "as by the first camera"
         elif isinstance(choice, int):
             number = choice
         elif choice is not None:
-            away = [np.hypot(scale * across - choice[0], scale * down - choice[1]) for _, across, down in where]
+            away = [
+                np.hypot(scale * across - choice[0], scale * down - choice[1])
+                for _, across, down in where
+            ]
             number = 1 + int(np.argmin(away))
         if not 1 <= number <= len(persons):
-            raise InputError(f"person must be 1 to {len(persons)}, as many people as there are, got {number}")
+            raise InputError(
+                f"person must be 1 to {len(persons)}, as many people as there are, got {number}"
+            )
         if len(persons) == 1:
             return persons[0], ""
-        spots = [f"{scale * across:.0f},{scale * down:.0f} in {name(frame)}" for frame, across, down in where]
+        spots = [
+            f"{scale * across:.0f},{scale * down:.0f} in {name(frame)}"
+            for frame, across, down in where
+        ]
         listed = "; ".join(f"{k} at {spot}" for k, spot in enumerate(spots, 1))
         words = f"{len(persons)} people: {listed}; person {number} is followed, {other}"
         return persons[number - 1], words
 
 
-def _owners(tracklets: Sequence[Tracklet], blobs: Sequence[_Blob], frame: int) -> dict[int, Tracklet]:
+def _owners(
+    tracklets: Sequence[Tracklet], blobs: Sequence[_Blob], frame: int
+) -> dict[int, Tracklet]:
     """Return whose each blob is, by its number, so that all are as near as possible to where they are expected."""
-    from scipy.optimize import linear_sum_assignment  # takes a tenth of a second to import
+    # takes a tenth of a second to import
+    from scipy.optimize import linear_sum_assignment
 
-    distances = np.array([[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets])
+    distances = np.array(
+        [[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets]
+    )
     if not distances.size:
         return {}
     rows, columns = linear_sum_assignment(np.minimum(distances, 1e6))
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
-    return {column: tracklets[row] for row, column in pairs if np.isfinite(distances[row, column])}
+    return {
+        column: tracklets[row]
+        for row, column in pairs
+        if np.isfinite(distances[row, column])
+    }
 
 
 def _distance(tracklet: Tracklet, other: Tracklet) -> float:
@@ -270,7 +344,8 @@ def rows_of(
 
     `blanks` are the rows of frames that do not show the person.
     """
-    rows, apart = list[dict[str, Any]](), list[dict[str, Any]]()
+    rows = list[dict[str, Any]]()
+    apart = list[dict[str, Any]]()
     for k, blank in enumerate(blanks):
         part = part_at(parts, k)
         rows.append(blank if part is None else part.rows[k])
@@ -285,10 +360,15 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     None where a mask is empty, covers more than half as much of another, or is beside everyone while the person before
     is elsewhere; and everywhere if all masks are, or if most cover several people, who are parts of one then.
     """
-    beside, result, several = -1, list[int | None](), list[bool]()
+    beside = -1
+    result = list[int | None]()
+    several = list[bool]()
     for k, mask in enumerate(masks):
         present = [part_at(parts, k) for parts in persons]
-        pixels = [(0, 0) if part is None else _common(part.detections[k][0], mask) for part in present]
+        pixels = [
+            (0, 0) if part is None else _common(part.detections[k][0], mask)
+            for part in present
+        ]
         areas, shares = np.array(pixels).T
         *_, second, most = sorted(shares)
         clear = mask.any() and most >= CLEARER * second
@@ -314,21 +394,30 @@ def _common(cut: Cut, mask: Mask) -> tuple[int, int]:
     return int(own.sum()), int((part & own).sum())
 
 
-def replace_detection(parts: Sequence[Tracklet], frame: int, mask: Mask, row: dict[str, Any]) -> None:
+def replace_detection(
+    parts: Sequence[Tracklet], frame: int, mask: Mask, row: dict[str, Any]
+) -> None:
     """Give a person another mask, and its row of `FrameQuality`, in a frame."""
     part = part_at(parts, frame) or parts[0]
     _, hidden = part.detections.get(frame, (None, None))
     part.detections[frame], part.rows[frame] = (cut_out(mask), hidden), row
 
 
-def excluded_mask(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, size: tuple[int, int]) -> Mask:
+def excluded_mask(
+    parts: Sequence[Tracklet],
+    others: Sequence[Tracklet],
+    frame: int,
+    size: tuple[int, int],
+) -> Mask:
     """Return where one of several people surely is not in a frame of a size: where the others are, and far away."""
     mask, own = (np.zeros(size[::-1], dtype=bool) for _ in range(2))
     for other in others:
         if frame in other.detections:
             paste(other.detections[frame][0], mask)
     width = 2 * round(SLACK * max((other.height for other in others), default=0.0)) + 1
-    mask = cv2.dilate(mask.astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
+    mask = (
+        cv2.dilate(mask.astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
+    )
     if (part := part_at(parts, frame)) is not None:
         for cut in part.detections[frame]:
             if cut is not None:
@@ -340,12 +429,15 @@ def excluded_mask(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: 
     return mask
 
 
-def planes_of(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, known: Mask) -> tuple[Mask, Mask]:
+def planes_of(
+    parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, known: Mask
+) -> tuple[Mask, Mask]:
     """Return the mask of a person in a frame, and which pixels are known: none of the others', or of those before them.
 
     `known` are those that the picture shows.
     """
-    mask, unknown = np.zeros_like(known), np.zeros_like(known)
+    mask = np.zeros_like(known)
+    unknown = np.zeros_like(known)
     if (part := part_at(parts, frame)) is not None:
         shown, hidden = part.detections[frame]
         paste(shown, mask)

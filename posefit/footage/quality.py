@@ -22,38 +22,62 @@ from posefit.silhouette.mask import Mask, Silhouette, box_of, padded_box
 
 # of a frame
 AREA_FRAMES = 15  # latest frames that a frame's area is compared with
-AREA_CHANGE = 0.5  # a frame whose area differs by more than this share from the latest is not usable
+# a frame whose area differs by more than this share from the latest is not usable
+AREA_CHANGE = 0.5
 # the area of a person's silhouette over the square of its longer side: 0.08 to 0.47 in 1,296 poses of the library,
 # from any side
 FILL = (0.07, 0.5)
-MIN_SIDE = 12  # pixels of the longer side below which a person cannot be distinguished from noise
+# pixels of the longer side below which a person cannot be distinguished from noise
+MIN_SIDE = 12
 LAG = 0.1  # seconds between two pictures that are compared for motion
 MOVING_LEVELS = 25  # grey levels by which a pixel that moved has changed
-MIN_MOVING = 0.1  # of the mask's area: fewer pixels that moved outside the mask are no evidence
-MOTION_REACH = 0.5  # of the person's longer side: motion is searched as far as that from the mask
+# of the mask's area: fewer pixels that moved outside the mask are no evidence
+MIN_MOVING = 0.1
+# of the person's longer side: motion is searched as far as that from the mask
+MOTION_REACH = 0.5
 SLACK = 0.02  # of the same: motion as near as that to the mask is the mask's own
-MAX_OUTSIDE = 0.5  # a frame is not usable where a larger share of what moves lies outside the mask
-EDGE_RATIO, EDGE_LEVELS = 1.5, 6.0  # an edge is in one picture only where it is stronger there by both
+# a frame is not usable where a larger share of what moves lies outside the mask
+MAX_OUTSIDE = 0.5
+# an edge is in one picture only where it is stronger there by both
+EDGE_RATIO = 1.5
+EDGE_LEVELS = 6.0
 
 # of a video
-PEOPLE_SEGMENTER = "mediapipe"  # needs no background: for a person who is always in the picture
+# needs no background: for a person who is always in the picture
+PEOPLE_SEGMENTER = "mediapipe"
 MIN_FRAMES = 8  # frames with a whole mask below which there is no verdict
-UNEXPLAINED = 0.3  # more of what moves lies outside the masks, in half of the frames: they are not the person
-TALLER, LARGER = 0.15, 0.25  # changes of the longer side and the area from frame to frame that one in ten exceeds
-GHOSTS, GHOSTS_REFUSED = 0.1, 0.5  # shares of frames with masks of an empty place: worth a warning, refused
-BROKEN = 0.3  # of the frames: masks that are in pieces more often, and unsteady, are parts of a person at best
-MIN_USABLE = 0.5  # where fewer of the frames are usable and the masks are unsteady, there is nothing to track
+# more of what moves lies outside the masks, in half of the frames: they are not the
+# person
+UNEXPLAINED = 0.3
+# changes of the longer side and the area from frame to frame that one in ten exceeds
+TALLER = 0.15
+LARGER = 0.25
+# shares of frames with masks of an empty place: worth a warning, refused
+GHOSTS = 0.1
+GHOSTS_REFUSED = 0.5
+# of the frames: masks that are in pieces more often, and unsteady, are parts of a
+# person at best
+BROKEN = 0.3
+# where fewer of the frames are usable and the masks are unsteady, there is nothing to
+# track
+MIN_USABLE = 0.5
 
 # between cameras
 CAMERA_FRAMES = 20  # that are compared, spread over the footage
-APART = 0.7  # of the person's height: rays to the middles of masks that pass each other by more do not meet in a person
-SHORT, TALL = 0.45, 1.9  # times their height: what a person may seem, from above, crouching, or with the arms up
+# of the person's height: rays to the middles of masks that pass each other by more do
+# not meet in a person
+APART = 0.7
+# times their height: what a person may seem, from above, crouching, or with the arms up
+SHORT = 0.45
+TALL = 1.9
 
 
 class FrameQuality:
     """Compares the mask of one frame after the other with the pictures; its rows become quality.csv."""
 
-    def __init__(self, fps: float, background: Image | None = None, *, still: bool = True) -> None:
+    def __init__(
+        self, fps: float, background: Image | None = None, *, still: bool = True
+    ) -> None:
         """Where the background need not be `still`, what moves outside a mask does not count."""
         self._still = still
         self._edges = None if background is None else _edges(background)
@@ -117,20 +141,31 @@ class FrameQuality:
         if self._edges is None or not mask.any():
             return False
         box = padded_box(mask, 2)  # what is farther away changes no edge at the mask
-        inner = cv2.erode(mask[box].astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) > 0
+        inner = (
+            cv2.erode(mask[box].astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) > 0
+        )
         outline = mask[box] & ~inner
-        now, before = _edges(image[box])[outline], self._edges[box][outline]
-        return bool((before > EDGE_RATIO * now + EDGE_LEVELS).sum() > (now > EDGE_RATIO * before + EDGE_LEVELS).sum())
+        now = _edges(image[box])[outline]
+        before = self._edges[box][outline]
+        return bool(
+            (before > EDGE_RATIO * now + EDGE_LEVELS).sum()
+            > (now > EDGE_RATIO * before + EDGE_LEVELS).sum()
+        )
 
 
 def changed_pixels(image: Image, earlier: Image) -> Mask:
     """Return which pixels (height, width) changed from one picture to another, but for single ones, which are noise."""
     levels = cv2.split(cv2.absdiff(image, earlier))
-    changed = np.asarray(cv2.max(cv2.max(levels[0], levels[1]), levels[2]) > MOVING_LEVELS, dtype=np.uint8)
+    changed = np.asarray(
+        cv2.max(cv2.max(levels[0], levels[1]), levels[2]) > MOVING_LEVELS,
+        dtype=np.uint8,
+    )
     return np.asarray(cv2.medianBlur(changed, 5) > 0)
 
 
-def moved_pixels(changed: Mask, region: Mask, body: Mask, reach: float, slack: float) -> tuple[int, int]:
+def moved_pixels(
+    changed: Mask, region: Mask, body: Mask, reach: float, slack: float
+) -> tuple[int, int]:
     """Return how many pixels changed in a region and around, and how many of them lie at the body.
 
     Around is as near as half of `reach`, the person's longer side in pixels, and at the body as near as `slack` of it.
@@ -138,15 +173,25 @@ def moved_pixels(changed: Mask, region: Mask, body: Mask, reach: float, slack: f
     (left, top, right, bottom), far = box_of(region), round(MOTION_REACH * reach)
     window = np.s_[max(0, top - far) : bottom + far, max(0, left - far) : right + far]
     width = 2 * max(1, round(slack * reach)) + 1
-    near = cv2.dilate(body[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
+    near = (
+        cv2.dilate(
+            body[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)
+        )
+        > 0
+    )
     return int(changed[window].sum()), int((changed[window] & near).sum())
 
 
 def _edges(image: Image) -> NDArray[np.float32]:
     """Return how strong an edge is at each pixel (height, width), or next to it, in grey levels a pixel."""
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
-    across, down = (cv2.Sobel(grey, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1)))
-    return np.asarray(cv2.dilate(cv2.magnitude(across, down), np.ones((3, 3), dtype=np.uint8)), dtype=np.float32)
+    across, down = (
+        cv2.Sobel(grey, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1))
+    )
+    return np.asarray(
+        cv2.dilate(cv2.magnitude(across, down), np.ones((3, 3), dtype=np.uint8)),
+        dtype=np.float32,
+    )
 
 
 @dataclass(frozen=True)
@@ -157,7 +202,9 @@ class Verdict:
     refused: bool
 
 
-def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) -> Verdict | None:
+def verdict(
+    rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool
+) -> Verdict | None:
     """Return what is wrong with masks, by the rows of `FrameQuality`; None where nothing is.
 
     `learned`: the segmenter was given no picture of the empty scene. Masks are refused where much moves outside them
@@ -179,21 +226,32 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     unsteady = taller > TALLER or larger > LARGER
     ghosts = float(np.mean([row["ghost"] for row in whole]))
     broken = float(np.mean([row["pieces"] > 1 for row in whole]))
-    moves, changes = f"{outside:.0%} of what moves", f"change by {larger:.0%} from frame to frame"
+    moves = f"{outside:.0%} of what moves"
+    changes = f"change by {larger:.0%} from frame to frame"
     if outside > UNEXPLAINED and unsteady:
-        where = "the person seems to stand in the background" if learned else "the masks do not show the whole person"
-        text, refused = f"{where}: {moves} lies outside the masks, and they {changes}", True
+        where = (
+            "the person seems to stand in the background"
+            if learned
+            else "the masks do not show the whole person"
+        )
+        text = f"{where}: {moves} lies outside the masks, and they {changes}"
+        refused = True
     elif ghosts > GHOSTS:
         text = f"{ghosts:.0%} of the masks show a place that is empty now: the person was learned into the background"
         refused = ghosts > GHOSTS_REFUSED
     elif not usable:
         return Verdict(none, True)
     elif unsteady:
-        pieces = f" and are in pieces in {broken:.0%} of the frames" if broken > BROKEN else ""
+        pieces = (
+            f" and are in pieces in {broken:.0%} of the frames"
+            if broken > BROKEN
+            else ""
+        )
         text = f"the masks {changes}{pieces}: parts of the person seem to be missing"
         refused = usable < MIN_USABLE * len(whole) or broken > BROKEN
     elif outside > UNEXPLAINED:
-        text, refused = f"{moves} near the person lies outside the masks, which may miss parts of the person", False
+        text = f"{moves} near the person lies outside the masks, which may miss parts of the person"
+        refused = False
     else:
         return None
     return Verdict(f"{text}{instead}", refused)
@@ -207,11 +265,15 @@ def advice(method: str, *, learned: bool) -> str:
     return f"; {empty}--extraction {PEOPLE_SEGMENTER}"
 
 
-def _change(pairs: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]], name: str) -> float:
+def _change(
+    pairs: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]], name: str
+) -> float:
     """Return by which share a value changes from frame to frame in one frame of ten, or by more."""
     if not pairs:
         return 0.0
-    return float(np.expm1(np.percentile([abs(np.log(b[name] / a[name])) for a, b in pairs], 90)))
+    return float(
+        np.expm1(np.percentile([abs(np.log(b[name] / a[name])) for a, b in pairs], 90))
+    )
 
 
 def extent_of(silhouette: Silhouette) -> tuple[Array, float]:
@@ -229,20 +291,31 @@ def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array,
     across = [np.eye(3) - np.outer(ray, ray) / (ray @ ray) for ray in rays]
     positions = [camera.position for camera in cameras]
     place = np.linalg.lstsq(
-        np.sum(across, axis=0), np.sum([a @ p for a, p in zip(across, positions, strict=True)], axis=0)
+        np.sum(across, axis=0),
+        np.sum([a @ p for a, p in zip(across, positions, strict=True)], axis=0),
     )[0]
-    return place, np.array([np.linalg.norm(a @ (place - p)) for a, p in zip(across, positions, strict=True)])
+    return place, np.array(
+        [
+            np.linalg.norm(a @ (place - p))
+            for a, p in zip(across, positions, strict=True)
+        ]
+    )
 
 
-def apparent_sizes(views: Views, cameras: Sequence[Camera]) -> tuple[float, Array] | None:
+def apparent_sizes(
+    views: Views, cameras: Sequence[Camera]
+) -> tuple[float, Array] | None:
     """Return by how much the rays of cameras to the person miss each other, and how tall the person is in each view.
 
     Both are medians over frames, in the cameras' unit; None where no frame is usable in all views.
     """
-    usable = [k for k in range(len(views)) if all(masks.usable[k] for masks in views.masks)]
+    usable = [
+        k for k in range(len(views)) if all(masks.usable[k] for masks in views.masks)
+    ]
     if not usable:
         return None
-    misses, heights = [], []
+    misses = []
+    heights = []
     for k in np.unique(np.linspace(0, len(usable) - 1, CAMERA_FRAMES).astype(int)):
         extents = [extent_of(silhouette) for silhouette in views[usable[k]].silhouettes]
         miss, tall = apparent_size(cameras, extents)
@@ -251,7 +324,9 @@ def apparent_sizes(views: Views, cameras: Sequence[Camera]) -> tuple[float, Arra
     return float(np.median(misses)), np.asarray(np.median(heights, axis=0))
 
 
-def apparent_size(cameras: Sequence[Camera], extents: Sequence[tuple[Array, float]]) -> tuple[float, Array]:
+def apparent_size(
+    cameras: Sequence[Camera], extents: Sequence[tuple[Array, float]]
+) -> tuple[float, Array]:
     """Return by how much the rays of cameras to a person miss each other, and how tall the person is in each view.
 
     `extents` are the middle (2,) and the height of the person in each picture. What lies behind a camera has a height
@@ -260,7 +335,8 @@ def apparent_size(cameras: Sequence[Camera], extents: Sequence[tuple[Array, floa
     place, away = meeting(cameras, [middle for middle, _ in extents])
     per_view = zip(cameras, extents, strict=True)
     heights = [
-        tall * (camera.rotation @ place + camera.translation)[2] / camera.focal[1] for camera, (_, tall) in per_view
+        tall * (camera.rotation @ place + camera.translation)[2] / camera.focal[1]
+        for camera, (_, tall) in per_view
     ]
     return 2.0 * float(away.max()), np.array(heights)
 
@@ -268,7 +344,8 @@ def apparent_size(cameras: Sequence[Camera], extents: Sequence[tuple[Array, floa
 def disagreement(miss: float, tall: Array, stature: float) -> str | None:
     """Return what is wrong between `apparent_sizes` and a person of a height, all in metres, if anything."""
     reasons = (
-        "the masks show only parts of the person, or another one, or the calibrations are in another order or unit"
+        "the masks show only parts of the person, or another one, "
+        "or the calibrations are in another order or unit"
     )
     if miss > APART * stature:
         return f"expected cameras that see one person, got views that pass each other by {miss:.1f} m: {reasons}"

@@ -25,7 +25,14 @@ from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
-from posefit.footage.images import FORMATS, IMAGES, PIXELS, Marks, page_count, read_marks
+from posefit.footage.images import (
+    FORMATS,
+    IMAGES,
+    PIXELS,
+    Marks,
+    page_count,
+    read_marks,
+)
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
@@ -38,22 +45,31 @@ MAX_FPS = 1000.0
 _KINDS = {".jpeg": ".jpg", ".tiff": ".tif"}
 NAMES = ("masks", "valid", "usable", "fps", "landmarks")
 
-MOST_MISSING = 9.0  # missing numbers for each image: where there are more, the numbers count something else
+# missing numbers for each image: where there are more, the numbers count something else
+MOST_MISSING = 9.0
 FEW_VALUES = 64  # masks with more values are soft
 COUNTED_VALUES = 4_096
 SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
-NEAR_SCALE = 1.25  # times a scale: degrees may go a little beyond, as resampling makes them
-SIGNED = 0.2  # of the highest value: where the lowest is as far below 0, they are logits, not degrees
+# times a scale: degrees may go a little beyond, as resampling makes them
+NEAR_SCALE = 1.25
+# of the highest value: where the lowest is as far below 0, they are logits, not degrees
+SIGNED = 0.2
 LISTED_LABELS = 6  # in a message
 
-Values = NDArray[Any]  # (height, width): grey levels, an alpha channel, indices of a palette, or colours 0xRRGGBB
-Classifier = Callable[[Values], Mask]  # values to the mask (height, width) of the person
+# (height, width): grey levels, an alpha channel, indices of a palette, or colours
+# 0xRRGGBB
+Values = NDArray[Any]
+# values to the mask (height, width) of the person
+Classifier = Callable[[Values], Mask]
 
 
-Masks = NDArray[Any] | tuple[Path, ...]  # of one camera: (frames, height, width), or an image a frame
+# of one camera: (frames, height, width), or an image a frame
+Masks = NDArray[Any] | tuple[Path, ...]
 
 
-def read_masks(source: Path | Masks, frames: Range, label: int | None = None) -> PackedMasks:
+def read_masks(
+    source: Path | Masks, frames: Range, label: int | None = None
+) -> PackedMasks:
     """Return the masks of images, of a folder of them, of an array, or of an .npz or .npy file, cut to `frames`.
 
     Images of a folder come in the natural order of their names: 2 before 10. `label` is the person's value, where masks
@@ -65,7 +81,9 @@ def read_masks(source: Path | Masks, frames: Range, label: int | None = None) ->
         return _packed(name_of(source), {"masks": source}, frames, label)
     if source.is_dir():
         if not (images := images_in(source)):
-            raise InputError(f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+            raise InputError(
+                f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none"
+            )
         return read_images(images, str(source), frames, label)
     existing(source)
     if source.suffix.lower() == ".npy":
@@ -83,20 +101,31 @@ def name_of(source: str | Path | Masks) -> str:
         return str(source)
     if isinstance(source, tuple) and len(source) == 1:
         return str(source[0])
-    return str(source[0].parent) if isinstance(source, tuple) and source[0].parent.name else "masks"
+    return (
+        str(source[0].parent)
+        if isinstance(source, tuple) and source[0].parent.name
+        else "masks"
+    )
 
 
 def images_in(folder: Path) -> list[Path]:
     """Return the images of a folder in the natural order of their names."""
     # hidden files are ignored: some systems put one beside each image that they copy
-    files = (file for file in folder.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
+    files = (
+        file
+        for file in folder.iterdir()
+        if file.suffix.lower() in IMAGES and not file.name.startswith(".")
+    )
     return sorted(files, key=_natural)
 
 
 def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     """Return the key that files are sorted by: numbers in their names count as such."""
     parts = re.findall(r"[0-9]+|[^0-9]+", file.name)
-    return [(int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p) for p in parts], file.name
+    return [
+        (int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p)
+        for p in parts
+    ], file.name
 
 
 def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list[str]]:
@@ -104,51 +133,86 @@ def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list
 
     Raises InputError where files are of several kinds, or several have one number: some are no masks then.
     """
-    kinds = Counter(_KINDS.get(suffix := file.suffix.lower(), suffix) for file in images)
+    kinds = Counter(
+        _KINDS.get(suffix := file.suffix.lower(), suffix) for file in images
+    )
     if len(kinds) > 1:
         came = " and ".join(f"{count} {kind}" for kind, count in kinds.most_common())
-        raise InputError(f"{name}: expected images of one kind, got {came}; name the files, such as masks/*.png")
+        raise InputError(
+            f"{name}: expected images of one kind, got {came}; name the files, such as masks/*.png"
+        )
     parts = [re.split(r"([0-9]+)", file.stem) for file in images]
-    if len(images) < 2 or not all(len(part) >= 3 and len(part[-2]) < 19 for part in parts):
+    if len(images) < 2 or not all(
+        len(part) >= 3 and len(part[-2]) < 19 for part in parts
+    ):
         return list(images), []
     numbers = [int(part[-2]) for part in parts]
     if len({tuple(part[::2]) for part in parts}) > 1:
-        twice = next((k for k, number in enumerate(numbers) if number in numbers[:k]), None)
+        twice = next(
+            (k for k, number in enumerate(numbers) if number in numbers[:k]), None
+        )
         if twice is not None:
-            pair = f"{images[numbers.index(numbers[twice])].name} and {images[twice].name}"
-            raise InputError(f"{name}: expected one image a frame, got {pair}; name the files, such as masks/*.png")
+            pair = (
+                f"{images[numbers.index(numbers[twice])].name} and {images[twice].name}"
+            )
+            raise InputError(
+                f"{name}: expected one image a frame, got {pair}; name the files, such as masks/*.png"
+            )
     steps = np.diff(numbers)
     if len({(*part[:-2], part[-1]) for part in parts}) > 1 or not (steps > 0).all():
-        return list(images), [] if (steps > 0).all() else [f"{name}: the frames come as listed, not as numbered"]
+        return list(images), [] if (steps > 0).all() else [
+            f"{name}: the frames come as listed, not as numbered"
+        ]
     step = int(np.gcd.reduce(steps))
     missing = int((steps // step - 1).sum())
     if missing > MOST_MISSING * len(images):
-        return list(images), [f"{name}: the numbers from {numbers[0]} to {numbers[-1]} do not count frames"]
+        return list(images), [
+            f"{name}: the numbers from {numbers[0]} to {numbers[-1]} do not count frames"
+        ]
     places = dict(zip(numbers, images, strict=True))
     guesses = [f"{name}: every {step}th number is a frame"] if step > 1 else []
     if missing:
-        guesses.append(f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are missing, and are held")
-    return [places.get(number) for number in range(numbers[0], numbers[-1] + 1, step)], guesses
+        guesses.append(
+            f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are missing, and are held"
+        )
+    return [
+        places.get(number) for number in range(numbers[0], numbers[-1] + 1, step)
+    ], guesses
 
 
-def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
+def read_images(
+    images: Sequence[Path], name: str, frames: Range, label: int | None = None
+) -> PackedMasks:
     """Return the masks of images of one size. Raises InputError naming the file where one is none."""
     files, guesses = numbered(images, name)
-    every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
+    every = [
+        (file, page)
+        for file in files
+        for page in range(1 if file is None else page_count(existing(file)))
+    ]
     chosen = every[slice(*span(frames, len(every)))]
     known = np.array([file is not None for file, _ in chosen])
     size, is_person, kind = _decided(_marks(chosen, name, label), label, name)
-    masks, valid = _pack(_marks(chosen, name, label), int(known.sum()), size, is_person), None
+    masks = _pack(_marks(chosen, name, label), int(known.sum()), size, is_person)
+    valid = None
     if not known.all():
-        shown, masks, valid = masks, *(empty_planes(len(chosen), size) for _ in range(2))
+        shown, masks, valid = (
+            masks,
+            *(empty_planes(len(chosen), size) for _ in range(2)),
+        )
         masks[~known], masks[known] = 0, shown
         valid[:] = np.where(known, 255, 0)[:, None]
     paged = {file for file, page in chosen if page}
-    names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
+    names = [
+        f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing"
+        for file, page in chosen
+    ]
     return PackedMasks(names, size, masks, valid, known, guesses=[*guesses, *kind])
 
 
-def _marks(images: Sequence[tuple[Path | None, int]], name: str, label: int | None) -> Iterator[Marks]:
+def _marks(
+    images: Sequence[tuple[Path | None, int]], name: str, label: int | None
+) -> Iterator[Marks]:
     """Yield how each of the images, files and pages but None, marks a person. Raises InputError where one does not."""
     known = [(file, page) for file, page in images if file is not None]
     first: Marks | None = None
@@ -165,50 +229,91 @@ def _marks(images: Sequence[tuple[Path | None, int]], name: str, label: int | No
                 raise InputError(f"{file}: masks must be finite, got nan or infinity")
             first = first or marks
             if marks.values.shape != first.values.shape:
-                raise InputError(f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}")
+                raise InputError(
+                    f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}"
+                )
             yield marks
         if remaining:
-            raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
+            raise InputError(
+                f"{file}: expected an image ({FORMATS}), got a file that is none"
+            )
 
 
-def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:
+def _packed(
+    name: str,
+    arrays: Mapping[str, Stored | NDArray[Any]],
+    frames: Range,
+    label: int | None,
+) -> PackedMasks:
     """Return the masks of arrays by their names. Raises InputError naming what holds them where it holds none."""
     stack = _checked_stack(name, arrays)
     count, height, width = stack.shape
-    usable = np.asarray(arrays["usable"]) if "usable" in arrays else np.ones(count, dtype=bool)
+    usable = (
+        np.asarray(arrays["usable"])
+        if "usable" in arrays
+        else np.ones(count, dtype=bool)
+    )
     fps = float(np.asarray(arrays["fps"])) if "fps" in arrays else None
     if fps is not None and not 0.0 < fps <= MAX_FPS:
         raise InputError(f"{name}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
     start, stop = span(frames, count)
     if not usable[start:stop].any():
-        raise InputError(f"{name}: expected a frame that is usable, got none from {start} to {stop}")
-    size, is_person, guesses = (width, height), _above(0.0), list[str]()
+        raise InputError(
+            f"{name}: expected a frame that is usable, got none from {start} to {stop}"
+        )
+    size = (width, height)
+    is_person = _above(0.0)
+    guesses = list[str]()
     if stack.dtype.kind != "b" or label is not None:  # booleans need no count
         _, is_person, guesses = _decided(_chosen(name, stack, start, stop), label, name)
     masks = _pack(_chosen(name, stack, start, stop), stop - start, size, is_person)
     valid = None
     if "valid" in arrays:
-        valid = _pack(_chosen(name, arrays["valid"], start, stop), stop - start, size, _above(0.0))
+        valid = _pack(
+            _chosen(name, arrays["valid"], start, stop), stop - start, size, _above(0.0)
+        )
     names = [f"{name}[{k}]" for k in range(start, stop)]
-    landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
-    if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
-        raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
+    landmarks = (
+        np.array(arrays["landmarks"], dtype=np.float64)[start:stop]
+        if "landmarks" in arrays
+        else None
+    )
+    if landmarks is not None and not (
+        np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0
+    ):
+        raise InputError(
+            f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others"
+        )
     return PackedMasks(
-        names, size, masks, valid, usable[start:stop], fps=fps, landmarks=landmarks, first=start, guesses=guesses
+        names,
+        size,
+        masks,
+        valid,
+        usable[start:stop],
+        fps=fps,
+        landmarks=landmarks,
+        first=start,
+        guesses=guesses,
     )
 
 
-NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture
+# times that a picture may be as high as wide: a person stands, but what is narrower is
+# no picture
+NARROW = 4
 
 
-def _checked_stack(name: str, arrays: Mapping[str, Stored | NDArray[Any]]) -> Stored | NDArray[Any]:
+def _checked_stack(
+    name: str, arrays: Mapping[str, Stored | NDArray[Any]]
+) -> Stored | NDArray[Any]:
     """Return the masks of arrays. Raises InputError where one of them has another shape or type."""
     if "masks" not in arrays:
         raise InputError(f"{name}: expected an .npz file with the key masks, got none")
     stack = arrays["masks"]
     shape = tuple(stack.shape)
     if len(shape) != 3 or 0 in shape or stack.dtype.kind not in "buif":
-        raise InputError(f"{name}: masks must have shape (frames, height, width), got {_described(stack)}")
+        raise InputError(
+            f"{name}: masks must have shape (frames, height, width), got {_described(stack)}"
+        )
     if shape[2] * NARROW < shape[1]:
         raise InputError(
             f"{name}: masks must have shape (frames, height, width), got {shape[2]} as the width of {shape}"
@@ -220,12 +325,18 @@ def _checked_stack(name: str, arrays: Mapping[str, Stored | NDArray[Any]]) -> St
     others: dict[str, tuple[tuple[int, ...], str, str]] = {
         "valid": (shape, "bui", f"have the masks' shape {quoted(shape)}"),
         "usable": (shape[:1], "b", f"be {shape[0]} booleans"),
-        "landmarks": ((shape[0], len(JOINTS), 3), "f", f"be of shape {shape[0], len(JOINTS), 3}"),
+        "landmarks": (
+            (shape[0], len(JOINTS), 3),
+            "f",
+            f"be of shape {shape[0], len(JOINTS), 3}",
+        ),
         "fps": ((), "iuf", f"be a number up to {MAX_FPS:g}"),
     }
     for key, (wanted, kinds, expected) in others.items():
         stored = arrays.get(key)
-        if stored is not None and (tuple(stored.shape) != wanted or stored.dtype.kind not in kinds):
+        if stored is not None and (
+            tuple(stored.shape) != wanted or stored.dtype.kind not in kinds
+        ):
             raise InputError(f"{name}: {key} must {expected}, got {_described(stored)}")
     return stack
 
@@ -234,25 +345,34 @@ def _described(stored: Stored | NDArray[Any]) -> str:
     return f"{quoted(tuple(stored.shape))} {stored.dtype}"
 
 
-def _chosen(name: str, stored: Stored | NDArray[Any], start: int, stop: int) -> Iterator[Marks]:
+def _chosen(
+    name: str, stored: Stored | NDArray[Any], start: int, stop: int
+) -> Iterator[Marks]:
     """Yield frames start to stop; the others are read to the end, for the checksum."""
     for k, frame in enumerate(stored):
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
-            raise InputError(f"{name}: masks must be finite, got nan or infinity in frame {k}")
+            raise InputError(
+                f"{name}: masks must be finite, got nan or infinity in frame {k}"
+            )
         if start <= k < stop:
             yield Marks(frame)
 
 
-def _decided(frames: Iterable[Marks], label: int | None, name: str) -> tuple[tuple[int, int], Classifier, list[str]]:
+def _decided(
+    frames: Iterable[Marks], label: int | None, name: str
+) -> tuple[tuple[int, int], Classifier, list[str]]:
     """Return the size of frames, how their values become masks, and what was guessed of them."""
-    counts, size = ValueCounts(), (0, 0)
+    counts = ValueCounts()
+    size = (0, 0)
     for marks in frames:
         counts.add(marks.values, marks.soft)
         size = marks.values.shape[1], marks.values.shape[0]
     return size, *counts.classifier(label, name)
 
 
-def _pack(frames: Iterable[Marks], count: int, size: tuple[int, int], is_person: Classifier) -> Planes:
+def _pack(
+    frames: Iterable[Marks], count: int, size: tuple[int, int], is_person: Classifier
+) -> Planes:
     """Return the bits of so many frames."""
     planes = empty_planes(count, size)
     for k, marks in enumerate(frames):
@@ -264,7 +384,8 @@ def _pack(frames: Iterable[Marks], count: int, size: tuple[int, int], is_person:
 class ValueCounts:
     """Counts the values in the masks of a source, one mask after the other, and decides which are the person's."""
 
-    soft: bool = False  # whether a value is a degree: in lossy images, in fractions, in an alpha channel
+    # whether a value is a degree: in lossy images, in fractions, in an alpha channel
+    soft: bool = False
     fractions: bool = False
     lowest: float = np.inf
     highest: float = 0.0
@@ -275,16 +396,24 @@ class ValueCounts:
 
     def add(self, values: Values, soft: bool) -> None:
         """Count the next mask."""
-        low, high = values.min(), values.max()
-        self.lowest, self.highest = min(self.lowest, float(low)), max(self.highest, float(high))
-        self.fractions |= values.dtype.kind == "f" and bool((values != np.floor(values)).any())
+        low = values.min()
+        high = values.max()
+        self.lowest, self.highest = (
+            min(self.lowest, float(low)),
+            max(self.highest, float(high)),
+        )
+        self.fractions |= values.dtype.kind == "f" and bool(
+            (values != np.floor(values)).any()
+        )
         self.soft |= soft
         if self.soft:
             return
         top = int(np.count_nonzero(values == high))
-        if low == high or top + np.count_nonzero(values == low) == values.size:  # takes less time than sorting
+        # takes less time than sorting
+        if low == high or top + np.count_nonzero(values == low) == values.size:
             different = slice(int(low == high), 2)
-            unique, counts = np.array([low, high])[different], np.array([values.size - top, top])[different]
+            unique = np.array([low, high])[different]
+            counts = np.array([values.size - top, top])[different]
         else:
             unique, counts = np.unique(values, return_counts=True)
         self.pixels.update(dict(zip(unique.tolist(), counts.tolist(), strict=True)))
@@ -292,7 +421,9 @@ class ValueCounts:
         if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
 
-    def classifier(self, label: int | None, name: object) -> tuple[Classifier, list[str]]:
+    def classifier(
+        self, label: int | None, name: object
+    ) -> tuple[Classifier, list[str]]:
         """Return how these values become masks, and what was guessed of them.
 
         Raises InputError where it is open which label is the person.
@@ -300,10 +431,14 @@ class ValueCounts:
         if label is not None:
             if self.soft:
                 kinds = "masks whose values are labels, PNG or whole numbers"
-                raise InputError(f"{name}: label must be given for {kinds}, got soft ones")
+                raise InputError(
+                    f"{name}: label must be given for {kinds}, got soft ones"
+                )
             if label not in self.pixels:
                 there = self._listed([value for value, _ in self.pixels.most_common()])
-                raise InputError(f"{name}: label must be one of those that are there, {there}, got {label}")
+                raise InputError(
+                    f"{name}: label must be one of those that are there, {there}, got {label}"
+                )
             return lambda values: np.asarray(values == label), []
         values = sorted(self.pixels)
         if self.highest > SCALES[-1] and (self.soft or len(values) > FEW_VALUES):
@@ -313,16 +448,26 @@ class ValueCounts:
             half, kind = self._half
             return _above(half), [f"{ends} are {kind}: the person is above {half:g}"]
         if len(values) <= 2:  # whichever two they are
-            usual = not values or (min(values[0], 0) == 0 and values[-1] in (0, *SCALES[:2]))
-            threshold = float(values[0] if len(values) == 2 else min(values[0], 0)) if values else 0.0
-            return _above(threshold), [] if usual else [f"{ends}: the person is the higher of two"]
+            usual = not values or (
+                min(values[0], 0) == 0 and values[-1] in (0, *SCALES[:2])
+            )
+            threshold = (
+                float(values[0] if len(values) == 2 else min(values[0], 0))
+                if values
+                else 0.0
+            )
+            return _above(threshold), [] if usual else [
+                f"{ends}: the person is the higher of two"
+            ]
         labels = [value for value, _ in self.solid.most_common() if value]
         if len(labels) > 1:
             raise InputError(
                 f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
             )
         threshold = float(labels[0] // 2) if labels else self._half[0]
-        return _above(threshold), [f"{ends}: the person is above {threshold:g}, what is between is an edge"]
+        return _above(threshold), [
+            f"{ends}: the person is above {threshold:g}, what is between is an edge"
+        ]
 
     @property
     def _half(self) -> tuple[float, str]:
@@ -332,14 +477,21 @@ class ValueCounts:
         """
         if self.lowest < -SIGNED * self.highest:
             return 0.0, "logits"
-        if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:  # of no usual scale
+        # of no usual scale
+        if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:
             return self.highest / 2.0, "degrees"
-        full = next((scale for scale in SCALES if self.highest <= NEAR_SCALE * scale), self.highest)
+        full = next(
+            (scale for scale in SCALES if self.highest <= NEAR_SCALE * scale),
+            self.highest,
+        )
         return (0.5 if full == 1.0 else float(full // 2)), "degrees"
 
     def _listed(self, labels: Sequence[float]) -> str:
         """Return some labels, the commonest first; colours as hexadecimal numbers."""
-        written = [str(value) if self.highest <= SCALES[-1] else f"0x{value:06x}" for value in labels[:LISTED_LABELS]]
+        written = [
+            str(value) if self.highest <= SCALES[-1] else f"0x{value:06x}"
+            for value in labels[:LISTED_LABELS]
+        ]
         others = len(labels) - LISTED_LABELS
         return ", ".join(written) + (f" and {others} others" if others > 0 else "")
 
@@ -349,7 +501,9 @@ def _above(threshold: float) -> Classifier:
 
 
 def _many_colours(name: object) -> InputError:
-    return InputError(f"{name}: expected masks, got pictures in many colours; a person cut out needs an alpha channel")
+    return InputError(
+        f"{name}: expected masks, got pictures in many colours; a person cut out needs an alpha channel"
+    )
 
 
 def _solid(values: Values, unique: NDArray[Any]) -> list[int]:

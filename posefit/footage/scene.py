@@ -20,9 +20,11 @@ from posefit.silhouette.cuda.device import check_device, moved_to
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
-VIEW_DEGREES = 45.0  # default place of the camera of a synthetic sequence: 0 is in front, 90 to the side
+# default place of the camera of a synthetic sequence: 0 is in front, 90 to the side
+VIEW_DEGREES = 45.0
 RNG_STREAM_CORRUPTION = 2010
-Placing = Literal["given", "guessed", "placed"]  # cameras are the user's, a guess, or set up around a known motion
+# cameras are the user's, a guess, or set up around a known motion
+Placing = Literal["given", "guessed", "placed"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +45,11 @@ class Scene:
     guesses: Sequence[str] = ()  # what the sources do not state, and posefit assumes
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
-    first: int = 0  # the number of the first frame in the footage, or in the whole motion
+    # the number of the first frame in the footage, or in the whole motion
+    first: int = 0
     camera_moves: bool = False  # whether the first camera seems to
-    reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
+    # wall and CPU time that it took to read
+    reading_seconds: tuple[float, float] = (0.0, 0.0)
 
     @property
     def cameras_turn(self) -> bool:
@@ -54,8 +58,11 @@ class Scene:
 
     def motion(self, frames: Sequence[Frame]) -> Motion:
         """Return the person's motion that some frames estimate."""
-        poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
-        return Motion(self.name, self.body.skeleton, poses, places, self.fps, self.first)
+        poses = np.array([frame.pose for frame in frames])
+        places = np.array([frame.translation for frame in frames])
+        return Motion(
+            self.name, self.body.skeleton, poses, places, self.fps, self.first
+        )
 
 
 def synthetic(
@@ -74,13 +81,18 @@ def synthetic(
     placing: Placing = "given" if cameras else "placed"
     motion = motion.frames(*span(frames, len(motion)))
     if not cameras:
-        joints, radii = motion.joints.reshape(-1, 3), np.tile(body.joint_radii(), len(motion))
+        joints = motion.joints.reshape(-1, 3)
+        radii = np.tile(body.joint_radii(), len(motion))
         azimuths = motion.poses[0, 0] + np.radians(views_degrees or [VIEW_DEGREES])
-        cameras = [Camera.framing(joints, radii, float(azimuth), size) for azimuth in azimuths]
+        cameras = [
+            Camera.framing(joints, radii, float(azimuth), size) for azimuth in azimuths
+        ]
     observations = rendered(motion, body, cameras)
     for k in (0, len(motion) - 1):
         if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
-            raise InputError(f"camera must see the person, got an empty mask in frame {k}")
+            raise InputError(
+                f"camera must see the person, got an empty mask in frame {k}"
+            )
     return Scene(
         name=motion.name,
         body=body,
@@ -119,8 +131,11 @@ def rendered(motion: Motion, body: Body, cameras: Sequence[Camera]) -> LazyObser
     return LazyObservations(len(motion), partial(_rendered, motion, body, cameras))
 
 
-def _rendered(motion: Motion, body: Body, cameras: Sequence[Camera], k: int) -> Observation:
-    pose, translation = motion.poses[k], motion.translations[k]
+def _rendered(
+    motion: Motion, body: Body, cameras: Sequence[Camera], k: int
+) -> Observation:
+    pose = motion.poses[k]
+    translation = motion.translations[k]
     masks = [project(body, camera, pose, translation) for camera in cameras]
     return Observation([Silhouette.of(mask) for mask in masks], translation)
 
@@ -130,7 +145,12 @@ def on_device(scene: Scene, device: str) -> Scene:
     check_device(device)
     if device == "cpu":
         return scene
-    return replace(scene, observations=LazyObservations(scene.count, partial(_moved, scene.observations, device)))
+    return replace(
+        scene,
+        observations=LazyObservations(
+            scene.count, partial(_moved, scene.observations, device)
+        ),
+    )
 
 
 def _moved(observations: Sequence[Observation], device: str, k: int) -> Observation:
@@ -139,16 +159,32 @@ def _moved(observations: Sequence[Observation], device: str, k: int) -> Observat
 
 
 def with_corruption(
-    observations: Sequence[Observation], noise: dict[str, float], dropped: float, seed: int
+    observations: Sequence[Observation],
+    noise: dict[str, float],
+    dropped: float,
+    seed: int,
 ) -> LazyObservations:
     """Return observations with corruptions of some strength, and a share of the frames dropped; the same each time."""
-    return LazyObservations(len(observations), partial(_corrupted, observations, noise, dropped, seed))
+    return LazyObservations(
+        len(observations), partial(_corrupted, observations, noise, dropped, seed)
+    )
 
 
 def _corrupted(
-    observations: Sequence[Observation], noise: dict[str, float], dropped: float, seed: int, k: int
+    observations: Sequence[Observation],
+    noise: dict[str, float],
+    dropped: float,
+    seed: int,
+    k: int,
 ) -> Observation:
-    observation, rng = observations[k], np.random.default_rng([RNG_STREAM_CORRUPTION, seed, k])
+    observation = observations[k]
+    rng = np.random.default_rng([RNG_STREAM_CORRUPTION, seed, k])
     lost = k > 0 and rng.random() < dropped
-    masks = [corrupted(silhouette.mask, noise, rng) for silhouette in observation.silhouettes]
-    return replace(observation, silhouettes=[Silhouette.of(mask) for mask in masks], usable=not lost)
+    masks = [
+        corrupted(silhouette.mask, noise, rng) for silhouette in observation.silhouettes
+    ]
+    return replace(
+        observation,
+        silhouettes=[Silhouette.of(mask) for mask in masks],
+        usable=not lost,
+    )

@@ -17,7 +17,14 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
-from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span, unpacked
+from posefit.footage.masks import (
+    PackedMasks,
+    Planes,
+    Range,
+    empty_planes,
+    span,
+    unpacked,
+)
 from posefit.footage.people import (
     Choice,
     Chooser,
@@ -29,7 +36,13 @@ from posefit.footage.people import (
     replace_detection,
     rows_of,
 )
-from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
+from posefit.footage.quality import (
+    PEOPLE_SEGMENTER,
+    FrameQuality,
+    Verdict,
+    advice,
+    verdict,
+)
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
@@ -47,20 +60,30 @@ BACKGROUND_SEGMENTER = "mean"  # where a background is given
 WIDTH = 640  # pixels; larger videos are scaled down to it
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 MISSING = 0.02  # the share of a file's frames that may be missing without a warning
-CROSSING = 0.35  # of the longer side: a person who goes as far across the picture within `STAYING` is not on the spot
-REDIRECTED = 0.5  # of the frames with a person: in so many a network has to find them to be used
+# of the longer side: a person who goes as far across the picture within `STAYING` is
+# not on the spot
+CROSSING = 0.35
+# of the frames with a person: in so many a network has to find them to be used
+REDIRECTED = 0.5
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
 PERIOD = 5  # frames between two that are compared with the first
 SMALL = 160  # pixels: the width of the pictures that are compared
 TILES = 4  # to a side
-FINE, COARSE = 1.0, 4.0  # pixels: smaller and larger structures are filtered out
+# pixels: smaller and larger structures are filtered out
+FINE = 1.0
+COARSE = 4.0
 REACH = 4  # pixels by which a tile is searched to either side
-TEXTURE = 0.7  # grey levels a pixel: a tile that changes less along some axis does not show where it went
+# grey levels a pixel: a tile that changes less along some axis does not show where it
+# went
+TEXTURE = 0.7
 FREE = 0.25  # the share of these tiles that a person leaves free at least
-SPREAD = 0.5  # the share of all tiles that have such texture at least: else it may be the person's alone
-MOVED = 0.008  # of the width: a shift since the first frame that counts as a moving camera
+# the share of all tiles that have such texture at least: else it may be the person's
+# alone
+SPREAD = 0.5
+# of the width: a shift since the first frame that counts as a moving camera
+MOVED = 0.008
 
 
 @dataclass(frozen=True)
@@ -89,16 +112,32 @@ class Extraction:
         offer = registry().offer("segmenter", self.name)
         if self.background is not None:
             offers = registry().offers["segmenter"].values()
-            takers = [other.name for other in offers if "background" in [setting.name for setting in other.settings]]
+            takers = [
+                other.name
+                for other in offers
+                if "background" in [setting.name for setting in other.settings]
+            ]
             if self.name not in takers:
                 came = f"{quoted(self.background)} with {self.name}"
-                raise InputError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
-            object.__setattr__(self, "settings", {**self.settings, "background": self.background})
-        object.__setattr__(self, "settings", check(self.name, offer.factory, self.settings))
+                raise InputError(
+                    f"background must be given for the method {' or '.join(takers)} only, got {came}"
+                )
+            object.__setattr__(
+                self, "settings", {**self.settings, "background": self.background}
+            )
+        object.__setattr__(
+            self, "settings", check(self.name, offer.factory, self.settings)
+        )
         for setting in offer.settings:
             if setting.default is Parameter.empty and setting.name not in self.settings:
-                given = "frames A:B or an image" if setting.name == "background" else "given"
-                raise InputError(f"{setting.name} must be {given} for the method {self.name}, got none")
+                given = (
+                    "frames A:B or an image"
+                    if setting.name == "background"
+                    else "given"
+                )
+                raise InputError(
+                    f"{setting.name} must be {given} for the method {self.name}, got none"
+                )
 
     @property
     def name(self) -> str:
@@ -112,7 +151,13 @@ class Extraction:
         show which leg is the left one.
         """
         other = registry().offers["segmenter"].get(PEOPLE_SEGMENTER)
-        if self.method or self.background or self.settings or other is None or other.missing:
+        if (
+            self.method
+            or self.background
+            or self.settings
+            or other is None
+            or other.missing
+        ):
             return [self]
         both = [self, replace(self, method=PEOPLE_SEGMENTER)]
         return both[::-1] if cameras == 1 else both
@@ -140,7 +185,9 @@ class VideoFootage:
     def __len__(self) -> int:
         return self.video.count()
 
-    def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Image]:
+    def frames(
+        self, start: int = 0, stop: int | None = None, step: int = 1
+    ) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop."""
         return map(self.cut, self.video.frames(start, stop, self.size, step))
 
@@ -148,10 +195,14 @@ class VideoFootage:
         """Return a picture of the video's size as the video shows it. Raises InputError where there is none."""
         image = read_image(path, grey=False)
         if image is None:
-            raise InputError(f"background must be frames A:B or an image, got {quoted(path)}")
+            raise InputError(
+                f"background must be frames A:B or an image, got {quoted(path)}"
+            )
         (tall, wide), (width, height) = image.shape[:2], self.video.size
         if (wide, tall) != (width, height):
-            raise InputError(f"{path}: background must have the video's size {width}x{height}, got {wide}x{tall}")
+            raise InputError(
+                f"{path}: background must have the video's size {width}x{height}, got {wide}x{tall}"
+            )
         return self.cut(scaled(image, self.size))
 
     def cut(self, image: NDArray[T]) -> NDArray[T]:
@@ -165,7 +216,8 @@ class SegmentedFrame(NamedTuple):
 
     people: list[Person]
     facing: float  # as `Segmenter.facing`; NaN where unknown
-    landmarks: Array  # (27, 3) as `Segmenter.landmarks`, at their place in the frame; 0 for none
+    # (27, 3) as `Segmenter.landmarks`, at their place in the frame; 0 for none
+    landmarks: Array
 
 
 class PersonSegmenter:
@@ -174,10 +226,18 @@ class PersonSegmenter:
     def __init__(self, video: Video, how: Extraction) -> None:
         """Check that the extraction fits the video. Raises InputError where it does not."""
         scale = min(1.0, how.width / video.size[0])
-        self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
-        self.scale, self.learned = scale, "background" not in how.settings
-        self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
-        self._film, self._how = VideoFootage(video, self.size, self._roi or (0, 0, *self.size)), how
+        self.size = (
+            max(1, round(video.size[0] * scale)),
+            max(1, round(video.size[1] * scale)),
+        )
+        self.scale = scale
+        self.learned = "background" not in how.settings
+        self._roi, self._ignored = (
+            _scaled_roi(how.roi, video, scale),
+            _ignored(how.ignore, self.size),
+        )
+        self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
+        self._how = how
         if not self.learned:  # a background is checked now
             _ = self._segmenter
 
@@ -189,12 +249,17 @@ class PersonSegmenter:
     def frame(self, image: Image) -> SegmentedFrame:
         """Return who is in the next frame, which is of the working size."""
         result = people(*self._segmented(image), self._roi, self._ignored)
-        return SegmentedFrame(result, float(getattr(self._segmenter, "facing", math.nan)), self._landmarks())
+        return SegmentedFrame(
+            result,
+            float(getattr(self._segmenter, "facing", math.nan)),
+            self._landmarks(),
+        )
 
     def without(self, image: Image, mask: Mask) -> Image:
         """Return a frame of the working size with the background where a mask is."""
         (x, y, wide, tall), result = self._film.part, image.copy()
-        part, covered = result[y : y + tall, x : x + wide], self._film.cut(mask)
+        part = result[y : y + tall, x : x + wide]
+        covered = self._film.cut(mask)
         part[covered] = getattr(self._segmenter, "background", part)[covered]
         return result
 
@@ -204,17 +269,26 @@ class PersonSegmenter:
         still = registry().offer("segmenter", self._how.name).still_background
         return FrameQuality(self._film.video.fps, background, still=still)
 
-    def row(self, quality: FrameQuality, image: Image, person: Person, number: int) -> dict[str, Any]:
+    def row(
+        self, quality: FrameQuality, image: Image, person: Person, number: int
+    ) -> dict[str, Any]:
         """Return the row of quality.csv for a person in the next frame."""
-        part = replace(person, mask=self._film.cut(person.mask), valid=self._film.cut(person.valid))
+        part = replace(
+            person, mask=self._film.cut(person.mask), valid=self._film.cut(person.valid)
+        )
         return quality.row(self._film.cut(image), part, number)
 
     def _segmented(self, image: Image) -> tuple[Mask, Mask]:
         """Return the segmenter's two masks of the part that it gets, at its place in the whole frame."""
         x, y, wide, tall = self._film.part
         with plugin_errors(f"segmenter {self._how.name!r}", "segment"):
-            planes = [np.asarray(plane) for plane in self._segmenter.segment(self._film.cut(image))]
-        if len(planes) != 2 or any(plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes):
+            planes = [
+                np.asarray(plane)
+                for plane in self._segmenter.segment(self._film.cut(image))
+            ]
+        if len(planes) != 2 or any(
+            plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes
+        ):
             came = ", ".join(f"{plane.shape} {plane.dtype}" for plane in planes)
             raise BrokenRuleError(
                 f"segmenter {self._how.name!r}: segment must return two boolean masks of shape {tall, wide}, got {came}"
@@ -225,8 +299,15 @@ class PersonSegmenter:
 
     def _landmarks(self) -> Array:
         landmarks = getattr(self._segmenter, "landmarks", None)
-        given = np.array(np.zeros((len(JOINTS), 3)) if landmarks is None else landmarks, dtype=np.float64)
-        if given.shape != (len(JOINTS), 3) or not np.isfinite(given).all() or given[:, 2].min() < 0.0:
+        given = np.array(
+            np.zeros((len(JOINTS), 3)) if landmarks is None else landmarks,
+            dtype=np.float64,
+        )
+        if (
+            given.shape != (len(JOINTS), 3)
+            or not np.isfinite(given).all()
+            or given[:, 2].min() < 0.0
+        ):
             raise BrokenRuleError(
                 f"segmenter {self._how.name!r}: landmarks must be finite numbers of shape {len(JOINTS), 3}, their "
                 f"confidence 0 or more, got shape {given.shape}"
@@ -252,7 +333,8 @@ class _Scan(NamedTuple):
     masks: Planes  # of the largest blob
     valid: Planes
     people: People
-    largest: list[dict[str, Any]]  # rows of quality.csv for the largest blobs: the person, where there is one only
+    # rows of quality.csv for the largest blobs: the person, where there is one only
+    largest: list[dict[str, Any]]
     blanks: list[dict[str, Any]]  # rows for empty masks
     facings: list[float]
     landmarks: Array  # (T, 27, 3)
@@ -263,25 +345,38 @@ class _Scan(NamedTuple):
 class Segmentation:
     """A pass through a video. Raises InputError where the extraction or the frames do not fit it."""
 
-    def __init__(self, video: Video, how: Extraction, frames: Range, among: Extraction | None = None) -> None:
+    def __init__(
+        self,
+        video: Video,
+        how: Extraction,
+        frames: Range,
+        among: Extraction | None = None,
+    ) -> None:
         """Where the segmenter of `how` reports one person only, that of `among` identifies which of several it is."""
         self.start, self.stop = span(frames, video.count())
         self.video, self.how, self._segmenter = video, how, PersonSegmenter(video, how)
         self.size = self._segmenter.size
         self._among = None if among is None else Segmentation(video, among, frames)
 
-    def read(self, progress: Progress | None = None, choose: Chooser | None = None) -> Segmented:
+    def read(
+        self, progress: Progress | None = None, choose: Chooser | None = None
+    ) -> Segmented:
         """Return the masks of the video, which is decoded once, after the background was learned.
 
         Of several people `choose` returns the number of the one who is followed, where the extraction names none.
         Raises InputError where no frame shows a person.
         """
-        video, scan = self.video, self._scan(progress)
+        video = self.video
+        scan = self._scan(progress)
         if self._among is not None:
             scan = self._among.with_identities(self, scan, progress)
-        count, learned = len(scan.blanks), self._segmenter.learned
-        several, rows, apart = self._follow_person(scan if choose is None else scan._replace(choice=choose))
-        missing, damage = max(0, video.claimed - video.count()), ""
+        count = len(scan.blanks)
+        learned = self._segmenter.learned
+        several, rows, apart = self._follow_person(
+            scan if choose is None else scan._replace(choice=choose)
+        )
+        missing = max(0, video.claimed - video.count())
+        damage = ""
         if missing:
             damage = f"the file says that it has {missing} frames more than can be read: it seems to be damaged"
         if not any(row["area"] for row in rows):
@@ -293,7 +388,8 @@ class Segmentation:
             doubt and doubt.text,
             damage if missing > MISSING * count else "",
             several,
-            scan.camera_moves and "the camera seems to move, and silhouettes need a still one; expect poor masks",
+            scan.camera_moves
+            and "the camera seems to move, and silhouettes need a still one; expect poor masks",
         ]
         packed = PackedMasks(
             names=[f"{video.path}, frame {self.start + k}" for k in range(count)],
@@ -306,32 +402,48 @@ class Segmentation:
             first=self.start,
             guesses=video.guesses,
         )
-        columns = [np.flatnonzero(packed.silhouette(k).mask) % self.size[0] for k in range(count)]
+        columns = [
+            np.flatnonzero(packed.silhouette(k).mask) % self.size[0]
+            for k in range(count)
+        ]
         middles = [float(each.mean()) if len(each) else math.nan for each in columns]
         return Segmented(
             packed,
             rows,
             doubt and replace(doubt, text=f"{video.path}: {doubt.text}"),
             [*video.warnings, *(f"{video.path}: {text}" for text in warnings if text)],
-            facings_on_the_spot(scan.facings, middles, [row["longer_side"] for row in rows], video.fps),
+            facings_on_the_spot(
+                scan.facings, middles, [row["longer_side"] for row in rows], video.fps
+            ),
             scan.camera_moves,
         )
 
-    def _scan(self, progress: Progress | None, changed: Callable[[int, Image], Image] | None = None) -> _Scan:
+    def _scan(
+        self,
+        progress: Progress | None,
+        changed: Callable[[int, Image], Image] | None = None,
+    ) -> _Scan:
         """Return what each frame shows: the largest blob, and the people with the quality of their masks.
 
         The segmenter gets the pictures as `changed` returns them.
         """
-        segmenter, room = self._segmenter, self.stop - self.start
-        people, camera = People(self.video.fps), CameraMotion(self.size)
-        facings, landmarks = list[float](), list[Array]()
-        blank_quality, largest_quality = segmenter.quality(), segmenter.quality()
-        blanks, largest = list[dict[str, Any]](), list[dict[str, Any]]()
+        segmenter = self._segmenter
+        room = self.stop - self.start
+        people = People(self.video.fps)
+        camera = CameraMotion(self.size)
+        facings = list[float]()
+        landmarks = list[Array]()
+        blank_quality = segmenter.quality()
+        largest_quality = segmenter.quality()
+        blanks = list[dict[str, Any]]()
+        largest = list[dict[str, Any]]()
         masks, valid = (empty_planes(room, self.size) for _ in range(2))
         images = self.video.frames(self.start, self.stop, self.size)
         for k, image in enumerate(progress(images, room) if progress else images):
             camera.add(k, image)
-            blobs, facing, points = segmenter.frame(image if changed is None else changed(k, image))
+            blobs, facing, points = segmenter.frame(
+                image if changed is None else changed(k, image)
+            )
             facings.append(facing)
             landmarks.append(points)
             known = blobs[0].valid
@@ -340,15 +452,29 @@ class Segmentation:
             empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
             for tracklet in people.active:
                 tracklet.quality = tracklet.quality or deepcopy(blank_quality)
-                person = _alone(tracklet, present, blobs, k) if tracklet in present else empty
+                person = (
+                    _alone(tracklet, present, blobs, k)
+                    if tracklet in present
+                    else empty
+                )
                 tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
             blanks.append(self._row(blank_quality, image, empty, k))
             largest.append(self._row(largest_quality, image, blobs[0], k))
         count = len(blanks)  # the file may break off
-        frames = masks[:count], valid[:count], people, largest, blanks, facings, np.array(landmarks)
+        frames = (
+            masks[:count],
+            valid[:count],
+            people,
+            largest,
+            blanks,
+            facings,
+            np.array(landmarks),
+        )
         return _Scan(*frames, camera.moves, self.how.person)
 
-    def with_identities(self, single: "Segmentation", scan: _Scan, progress: Progress | None) -> _Scan:
+    def with_identities(
+        self, single: "Segmentation", scan: _Scan, progress: Progress | None
+    ) -> _Scan:
         """Return the scan of a segmenter that reports one person only, with the people of this still background.
 
         Nothing changes where this one has one person only, or poor masks of all. For the person who is followed
@@ -356,44 +482,80 @@ class Segmentation:
         one's is used. Without a choice that is the first, or, if `single` does not find them, its most frequent one.
         """
         own = self._scan(progress)
-        persons, learned = own.people.persons(), self._segmenter.learned
-        doubts = [verdict(rows_of(person, own.blanks)[1], self.how.name, learned=learned) for person in persons]
+        persons = own.people.persons()
+        learned = self._segmenter.learned
+        doubts = [
+            verdict(rows_of(person, own.blanks)[1], self.how.name, learned=learned)
+            for person in persons
+        ]
         if len(persons) < 2 or own.camera_moves or all(doubts):
             return scan
-        indices = person_indices(persons, (unpacked(plane, self.size) for plane in scan.masks))
+        indices = person_indices(
+            persons, (unpacked(plane, self.size) for plane in scan.masks)
+        )
         if not any(index is not None for index in indices):
             return scan
-        most, chosen = max(range(len(persons)), key=indices.count), self.how.person
+        most = max(range(len(persons)), key=indices.count)
+        chosen = self.how.person
         for choice in dict.fromkeys((1, 1 + most)) if chosen is None else [chosen]:
             parts, _ = own.people.chosen(choice, str, 1.0 / self._segmenter.scale)
-            scan = self._without_others(single, parts, own.people.others(parts), progress)
-            indices = person_indices(persons, (unpacked(plane, self.size) for plane in scan.masks))
-            frames = [k for k, index in enumerate(indices) if index is not None and persons[index] == parts]
-            if len(frames) >= REDIRECTED * len({frame for part in parts for frame in part.detections}):
+            scan = self._without_others(
+                single, parts, own.people.others(parts), progress
+            )
+            indices = person_indices(
+                persons, (unpacked(plane, self.size) for plane in scan.masks)
+            )
+            frames = [
+                k
+                for k, index in enumerate(indices)
+                if index is not None and persons[index] == parts
+            ]
+            if len(frames) >= REDIRECTED * len(
+                {frame for part in parts for frame in part.detections}
+            ):
                 break
-        landmarks, facings = np.zeros_like(scan.landmarks), [math.nan] * len(indices)
+        landmarks = np.zeros_like(scan.landmarks)
+        facings = [math.nan] * len(indices)
         for k in frames:
-            replace_detection(parts, k, unpacked(scan.masks[k], self.size), scan.largest[k])
-            own.valid[k], landmarks[k], facings[k] = scan.valid[k], scan.landmarks[k], scan.facings[k]
+            replace_detection(
+                parts, k, unpacked(scan.masks[k], self.size), scan.largest[k]
+            )
+            own.valid[k], landmarks[k], facings[k] = (
+                scan.valid[k],
+                scan.landmarks[k],
+                scan.facings[k],
+            )
         return own._replace(landmarks=landmarks, facings=facings, choice=choice)
 
     def _without_others(
-        self, single: "Segmentation", parts: Sequence[Tracklet], others: Sequence[Tracklet], progress: Progress | None
+        self,
+        single: "Segmentation",
+        parts: Sequence[Tracklet],
+        others: Sequence[Tracklet],
+        progress: Progress | None,
     ) -> _Scan:
         """Return another pass of a segmentation, through pictures with the background where a person is not."""
 
         def changed(k: int, image: Image) -> Image:
-            return self._segmenter.without(image, excluded_mask(parts, others, k, self.size))
+            return self._segmenter.without(
+                image, excluded_mask(parts, others, k, self.size)
+            )
 
-        return Segmentation(single.video, single.how, (single.start, single.stop))._scan(progress, changed)
+        return Segmentation(
+            single.video, single.how, (single.start, single.stop)
+        )._scan(progress, changed)
 
-    def _follow_person(self, scan: _Scan) -> tuple[str, list[dict[str, Any]], list[dict[str, Any]]]:
+    def _follow_person(
+        self, scan: _Scan
+    ) -> tuple[str, list[dict[str, Any]], list[dict[str, Any]]]:
         """Return what there is to say of several people, and the rows of the one who is followed, as `rows_of`.
 
         Of several, the scan's masks become those of this one, and the pixels of the others are unknown.
         """
         scale = 1.0 / self._segmenter.scale
-        parts, several = scan.people.chosen(scan.choice, lambda k: f"frame {self.start + k}", scale)
+        parts, several = scan.people.chosen(
+            scan.choice, lambda k: f"frame {self.start + k}", scale
+        )
         if not several:
             return several, scan.largest, scan.largest
         others = scan.people.others(parts)
@@ -402,33 +564,49 @@ class Segmentation:
             scan.masks[k], scan.valid[k] = (np.packbits(plane) for plane in planes)
         return several, *rows_of(parts, scan.blanks)
 
-    def _row(self, quality: FrameQuality, image: Image, person: Person, k: int) -> dict[str, Any]:
+    def _row(
+        self, quality: FrameQuality, image: Image, person: Person, k: int
+    ) -> dict[str, Any]:
         row = self._segmenter.row(quality, image, person, self.start + k)
-        return row | {"usable": int(row["usable"] and self.video.is_filmed(self.start + k))}
+        return row | {
+            "usable": int(row["usable"] and self.video.is_filmed(self.start + k))
+        }
 
 
-def _alone(tracklet: Tracklet, present: Sequence[Tracklet], blobs: Sequence[Person], k: int) -> Person:
+def _alone(
+    tracklet: Tracklet, present: Sequence[Tracklet], blobs: Sequence[Person], k: int
+) -> Person:
     """Return what frame k shows of a tracklet, without the others that are present."""
-    known, others = blobs[0].valid, [other for other in present if other is not tracklet and other.confirmed()]
+    known = blobs[0].valid
+    others = [other for other in present if other is not tracklet and other.confirmed()]
     mask, valid = planes_of([tracklet], others, k, known)
-    whole = next((blob for blob in blobs if blob.mask is tracklet.latest.mask), blobs[0])
+    whole = next(
+        (blob for blob in blobs if blob.mask is tracklet.latest.mask), blobs[0]
+    )
     pieces = max(min(1, whole.pieces), whole.pieces - len(others))
-    return Person(mask, valid, int(mask.sum()), pieces, whole.rival, touches_border(mask))
+    return Person(
+        mask, valid, int(mask.sum()), pieces, whole.rival, touches_border(mask)
+    )
 
 
 def facings_on_the_spot(
-    facings: Sequence[float], middles: Sequence[float], sides: Sequence[float], fps: float
+    facings: Sequence[float],
+    middles: Sequence[float],
+    sides: Sequence[float],
+    fps: float,
 ) -> Array:
     """Return which way a person faces in each frame (T,), NaN where they go across the picture or it is unknown.
 
     `middles` and `sides` are those of the mask, in pixels. For a person who goes along, the frames themselves show
     front and back, and a network is no surer.
     """
-    result, reach = np.array(facings, dtype=np.float64), max(round(STAYING * fps), 1)
+    result = np.array(facings, dtype=np.float64)
+    reach = max(round(STAYING * fps), 1)
     for k in range(len(result)):
         rows = slice(max(k - reach, 0), k + reach + 1)
         known = np.isfinite(middles[rows])
-        across, side = np.asarray(middles[rows])[known], np.asarray(sides[rows])[known]
+        across = np.asarray(middles[rows])[known]
+        side = np.asarray(sides[rows])[known]
         if known.any() and np.ptp(across) > CROSSING * np.median(side):
             result[k] = np.nan
     return result
@@ -439,13 +617,16 @@ class CameraMotion:
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = SMALL, max(16 * TILES, round(SMALL * size[1] / size[0]))
-        self._first: list[Any] | None = None  # the tiles of the first picture; None for one without texture
+        # the tiles of the first picture; None for one without texture
+        self._first: list[Any] | None = None
         self._shifts = list[float]()
 
     @property
     def moves(self) -> bool:
         """Whether the camera seems to move."""
-        return sum(shift > MOVED * SMALL for shift in self._shifts) > OFTEN * len(self._shifts)
+        return sum(shift > MOVED * SMALL for shift in self._shifts) > OFTEN * len(
+            self._shifts
+        )
 
     def add(self, k: int, image: Image) -> None:
         """Take picture k."""
@@ -458,26 +639,42 @@ class CameraMotion:
         Tiles that a person covers match anywhere, but a camera that moves takes along every tile: what all but a
         few of those with texture are shifted by at least is the camera's part. Where few have any, it is 0.
         """
-        small = cv2.cvtColor(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
-        grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)  # noise is no texture,
+        small = cv2.cvtColor(
+            cv2.resize(image, self._size, interpolation=cv2.INTER_AREA),
+            cv2.COLOR_BGR2GRAY,
+        )
+        # noise is no texture,
+        grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)
         grey -= cv2.GaussianBlur(grey, (0, 0), COARSE)  # and light that changes is none
         wide, tall = (side // TILES for side in self._size)
         corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]
-        tiles = [np.ascontiguousarray(grey[y : y + tall, x : x + wide]) for y, x in corners]
+        tiles = [
+            np.ascontiguousarray(grey[y : y + tall, x : x + wide]) for y, x in corners
+        ]
         if self._first is None:
-            self._first = [tile[REACH:-REACH, REACH:-REACH] if _textured(tile) else None for tile in tiles]
+            self._first = [
+                tile[REACH:-REACH, REACH:-REACH] if _textured(tile) else None
+                for tile in tiles
+            ]
         shifts = []
         for before, now in zip(self._first, tiles, strict=True):
             if before is not None:
-                best = cv2.minMaxLoc(cv2.matchTemplate(now, before, cv2.TM_CCOEFF_NORMED))[3]
+                best = cv2.minMaxLoc(
+                    cv2.matchTemplate(now, before, cv2.TM_CCOEFF_NORMED)
+                )[3]
                 shifts.append(float(np.hypot(*np.subtract(best, REACH))))
-        return float(np.quantile(shifts, FREE)) if len(shifts) > SPREAD * TILES**2 else 0.0
+        return (
+            float(np.quantile(shifts, FREE)) if len(shifts) > SPREAD * TILES**2 else 0.0
+        )
 
 
 def _textured(tile: Any) -> bool:
     """Return whether a tile changes along both axes, so that it shows a shift."""
     down, across = np.gradient(tile)
-    tensor = [[np.mean(across * across), np.mean(across * down)], [np.mean(across * down), np.mean(down * down)]]
+    tensor = [
+        [np.mean(across * across), np.mean(across * down)],
+        [np.mean(across * down), np.mean(down * down)],
+    ]
     return bool(np.linalg.eigvalsh(tensor)[0] > TEXTURE**2)
 
 
@@ -485,10 +682,23 @@ def _scaled_roi(roi: Box | None, video: Video, scale: float) -> Box | None:
     if roi is None:
         return None
     x, y, wide, tall = roi
-    if min(x, y) < 0 or min(wide, tall) < 1 or x + wide > video.size[0] or y + tall > video.size[1]:
-        raise InputError(f"roi must lie within the video's {video.size[0]}x{video.size[1]} pixels, got {roi}")
-    left, top = round(x * scale), round(y * scale)
-    return left, top, max(1, round((x + wide) * scale) - left), max(1, round((y + tall) * scale) - top)
+    if (
+        min(x, y) < 0
+        or min(wide, tall) < 1
+        or x + wide > video.size[0]
+        or y + tall > video.size[1]
+    ):
+        raise InputError(
+            f"roi must lie within the video's {video.size[0]}x{video.size[1]} pixels, got {roi}"
+        )
+    left = round(x * scale)
+    top = round(y * scale)
+    return (
+        left,
+        top,
+        max(1, round((x + wide) * scale) - left),
+        max(1, round((y + tall) * scale) - top),
+    )
 
 
 def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
@@ -496,5 +706,7 @@ def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
         return None
     image = read_image(path, grey=True)
     if image is None:
-        raise InputError(f"{path}: expected an image of what to ignore, got a file that is none")
+        raise InputError(
+            f"{path}: expected an image of what to ignore, got a file that is none"
+        )
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > 127)

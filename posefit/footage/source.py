@@ -11,7 +11,14 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.files import opencv_name
-from posefit.footage.cameras import CameraView, calibrated, combined, listed, same_person, world_of
+from posefit.footage.cameras import (
+    CameraView,
+    calibrated,
+    combined,
+    listed,
+    same_person,
+    world_of,
+)
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.masks import ARRAYS, Range
@@ -35,7 +42,12 @@ from posefit.reading import quoted
 NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf", ".json", ".csv", ".txt")
 SIZE = (320, 240)  # pixels of a rendered picture
 Kind = Literal["motion", "masks", "video", "pictures"]
-_KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video", "pictures": "pictures"}
+_KINDS: dict[Kind, str] = {
+    "motion": "a motion",
+    "masks": "masks",
+    "video": "a video",
+    "pictures": "pictures",
+}
 Footage = Source | Masks
 _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
     "extraction": ("video", ["video", "pictures"]),
@@ -55,13 +67,22 @@ def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
             raise useless_for(kind, name, view[name], where)
     if view.get("up") is not None and not view.get("camera") and kind != "motion":
         raise useless_for(kind, "up", view["up"], "calibrations and files of motions")
-    if view.get("unit") is not None and kind != "motion" and view.get("asf") is None and not view.get("camera"):
-        raise useless_for(kind, "unit", view["unit"], "calibrations and files of motions")
+    if (
+        view.get("unit") is not None
+        and kind != "motion"
+        and view.get("asf") is None
+        and not view.get("camera")
+    ):
+        raise useless_for(
+            kind, "unit", view["unit"], "calibrations and files of motions"
+        )
 
 
 def useless_for(kind: Kind, name: str, value: object, where: str) -> InputError:
     """Return the error of an option that sources of this kind have no use for, and says for which it is given."""
-    return InputError(f"{name} must be given for {where} only, got {quoted(value)} for {_KINDS[kind]}")
+    return InputError(
+        f"{name} must be given for {where} only, got {quoted(value)} for {_KINDS[kind]}"
+    )
 
 
 def scene_of(
@@ -93,52 +114,92 @@ def scene_of(
             opencv_name(source[0] if isinstance(source, tuple) else source)
     kinds = {kind_of(source) for source in sources}
     if len(kinds) > 1:
-        raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
+        raise InputError(
+            f"sources must be of one kind, got {' and '.join(sorted(kinds))}"
+        )
     (kind,) = kinds
     if kind == "motion":
         if len(sources) > 1:
-            raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
+            raise InputError(
+                f"source must be one motion, or views of one person, got {len(sources)} motions"
+            )
         # `up` and `unit` are those of the calibrations, where there are any, and else of the motion's file
         cameras, guesses = _placed(listed(camera), size or SIZE, up, unit)
-        stated = FileOptions(asf, None if cameras else unit, None if cameras else up, rate)
+        stated = FileOptions(
+            asf, None if cameras else unit, None if cameras else up, rate
+        )
         motion = load_motion(cast(Source, sources[0]), fps or FPS, stated)
-        return logged(synthetic(motion, view_degrees, size or SIZE, cameras, frames, guesses), progress)
+        return logged(
+            synthetic(motion, view_degrees, size or SIZE, cameras, frames, guesses),
+            progress,
+        )
     if len(view_degrees) > 1:
-        raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
+        raise InputError(
+            f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}"
+        )
     body, notes, of_height = body_of(asf, height, None if camera else unit)
     facing = view_degrees[0] if view_degrees else None
 
     def scene(views: Sequence[CameraView]) -> Scene:
-        return combined(views, Path(views[0].name).stem, body, known, facing, up, fps, unit)
+        return combined(
+            views, Path(views[0].name).stem, body, known, facing, up, fps, unit
+        )
 
     if kind in ("video", "pictures"):
-        videos = [film_of(source, fps) for source in cast(Sequence[str | Path | tuple[Path, ...]], sources)]
+        videos = [
+            film_of(source, fps)
+            for source in cast(Sequence[str | Path | tuple[Path, ...]], sources)
+        ]
         rates = {round(video.fps, 3) for video in videos}
         if len(rates) > 1:
-            raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
+            raise InputError(
+                f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}"
+            )
         known = calibrated(camera, [video.size for video in videos])
         how = replace(extraction or Extraction(), person=person)
         result = _filmed(videos, known, how, frames, progress, scene)
     else:
         known = calibrated(camera, [None] * len(sources))
-        places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
+        places = [
+            source if isinstance(source, np.ndarray | tuple) else Path(str(source))
+            for source in sources
+        ]
         views = list[CameraView]()
         for place in places:
             masks = read_masks(place, frames, label)
-            choice = partial(same_person, [known[0], known[len(views)]], views[0], masks.size) if views else person
-            views.append(CameraView(*cleaned(masks, name_of(place), holes, choice), name=name_of(place)))
+            choice = (
+                partial(
+                    same_person, [known[0], known[len(views)]], views[0], masks.size
+                )
+                if views
+                else person
+            )
+            views.append(
+                CameraView(
+                    *cleaned(masks, name_of(place), holes, choice), name=name_of(place)
+                )
+            )
         result = scene(views)
-    result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
+    result = replace(
+        result,
+        warnings=[*notes, *result.warnings],
+        guesses=[*result.guesses, *of_height],
+    )
     return logged(result, progress)
 
 
 def _placed(
-    known: Sequence[Camera | Calibration], size: tuple[int, int], up: Up | None, unit: Unit | None
+    known: Sequence[Camera | Calibration],
+    size: tuple[int, int],
+    up: Up | None,
+    unit: Unit | None,
 ) -> tuple[list[Camera], list[str]]:
     """Return the cameras around a known motion, of a `size` where a file states none, and what was guessed of them."""
     world, metres, guesses = world_of(known, up, unit)
     cameras = [
-        camera if isinstance(camera, Camera) else camera.in_metres(metres).camera(camera.size or size, world)
+        camera
+        if isinstance(camera, Camera)
+        else camera.in_metres(metres).camera(camera.size or size, world)
         for camera in known
     ]
     return cameras, [*guesses.values()]
@@ -156,18 +217,30 @@ def film_of(source: str | Path | tuple[Path, ...], fps: float | None) -> Video:
     if isinstance(source, tuple):
         return Video.of_pictures(source, Path(name_of(source)), fps)
     path = Path(source)
-    return Video.of_pictures(images_in(path), path, fps) if path.is_dir() else Video.of(path)
+    return (
+        Video.of_pictures(images_in(path), path, fps)
+        if path.is_dir()
+        else Video.of(path)
+    )
 
 
 def body_of(
     asf: str | Path | None, height: float | None, unit: Unit | None = None
 ) -> tuple[Body, Sequence[str], Sequence[str]]:
     """Return the body of a skeleton file, or the average one, scaled to a height in metres; warnings, and guesses."""
-    acclaim = Acclaim(built_in.average_skeleton(), 1.0) if asf is None else parse_asf(asf, unit)
+    acclaim = (
+        Acclaim(built_in.average_skeleton(), 1.0)
+        if asf is None
+        else parse_asf(asf, unit)
+    )
     body = Body.of(acclaim.skeleton)
     if height is not None:
         return body.scaled(height / body.stature, height / body.stature), (), ()
-    return body, acclaim.notes, [f"a person of {body.stature:.2f} m"] if asf is None else ()
+    return (
+        body,
+        acclaim.notes,
+        [f"a person of {body.stature:.2f} m"] if asf is None else (),
+    )
 
 
 def _filmed(
@@ -185,11 +258,14 @@ def _filmed(
     tried = list[tuple[str, Scene | None, Verdict | None]]()
     for way in how.ways(len(videos)):
         among = how if len(videos) == 1 and way is not how else None
-        parts = [Segmentation(video, way, frames, among) for video in videos]  # all are checked before any is read
+        # all are checked before any is read
+        parts = [Segmentation(video, way, frames, among) for video in videos]
         tried.append((way.name, *_taken_out(parts, known, progress, scene)))
         if tried[-1][2] is None:
             break
-    name, result, doubt = min(tried, key=lambda way: 0 if way[2] is None else 1 + way[2].refused)
+    name, result, doubt = min(
+        tried, key=lambda way: 0 if way[2] is None else 1 + way[2].refused
+    )
     if result is None:
         assert doubt is not None
         raise InputError(doubt.text)
@@ -207,18 +283,30 @@ def _taken_out(
     scene: Callable[[Sequence[CameraView]], Scene],
 ) -> tuple[Scene | None, Verdict | None]:
     """Return the scene of what videos show, and the worst that is wrong with their masks; no scene of refused ones."""
-    views, worst = list[CameraView](), None
+    views = list[CameraView]()
+    worst = None
     try:
         for part in parts:
-            progress.log(f"taking the person out of {part.video.path} by {part.how.name}")
-            choose = partial(same_person, [known[0], known[len(views)]], views[0], part.size) if views else None
-            masks, _, doubt, warnings, facings, moves = part.read(progress.steps, choose)
+            progress.log(
+                f"taking the person out of {part.video.path} by {part.how.name}"
+            )
+            choose = (
+                partial(same_person, [known[0], known[len(views)]], views[0], part.size)
+                if views
+                else None
+            )
+            masks, _, doubt, warnings, facings, moves = part.read(
+                progress.steps, choose
+            )
             if doubt is not None and doubt.refused:
                 return None, doubt
             worst = worst or doubt
             pictures = partial(part.video.frames, part.start, part.stop, masks.size)
-            name, filmed = str(part.video.path), part.video.size
-            views.append(CameraView(masks, warnings, name, filmed, pictures, facings, moves))
+            name = str(part.video.path)
+            filmed = part.video.size
+            views.append(
+                CameraView(masks, warnings, name, filmed, pictures, facings, moves)
+            )
         return scene(views), worst
     except InputError as error:
         return None, Verdict(str(error), True)
@@ -233,15 +321,25 @@ def kind_of(source: Footage) -> Kind:
     if isinstance(source, np.ndarray):
         return "masks"
     if isinstance(source, tuple):
-        return "pictures" if is_photo(source[0]) and (len(source) > 1 or page_count(source[0]) > 1) else "masks"
-    if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
+        return (
+            "pictures"
+            if is_photo(source[0]) and (len(source) > 1 or page_count(source[0]) > 1)
+            else "masks"
+        )
+    if (
+        isinstance(source, Motion)
+        or source in built_in.names()
+        or recorded.is_recorded(source)
+    ):
         return "motion"
     path = Path(source)
     if path.suffix.lower() in IMAGES and not path.is_dir():
         return kind_of((path,))
     if path.is_dir():
         if (path / "poses.npz").is_file() and (path / "summary.json").is_file():
-            raise InputError(f"{path}: expected a source, got a track's folder: give the source that it was made from")
+            raise InputError(
+                f"{path}: expected a source, got a track's folder: give the source that it was made from"
+            )
         return kind_of(tuple(images)) if (images := images_in(path)) else "masks"
     if path.suffix.lower() in ARRAYS or (not path.suffix and os.sep in str(source)):
         return "masks"

@@ -25,8 +25,11 @@ HEAD = 2_000  # bytes at the beginning of a file by which a text is recognised
 SQUARE = 0.02  # by how much the sides of a pixel may differ
 Order = NDArray[np.int64]  # (T,) numbers of frames
 CODE = "mp4v"
-UNEVEN = 0.75  # of the distance between frames: one that comes so much too early or too late is not in its place
-DENSEST = 4.0  # times the mean rate: frames are not taken more often, however short some of them are
+# of the distance between frames: one that comes so much too early or too late is not in
+# its place
+UNEVEN = 0.75
+# times the mean rate: frames are not taken more often, however short some of them are
+DENSEST = 4.0
 # posefit reports once what is wrong with a file; a user may set the variable to get FFmpeg's own messages
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
@@ -40,11 +43,15 @@ class Video:
     size: tuple[int, int]  # width and height in pixels, as filmed
     claimed: int = 0  # frames, by what the file says of itself; 0 where it says nothing
     # images, or their files and pages; of a video file none
-    pictures: Sequence[tuple[Path, int] | Image] = field(default=(), repr=False, compare=False)
+    pictures: Sequence[tuple[Path, int] | Image] = field(
+        default=(), repr=False, compare=False
+    )
     warnings: Sequence[str] = ()  # what a user should know of its frames
     guesses: Sequence[str] = ()  # what it does not state
-    _order: Order = field(kw_only=True, repr=False, compare=False)  # of the file's frames: one for each moment
-    _filmed: NDArray[np.bool_] = field(kw_only=True, repr=False, compare=False)  # (T,) at that moment
+    # of the file's frames: one for each moment
+    _order: Order = field(kw_only=True, repr=False, compare=False)
+    # (T,) at that moment
+    _filmed: NDArray[np.bool_] = field(kw_only=True, repr=False, compare=False)
 
     @classmethod
     def of(cls, path: str | Path) -> "Video":
@@ -56,16 +63,28 @@ class Video:
         _check_no_text(path)
         capture = cv2.VideoCapture(opencv_name(path))
         try:
-            wide, tall = (capture.get(key) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+            wide, tall = (
+                capture.get(key)
+                for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+            )
             if wide * tall > PIXELS:
                 most = f"{PIXELS // 10**6} million pixels"
-                raise InputError(f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}")
+                raise InputError(
+                    f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}"
+                )
             read, image = capture.read()
             if not read:
-                raise InputError(f"{path}: expected a video that OpenCV can read, got none or one without frames")
+                raise InputError(
+                    f"{path}: expected a video that OpenCV can read, got none or one without frames"
+                )
             fps, claimed, across, down = (
                 float(capture.get(key))
-                for key in (cv2.CAP_PROP_FPS, cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_SAR_NUM, cv2.CAP_PROP_SAR_DEN)
+                for key in (
+                    cv2.CAP_PROP_FPS,
+                    cv2.CAP_PROP_FRAME_COUNT,
+                    cv2.CAP_PROP_SAR_NUM,
+                    cv2.CAP_PROP_SAR_DEN,
+                )
             )
             _check_written(path, image, capture)
         finally:
@@ -84,49 +103,90 @@ class Video:
                 f"{path}: its frames come at uneven times; it is sampled {rate:.3g} times a second, so that {held} of "
                 f"{len(order)} frames stand for moments without a filmed one, and are held"
             )
-        guesses = [] if stated else [f"{path}: {FPS:g} frames a second, which the file does not state"]
+        guesses = (
+            []
+            if stated
+            else [f"{path}: {FPS:g} frames a second, which the file does not state"]
+        )
         size = image.shape[1], image.shape[0]
-        video = cls(path, rate, size, warnings=warnings, guesses=guesses, _order=order, _filmed=filmed)
+        video = cls(
+            path,
+            rate,
+            size,
+            warnings=warnings,
+            guesses=guesses,
+            _order=order,
+            _filmed=filmed,
+        )
         # what a file says counts the frames as they were filmed
-        return replace(video, claimed=int(claimed)) if 0.0 < claimed < 1e9 and not uneven else video
+        return (
+            replace(video, claimed=int(claimed))
+            if 0.0 < claimed < 1e9 and not uneven
+            else video
+        )
 
     @classmethod
     def of_images(cls, images: Sequence[Image], name: Path, fps: float) -> "Video":
         """Return the film of images in memory."""
-        order, size = np.arange(len(images)), (images[0].shape[1], images[0].shape[0])
+        order = np.arange(len(images))
+        size = (images[0].shape[1], images[0].shape[0])
         return cls(name, fps, size, pictures=images, _order=order, _filmed=order >= 0)
 
     @classmethod
-    def of_pictures(cls, files: Sequence[Path], name: Path, fps: float | None) -> "Video":
+    def of_pictures(
+        cls, files: Sequence[Path], name: Path, fps: float | None
+    ) -> "Video":
         """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
         frames, guesses = numbered(files, str(name))
-        pictures: list[tuple[Path, int] | Image] = [(file, page) for file in files for page in range(page_count(file))]
+        pictures: list[tuple[Path, int] | Image] = [
+            (file, page) for file in files for page in range(page_count(file))
+        ]
         image = _picture(pictures[0])
         filmed = np.array([file is not None for file in frames])
         order = np.cumsum(filmed) - 1
         if len(pictures) > len(files):
-            order, filmed = np.arange(len(pictures)), np.ones(len(pictures), dtype=bool)
+            order = np.arange(len(pictures))
+            filmed = np.ones(len(pictures), dtype=bool)
         size = image.shape[1], image.shape[0]
         if fps is None:
             guesses.append(f"{FPS:g} frames a second")
-        return cls(name, fps or FPS, size, 0, pictures, guesses=guesses, _order=order, _filmed=filmed)
+        return cls(
+            name,
+            fps or FPS,
+            size,
+            0,
+            pictures,
+            guesses=guesses,
+            _order=order,
+            _filmed=filmed,
+        )
 
-    def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
+    def frames(
+        self, start: int, stop: int | None, size: tuple[int, int], step: int = 1
+    ) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop, scaled to `size`.
 
         Raises InputError where a frame has another size than the first.
         """
-        wanted = Counter(self._order[start:stop:step].tolist())  # a frame may stand for several moments
-        decoded = (_picture(self.pictures[k]) for k in wanted) if self.pictures else self._decoded(list(wanted))
+        # a frame may stand for several moments
+        wanted = Counter(self._order[start:stop:step].tolist())
+        decoded = (
+            (_picture(self.pictures[k]) for k in wanted)
+            if self.pictures
+            else self._decoded(list(wanted))
+        )
         for (number, times), image in zip(wanted.items(), decoded, strict=False):
             if (image.shape[1], image.shape[0]) != self.size:
                 came = f"{image.shape[1]}x{image.shape[0]} in frame {number}"
-                raise InputError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
+                raise InputError(
+                    f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}"
+                )
             yield from repeat(scaled(image, size), times)
 
     def _decoded(self, numbers: Sequence[int]) -> Iterator[Image]:
         """Yield the frames of these numbers of a video file, as far as it can be read."""
-        capture, k = cv2.VideoCapture(opencv_name(self.path)), -1
+        capture = cv2.VideoCapture(opencv_name(self.path))
+        k = -1
         try:
             for number in numbers:
                 while k < number - 1 and capture.grab():
@@ -162,7 +222,11 @@ def _check_no_text(path: Path) -> None:
     """Raise InputError for a text, such as a playlist, by which FFmpeg would open other files."""
     with path.open("rb") as file:
         head = file.read(HEAD)
-    is_text = head and not head.startswith(b"YUV4MPEG2") and all(byte >= 32 or byte in b"\t\n\r\f" for byte in head)
+    is_text = (
+        head
+        and not head.startswith(b"YUV4MPEG2")
+        and all(byte >= 32 or byte in b"\t\n\r\f" for byte in head)
+    )
     if is_text or head.startswith((b"ffconcat", b"#EXTM3U")):
         raise InputError(f"{path}: expected a video that OpenCV can read, got a text")
 
@@ -187,16 +251,22 @@ def _check_written(path: Path, first: Any, capture: Any) -> None:
 
 def scaled(image: Any, size: tuple[int, int]) -> Image:
     """Return a picture scaled to a width and a height: by a whole number first, which takes a tenth of the time."""
-    wide, tall = image.shape[1], image.shape[0]
+    wide = image.shape[1]
+    tall = image.shape[0]
     whole = min(wide // size[0], tall // size[1])
     if whole > 1 and wide % whole == tall % whole == 0:
-        image = cv2.resize(image, (wide // whole, tall // whole), interpolation=cv2.INTER_AREA)
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        image = cv2.resize(
+            image, (wide // whole, tall // whole), interpolation=cv2.INTER_AREA
+        )
+    return np.asarray(
+        cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8
+    )
 
 
 def _moments(path: Path) -> Array:
     """Return when each frame is shown, in seconds, by going through them."""
-    capture, times = cv2.VideoCapture(opencv_name(path)), []
+    capture = cv2.VideoCapture(opencv_name(path))
+    times = []
     while capture.grab():
         times.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
     capture.release()
@@ -216,7 +286,8 @@ def _even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
     if np.abs(times - times[0] - mean * whole).max() <= UNEVEN * mean:
         return whole, whole >= 0, fps
     usual = max(float(np.median(apart)), mean / DENSEST)
-    usual = float(apart.sum() / np.maximum(np.round(apart / usual), 1.0).sum())  # stamps are rounded
+    # stamps are rounded
+    usual = float(apart.sum() / np.maximum(np.round(apart / usual), 1.0).sum())
     moments = times[0] + usual * np.arange(round((times[-1] - times[0]) / usual) + 1)
     later = np.clip(np.searchsorted(times, moments), 1, len(times) - 1)
     earlier = moments - times[later - 1] <= times[later] - moments
@@ -231,10 +302,15 @@ class VideoWriter:
     """Writes an .mp4 whose number of frames is checked at the end: OpenCV says nothing when the disk is full."""
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
-        self._path, self._count = path, 0
-        self._writer = cv2.VideoWriter(opencv_name(path), cv2.VideoWriter.fourcc(*CODE), fps, size)
+        self._path = path
+        self._count = 0
+        self._writer = cv2.VideoWriter(
+            opencv_name(path), cv2.VideoWriter.fourcc(*CODE), fps, size
+        )
         if not self._writer.isOpened():
-            raise InputError(f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot")
+            raise InputError(
+                f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot"
+            )
 
     def write(self, image: Image) -> None:
         """Add a frame."""
@@ -245,10 +321,14 @@ class VideoWriter:
         """Finish the file. Raises OSError where it does not hold all frames."""
         self._writer.release()
         capture = cv2.VideoCapture(opencv_name(self._path))
-        written = round(capture.get(cv2.CAP_PROP_FRAME_COUNT)) if capture.isOpened() else 0
+        written = (
+            round(capture.get(cv2.CAP_PROP_FRAME_COUNT)) if capture.isOpened() else 0
+        )
         capture.release()
         if written != self._count:
-            raise OSError(errno.ENOSPC, f"room for {written} of {self._count} frames of video")
+            raise OSError(
+                errno.ENOSPC, f"room for {written} of {self._count} frames of video"
+            )
 
     def __enter__(self) -> "VideoWriter":
         return self

@@ -6,7 +6,15 @@ import numpy as np
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton, kind
+from posefit.geometry.skeleton import (
+    ANGLES,
+    BONES,
+    JOINTS,
+    MIRROR,
+    PARENTS,
+    Skeleton,
+    kind,
+)
 
 # Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.
 PROPORTIONS = {
@@ -57,17 +65,24 @@ class Body:
     @property
     def stature(self) -> float:
         """How tall the body stands, in metres: its legs straight and upright, the rest as in its rest pose."""
-        skeleton, at = self.skeleton, BONES.index
+        skeleton = self.skeleton
+        at = BONES.index
         joints = skeleton.joints(np.zeros(ANGLES))
         crown = joints[JOINTS.index("head"), 1] + self.radii[at("head"), 1]
         leg = skeleton.lengths[[at("lfemur"), at("ltibia")]].sum()
-        sole = max(0.0, -float(skeleton.offsets[at("lfoot"), 1])) + self.radii[at("lfoot"), 1]
+        sole = (
+            max(0.0, -float(skeleton.offsets[at("lfoot"), 1]))
+            + self.radii[at("lfoot"), 1]
+        )
         return float(crown - joints[JOINTS.index("lhipjoint"), 1] + leg + sole)
 
     def scaled(self, lengths: Array | float, girths: Array | float) -> "Body":
         """Return the body with its bones' lengths and radii multiplied by factors, one for all or one a bone (26,)."""
-        lengths, girths = np.broadcast_to(lengths, len(BONES)), np.broadcast_to(girths, len(BONES))
-        skeleton = replace(self.skeleton, offsets=self.skeleton.offsets * lengths[:, None])
+        lengths = np.broadcast_to(lengths, len(BONES))
+        girths = np.broadcast_to(girths, len(BONES))
+        skeleton = replace(
+            self.skeleton, offsets=self.skeleton.offsets * lengths[:, None]
+        )
         return Body(skeleton, self.radii * girths[:, None])
 
 
@@ -76,6 +91,8 @@ def varied(body: Body, percent: float, rng: np.random.Generator) -> Body:
     if percent == 0.0:
         return body
     mirror = np.array(MIRROR)
-    shares = [1.0 + rng.uniform(-percent, percent, len(JOINTS)) / 100.0 for _ in range(2)]
+    shares = [
+        1.0 + rng.uniform(-percent, percent, len(JOINTS)) / 100.0 for _ in range(2)
+    ]
     lengths, girths = (0.5 * (share + share[mirror])[1:] for share in shares)
     return body.scaled(lengths, girths)

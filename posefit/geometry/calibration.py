@@ -46,26 +46,89 @@ _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
 SUBPIXELS = 64.0  # Qualisys counts lengths on the sensor in 64ths of a pixel
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 # The rotation of the world that turns an axis to +y.
-TURNS = {"x": [[0, -1, 0], [1, 0, 0], [0, 0, 1]], "y": np.eye(3), "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}
-LEVEL = 0.5  # of the images' up direction: where less of it is along the axis that a file says is up, it is doubted
+TURNS = {
+    "x": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+    "y": np.eye(3),
+    "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+}
+# of the images' up direction: where less of it is along the axis that a file says is
+# up, it is doubted
+LEVEL = 0.5
 
 # Names of what describes a camera, in small letters and without signs between: Camera_Matrix is cameramatrix
-MATRIX = ("cameramatrix", "matrix", "k", "m", "mtx", "intrinsic", "intrinsics", "intrinsicmatrix")
+MATRIX = (
+    "cameramatrix",
+    "matrix",
+    "k",
+    "m",
+    "mtx",
+    "intrinsic",
+    "intrinsics",
+    "intrinsicmatrix",
+)
 LENS = (
-    *("distortioncoefficients", "distortioncoeffs", "distortions", "distortion", "distcoefficients", "distcoeffs"),
+    *(
+        "distortioncoefficients",
+        "distortioncoeffs",
+        "distortions",
+        "distortion",
+        "distcoefficients",
+        "distcoeffs",
+    ),
     *("distcoefs", "distcoeff", "dist", "d", "kc"),
 )
-MODEL = ("distortionmodel", "fisheyemodel", "fisheye", "isfisheye", "lensmodel", "cameramodel", "model")
+MODEL = (
+    "distortionmodel",
+    "fisheyemodel",
+    "fisheye",
+    "isfisheye",
+    "lensmodel",
+    "cameramodel",
+    "model",
+)
 SIZE = ("imagesize", "size", "resolution", "imgsize", "imsize")
 SIDES = (("imagewidth", "width", "w"), ("imageheight", "height", "h"))
 ROTATION = ("r", "rotation", "rvec", "rot", "rmat", "rotationmatrix", "rotationvector")
 TRANSLATION = ("t", "translation", "tvec", "translationvector")
-_FISHEYES = ("1", "true", "yes", "fisheye", "equidistant", "kannalabrandt", "kannalabrandt4", "opencvfisheye", "kb4")
-_POLYNOMIALS = (
-    *("0", "false", "no", "none", "null", "", "plumbbob", "brown", "brownconrady", "pinhole", "perspective"),
-    *("opencv", "fullopencv", "polynomial", "rationalpolynomial", "radtan", "radialtangential", "standard"),
+_FISHEYES = (
+    "1",
+    "true",
+    "yes",
+    "fisheye",
+    "equidistant",
+    "kannalabrandt",
+    "kannalabrandt4",
+    "opencvfisheye",
+    "kb4",
 )
-_OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
+_POLYNOMIALS = (
+    *(
+        "0",
+        "false",
+        "no",
+        "none",
+        "null",
+        "",
+        "plumbbob",
+        "brown",
+        "brownconrady",
+        "pinhole",
+        "perspective",
+    ),
+    *(
+        "opencv",
+        "fullopencv",
+        "polynomial",
+        "rationalpolynomial",
+        "radtan",
+        "radialtangential",
+        "standard",
+    ),
+)
+# models not read
+_OTHERS = re.compile(
+    "omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular"
+)
 # keys that seem to describe a lens, such as radial_distortion, kappa1, k7 or xi; not distance, lens_mm or lens_serial
 _OF_LENS = re.compile(
     r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|(k|kappa)[0-9]*|xi"
@@ -77,13 +140,18 @@ class Calibration:
     """One camera's entry in a calibration file. Lengths are metres, or the file's unit, and pixels."""
 
     name: str
-    size: tuple[int, int] | None  # width, height; None where the file does not state it: that of its pictures
-    matrix: Array = field(repr=False)  # (3, 3) of the pinhole, skew ignored; pixel centres at 0, as OpenCV counts them
-    distortion: Array = field(repr=False)  # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; none is all 0
-    rotation: Array | None = field(repr=False)  # (3, 3) camera_from_world; None where the file does not place it
+    # width, height; None where the file does not state it: that of its pictures
+    size: tuple[int, int] | None
+    # (3, 3) of the pinhole, skew ignored; pixel centres at 0, as OpenCV counts them
+    matrix: Array = field(repr=False)
+    # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; none is all 0
+    distortion: Array = field(repr=False)
+    # (3, 3) camera_from_world; None where the file does not place it
+    rotation: Array | None = field(repr=False)
     translation: Array | None = field(repr=False)  # (3,)
     fisheye: bool = False
-    upright: bool = False  # whether +y is known to be up in its world, as in our own files
+    # whether +y is known to be up in its world, as in our own files
+    upright: bool = False
 
     @property
     def distorted(self) -> bool:
@@ -92,7 +160,11 @@ class Calibration:
 
     def in_metres(self, metres: float) -> "Calibration":
         """Return the calibration of a file whose unit is so many metres."""
-        return self if self.translation is None else replace(self, translation=metres * self.translation)
+        return (
+            self
+            if self.translation is None
+            else replace(self, translation=metres * self.translation)
+        )
 
     def camera(self, size: tuple[int, int], world: Array) -> Camera:
         """Return the camera of pictures scaled to `size` without their distortion; `world` (3, 3) turns its up to +y.
@@ -100,7 +172,11 @@ class Calibration:
         A camera that the file does not place stands at the origin and looks level along -z.
         """
         scale = np.array(size) / (self.size or size)
-        rotation = np.diag([1.0, -1.0, -1.0]) if self.rotation is None else self.rotation @ world.T
+        rotation = (
+            np.diag([1.0, -1.0, -1.0])
+            if self.rotation is None
+            else self.rotation @ world.T
+        )
         translation = np.zeros(3) if self.translation is None else self.translation
         focal = np.diag(self.matrix)[:2] * scale
         centre = (self.matrix[:2, 2] + HALF) * scale
@@ -115,17 +191,26 @@ class Calibration:
         """
         if self.size is None:
             middle = self.matrix[:2, 2] / size
-            fits = ((middle > 0.25) & (middle < 0.75)).all() and is_focal(np.diag(self.matrix)[:2], size)
+            fits = ((middle > 0.25) & (middle < 0.75)).all() and is_focal(
+                np.diag(self.matrix)[:2], size
+            )
             return replace(self, size=size) if fits else None
         for side, other in zip(self.size, size, strict=True):
-            if side != other and (abs(side - other) >= BLOCK or max(side, other) % BLOCK):
+            if side != other and (
+                abs(side - other) >= BLOCK or max(side, other) % BLOCK
+            ):
                 return None
         return replace(self, size=size)
 
     def maps(self, size: tuple[int, int]) -> tuple[Any, Any]:
         """Return the two maps with which cv2.remap undoes the distortion of pictures scaled to `size`."""
-        matrix, lens = self._scaled_matrix(size), self.distortion[: 4 if self.fisheye else None]
-        maps = cv2.fisheye.initUndistortRectifyMap if self.fisheye else cv2.initUndistortRectifyMap
+        matrix = self._scaled_matrix(size)
+        lens = self.distortion[: 4 if self.fisheye else None]
+        maps = (
+            cv2.fisheye.initUndistortRectifyMap
+            if self.fisheye
+            else cv2.initUndistortRectifyMap
+        )
         return maps(matrix, lens, np.eye(3), matrix, size, cv2.CV_32FC1)
 
     def _scaled_matrix(self, size: tuple[int, int]) -> Array:
@@ -137,8 +222,15 @@ class Calibration:
         matrix = self._scaled_matrix(size)
         bent = points[..., :2].reshape(-1, 1, 2).astype(np.float64) - HALF
         undistort = cv2.fisheye.undistortPoints if self.fisheye else cv2.undistortPoints
-        straight = undistort(bent, matrix, self.distortion[: 4 if self.fisheye else None], P=matrix) + HALF
-        return np.concatenate([straight.reshape(*points.shape[:-1], 2), points[..., 2:]], axis=-1)
+        straight = (
+            undistort(
+                bent, matrix, self.distortion[: 4 if self.fisheye else None], P=matrix
+            )
+            + HALF
+        )
+        return np.concatenate(
+            [straight.reshape(*points.shape[:-1], 2), points[..., 2:]], axis=-1
+        )
 
 
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
@@ -150,11 +242,17 @@ def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     if up is not None and up not in TURNS:
         raise InputError(f"up must be one of x, y, z, got {quoted(up)}")
     image_up = _image_up(calibrations)
-    if image_up is None or (up is None and any(camera.upright for camera in calibrations)):
+    if image_up is None or (
+        up is None and any(camera.upright for camera in calibrations)
+    ):
         return np.eye(3)
     axis = up or _axis(image_up)
     turn = np.array(TURNS[axis], dtype=np.float64)
-    return turn if up is not None or (turn @ image_up)[1] > 0.0 else np.diag([1.0, -1.0, -1.0]) @ turn
+    return (
+        turn
+        if up is not None or (turn @ image_up)[1] > 0.0
+        else np.diag([1.0, -1.0, -1.0]) @ turn
+    )
 
 
 def guessed_up(calibrations: Sequence[Calibration]) -> str:
@@ -186,27 +284,45 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
 
     Raises InputError naming the file and what is wrong.
     """
-    path, chosen = Path(path), ""
+    path = Path(path)
+    chosen = ""
     file, colon, name = str(path).rpartition(":")
     if colon and not path.is_file():
-        path, chosen = Path(file), name
+        path = Path(file)
+        chosen = name
     if not path.is_file():
-        raise InputError(f"{path}: expected a calibration file, got nothing of that name")
+        raise InputError(
+            f"{path}: expected a calibration file, got nothing of that name"
+        )
     text = read_text(path, LARGEST_FILE)
     try:
         calibrations = _cameras(path, text)
         for calibration in calibrations:
             calibration.camera(calibration.size or (1000, 1000), np.eye(3))
-    except (ValueError, TypeError, KeyError, OverflowError, AttributeError, RecursionError, cv2.error) as error:
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        OverflowError,
+        AttributeError,
+        RecursionError,
+        cv2.error,
+    ) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
         reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)
-        raise InputError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {reason}") from None
+        raise InputError(
+            f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {reason}"
+        ) from None
     if not calibrations:
         raise InputError(f"{path}: expected a calibration with a camera, got none")
     names = [calibration.name for calibration in calibrations]
     if chosen and chosen not in names:
-        raise InputError(f"{path}: expected the name of a camera, {cut(', '.join(names))}, got {quoted(chosen)}")
-    return [calibration for calibration in calibrations if chosen in ("", calibration.name)]
+        raise InputError(
+            f"{path}: expected the name of a camera, {cut(', '.join(names))}, got {quoted(chosen)}"
+        )
+    return [
+        calibration for calibration in calibrations if chosen in ("", calibration.name)
+    ]
 
 
 def _cameras(path: Path, text: str) -> list[Calibration]:
@@ -217,36 +333,56 @@ def _cameras(path: Path, text: str) -> list[Calibration]:
     if start.startswith("{") and "camera_from_world" in text:
         return _own(path)
     values = _stored_values(path, start, text)
-    if "names" in values and any(key.startswith("K_") or key.startswith("Rot_") for key in values):
+    if "names" in values and any(
+        key.startswith("K_") or key.startswith("Rot_") for key in values
+    ):
         return _easymocap(path, values)
     return _described(path.stem, values)
 
 
 def _own(path: Path) -> list[Calibration]:
     camera = Camera.from_json(path)
-    matrix, size = pinhole_matrix(camera.focal, camera.centre - HALF), (camera.width, camera.height)
-    return [Calibration(path.stem, size, matrix, np.zeros(4), camera.rotation, camera.translation, upright=True)]
+    matrix = pinhole_matrix(camera.focal, camera.centre - HALF)
+    size = (camera.width, camera.height)
+    return [
+        Calibration(
+            path.stem,
+            size,
+            matrix,
+            np.zeros(4),
+            camera.rotation,
+            camera.translation,
+            upright=True,
+        )
+    ]
 
 
 def _described(name: str, values: Mapping[str, Any]) -> list[Calibration]:
     """Return the camera that values describe by their keys, or those of their tables, and of the tables in these."""
-    cameras, tables = list[Calibration](), [(name, values)]
+    cameras = list[Calibration]()
+    tables = [(name, values)]
     for _ in range(3):
         inner: list[tuple[str, Mapping[str, Any]]] = []
         for name, table in tables:
             known = {_plain(key): value for key, value in table.items()}
-            if str(known.get("ignore")).lower() == "true":  # a camera that Caliscope left out
+            # a camera that Caliscope left out
+            if str(known.get("ignore")).lower() == "true":
                 continue
             if {"fx", "fy", "cx", "cy"} <= known.keys():
-                axes = ([_number_of(known[kind + axis]) for axis in "xy"] for kind in "fc")
+                axes = (
+                    [_number_of(known[kind + axis]) for axis in "xy"] for kind in "fc"
+                )
                 known["matrix"] = pinhole_matrix(*axes).tolist()
             if _first(known, MATRIX) is not None:
                 cameras.append(_camera(name, table, known))
             elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
-                raise InputError(f"{quoted(name)} without camera_matrix, image_width and image_height")
+                raise InputError(
+                    f"{quoted(name)} without camera_matrix, image_width and image_height"
+                )
             else:
                 inner += _tables(table)
-        if len(inner) > MOST_TABLES:  # as an alias of YAML may give the same one again and again
+        # as an alias of YAML may give the same one again and again
+        if len(inner) > MOST_TABLES:
             raise InputError(f"a file of more than {MOST_TABLES:,} tables")
         tables = inner
     return cameras
@@ -259,26 +395,40 @@ def _tables(values: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]
             yield str(value.get("name", key)), value
         elif isinstance(value, list):
             tables = (entry for entry in value if isinstance(entry, dict))
-            yield from ((str(table.get("name", f"{key}{number}")), table) for number, table in enumerate(tables))
+            yield from (
+                (str(table.get("name", f"{key}{number}")), table)
+                for number, table in enumerate(tables)
+            )
 
 
-def _camera(name: str, values: Mapping[str, Any], known: Mapping[str, Any]) -> Calibration:
+def _camera(
+    name: str, values: Mapping[str, Any], known: Mapping[str, Any]
+) -> Calibration:
     """Return the camera that values describe, whose keys in small letters and digits are those of `known`."""
     matrix = _matrix_of(_first(known, MATRIX))
     if matrix.shape == (4,):  # as Kalibr has it
         matrix = pinhole_matrix(matrix[:2], matrix[2:])
     fisheye = _is_fisheye(known)
-    numbered = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")  # in OpenCV's order
+    # in OpenCV's order
+    numbered = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")
     lens = _first(known, LENS)
     if lens is None or (isinstance(lens, dict) and "k1" in lens):
         lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
     others = *LENS, *MODEL, *numbered, next(key for key in MATRIX if key in known)
     for key, value in values.items():
-        if _OF_LENS.fullmatch(plain := _plain(key)) and plain not in others and _counts(value):
-            raise InputError(f"the lens key {quoted(key)} of {quoted(name)}, which is not known")
+        if (
+            _OF_LENS.fullmatch(plain := _plain(key))
+            and plain not in others
+            and _counts(value)
+        ):
+            raise InputError(
+                f"the lens key {quoted(key)} of {quoted(name)}, which is not known"
+            )
     size = _first(known, SIZE) or [_first(known, names) for names in SIDES]
-    rotation, translation = _first(known, ROTATION), _first(known, TRANSLATION)
-    if "distortionmodel" in known and "p" in known:  # a message of ROS, whose R rectifies and does not place
+    rotation = _first(known, ROTATION)
+    translation = _first(known, TRANSLATION)
+    # a message of ROS, whose R rectifies and does not place
+    if "distortionmodel" in known and "p" in known:
         rotation = translation = None
     if (rotation is None) != (translation is None):
         raise InputError("one with a rotation or a translation, but not both")
@@ -316,7 +466,9 @@ def _is_fisheye(known: Mapping[str, Any]) -> bool:
         model = _plain(known[key])
         if model in _FISHEYES:
             return True
-        if model not in _POLYNOMIALS and (key not in ("cameramodel", "model") or _OTHERS.search(model)):
+        if model not in _POLYNOMIALS and (
+            key not in ("cameramodel", "model") or _OTHERS.search(model)
+        ):
             raise InputError(f"the lens model {quoted(known[key])}, which is not known")
     return False
 
@@ -326,11 +478,26 @@ def _easymocap(path: Path, values: dict[str, Any]) -> list[Calibration]:
     for kind, other_kind in (("intri", "extri"), ("extri", "intri")):
         other = path.with_name(path.name.replace(kind, other_kind, 1))
         if other != path and other.is_file():
-            values = {**_stored_values(other, "%", read_text(other, LARGEST_FILE)), **values}
-    keys = {"K": "K", "dist": "dist", "R": "Rot", "rvec": "R", "T": "T", "width": "W", "height": "H"}
+            values = {
+                **_stored_values(other, "%", read_text(other, LARGEST_FILE)),
+                **values,
+            }
+    keys = {
+        "K": "K",
+        "dist": "dist",
+        "R": "Rot",
+        "rvec": "R",
+        "T": "T",
+        "width": "W",
+        "height": "H",
+    }
     calibrations: list[Calibration] = []
     for name in values["names"]:
-        entry = {key: values[f"{kind}_{name}"] for key, kind in keys.items() if f"{kind}_{name}" in values}
+        entry = {
+            key: values[f"{kind}_{name}"]
+            for key, kind in keys.items()
+            if f"{kind}_{name}" in values
+        }
         if not (_counts(entry.get("width")) and _counts(entry.get("height"))):
             entry.pop("width", None)
         calibrations += _described(str(name), entry) if entry else []
@@ -340,23 +507,46 @@ def _easymocap(path: Path, values: dict[str, Any]) -> list[Calibration]:
 def _qualisys(text: str) -> list[Calibration]:
     calibrations: list[Calibration] = []
     for number, camera in enumerate(_xml_of(text).iter("camera")):
-        view, lens, place = (_tag(camera, name) for name in ("fov_video", "intrinsic", "transform"))
-        left, top, right, bottom = (float(view.get(side, "")) for side in ("left", "top", "right", "bottom"))
+        view, lens, place = (
+            _tag(camera, name) for name in ("fov_video", "intrinsic", "transform")
+        )
+        left, top, right, bottom = (
+            float(view.get(side, "")) for side in ("left", "top", "right", "bottom")
+        )
         focal, centre = (
-            np.array([float(lens.get(f"{name}{axis}", "")) / SUBPIXELS for axis in "UV"])
+            np.array(
+                [float(lens.get(f"{name}{axis}", "")) / SUBPIXELS for axis in "UV"]
+            )
             for name in ("focalLength", "centerPoint")
         )
-        names = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2")
-        distortion = [float(lens.get(name, "0")) for name in (*names, "radialDistortion3")]
+        names = (
+            "radialDistortion1",
+            "radialDistortion2",
+            "tangentalDistortion1",
+            "tangentalDistortion2",
+        )
+        distortion = [
+            float(lens.get(name, "0")) for name in (*names, "radialDistortion3")
+        ]
         for key, value in lens.items():
-            if _OF_LENS.fullmatch(_plain(key)) and key not in (*names, "radialDistortion3") and _counts(value):
+            if (
+                _OF_LENS.fullmatch(_plain(key))
+                and key not in (*names, "radialDistortion3")
+                and _counts(value)
+            ):
                 raise InputError(f"the lens key {quoted(key)}, which is not known")
-        turned = np.array([[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"])
-        rotation = np.diag([1.0, -1.0, -1.0]) @ turned  # its camera looks along -z with y up
+        turned = np.array(
+            [[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"]
+        )
+        # its camera looks along -z with y up
+        rotation = np.diag([1.0, -1.0, -1.0]) @ turned
         position = np.array([float(place.get(axis, "")) for axis in "xyz"]) / 1000.0
-        size, matrix = (right - left + 1, bottom - top + 1), pinhole_matrix(focal, centre - (left, top))
+        size = (right - left + 1, bottom - top + 1)
+        matrix = pinhole_matrix(focal, centre - (left, top))
         name = camera.get("serial", f"camera {number}")
-        calibrations.append(_stated(name, size, matrix, distortion, rotation, -rotation @ position))
+        calibrations.append(
+            _stated(name, size, matrix, distortion, rotation, -rotation @ position)
+        )
     return calibrations
 
 
@@ -368,17 +558,32 @@ def _tag(camera: Any, name: str) -> Any:
 
 
 def _stated(
-    name: str, size: Any, matrix: Any, distortion: Any, rotation: Any, translation: Any, fisheye: bool = False
+    name: str,
+    size: Any,
+    matrix: Any,
+    distortion: Any,
+    rotation: Any,
+    translation: Any,
+    fisheye: bool = False,
 ) -> Calibration:
     """Return what a file states, checked; a rotation of three numbers is its axis, as long as its angle."""
-    matrix = _numbers(np.reshape(matrix, (3, 3)) if np.shape(matrix) == (9,) else matrix, (3, 3))
+    matrix = _numbers(
+        np.reshape(matrix, (3, 3)) if np.shape(matrix) == (9,) else matrix, (3, 3)
+    )
     if size is not None:
         width, height = size
-        if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):
+        if not (
+            float(width).is_integer()
+            and float(height).is_integer()
+            and width >= 1
+            and height >= 1
+        ):
             raise InputError(f"an image size of {width} x {height}")
         size = int(width), int(height)
     if abs(matrix[1, 0]) > 1e-6 or np.abs(matrix[2] - [0.0, 0.0, 1.0]).max() > 1e-6:
-        raise InputError(f"a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: {quoted(matrix.tolist())}")
+        raise InputError(
+            f"a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: {quoted(matrix.tolist())}"
+        )
     check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
     lens = np.array(distortion, dtype=np.float64).reshape(-1)
     if not np.isfinite(lens).all():
@@ -386,7 +591,9 @@ def _stated(
     if not lens.any():
         lens = np.zeros(4)
     elif lens.size not in DISTORTIONS or (fisheye and lens[4:].any()):
-        raise InputError(f"a distortion of {lens.size} numbers{' of a fisheye' if fisheye else ''}")
+        raise InputError(
+            f"a distortion of {lens.size} numbers{' of a fisheye' if fisheye else ''}"
+        )
     if rotation is not None and np.size(rotation) == 3:
         rotation = cv2.Rodrigues(_numbers(np.reshape(rotation, 3), (3,)))[0]
     elif np.shape(rotation) == (9,):
@@ -402,15 +609,21 @@ def _stated(
     )
 
 
-def pinhole_matrix(focal: Sequence[float] | Array, centre: Sequence[float] | Array) -> Array:
+def pinhole_matrix(
+    focal: Sequence[float] | Array, centre: Sequence[float] | Array
+) -> Array:
     """Return the matrix (3, 3) of a camera without skew."""
-    return np.array([[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]])
+    return np.array(
+        [[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]]
+    )
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
     numbers = np.asarray(values, dtype=np.float64)
     if numbers.shape != shape or not np.isfinite(numbers).all():
-        raise InputError(f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be")
+        raise InputError(
+            f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be"
+        )
     return numbers
 
 
@@ -427,9 +640,19 @@ def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
     """Return the values of a file by name. Raises InputError where it is none of the four formats."""
     if path.suffix.lower() == ".toml":
         return parsed_toml(text)
-    if not (start.startswith(("<", "{", "%")) or path.suffix.lower() in (".yml", ".yaml")):
-        raise InputError(f"a file that is none of them, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml")
-    values = _xml(text) if start.startswith("<") else parsed_json(text) if start.startswith("{") else _yaml(text)
+    if not (
+        start.startswith(("<", "{", "%")) or path.suffix.lower() in (".yml", ".yaml")
+    ):
+        raise InputError(
+            f"a file that is none of them, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml"
+        )
+    values = (
+        _xml(text)
+        if start.startswith("<")
+        else parsed_json(text)
+        if start.startswith("{")
+        else _yaml(text)
+    )
     if not isinstance(values, dict):
         raise InputError(f"a file without names, {quoted(values)}")
     return values
@@ -438,19 +661,33 @@ def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
 def _matrix_of(value: Any) -> Array:
     """Return a matrix, or numbers in one row. Raises InputError where there are none, too many, or another number."""
     stated = value if isinstance(value, dict) and "data" in value else {"data": value}
-    cells = np.array(stated["data"].split() if isinstance(stated["data"], str) else stated["data"], dtype=object)
+    cells = np.array(
+        stated["data"].split() if isinstance(stated["data"], str) else stated["data"],
+        dtype=object,
+    )
     numbers = np.array([_number_of(cell) for cell in cells.flat], dtype=np.float64)
     match = _TYPE.fullmatch(str(stated.get("dt", "d")))
     if match is None:
         raise InputError(f"a matrix of the type {quoted(stated['dt'])}")
     if match[2] in _ROUNDED:
         numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
-    sides = [stated["rows"], stated["cols"]] if {"rows", "cols"} <= stated.keys() else stated.get("sizes")
+    sides = (
+        [stated["rows"], stated["cols"]]
+        if {"rows", "cols"} <= stated.keys()
+        else stated.get("sizes")
+    )
     if sides is None:
         return numbers.reshape(cells.shape)
-    shape = [*map(_number_of, sides if isinstance(sides, list) else [sides]), *map(float, filter(None, [match[1]]))]
-    if not all(side.is_integer() and side > 0 for side in shape) or numbers.size != math.prod(shape):
-        raise InputError(f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with {numbers.size} numbers")
+    shape = [
+        *map(_number_of, sides if isinstance(sides, list) else [sides]),
+        *map(float, filter(None, [match[1]])),
+    ]
+    if not all(
+        side.is_integer() and side > 0 for side in shape
+    ) or numbers.size != math.prod(shape):
+        raise InputError(
+            f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with {numbers.size} numbers"
+        )
     return numbers.reshape([int(side) for side in shape])
 
 
@@ -480,7 +717,8 @@ def _xml(text: str) -> dict[str, Any]:
     if root.tag != "opencv_storage":
         raise InputError(f"XML of {quoted(root.tag)}")
     return {
-        entry.tag: {part.tag: (part.text or "").strip() for part in entry} or (entry.text or "").strip()
+        entry.tag: {part.tag: (part.text or "").strip() for part in entry}
+        or (entry.text or "").strip()
         for entry in root
     }
 
@@ -495,6 +733,9 @@ def _xml_of(text: str) -> Any:
     try:
         return fromstring(text, forbid_dtd=True)
     except DefusedXmlException:
-        raise InputError("an XML file with a document type, which is not read") from None
-    except (ParseError, ValueError, RecursionError) as error:  # ValueError: an encoding that contradicts the text's
+        raise InputError(
+            "an XML file with a document type, which is not read"
+        ) from None
+    # ValueError: an encoding that contradicts the text's
+    except (ParseError, ValueError, RecursionError) as error:
         raise InputError(f"XML that is broken: {error}") from None

@@ -12,30 +12,36 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
 
-LANES = 16  # poses side by side: the fewest that bones are moved for in vector registers
+# poses side by side: the fewest that bones are moved for in vector registers
+LANES = 16
 
 # pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
 # where the first term left out is below 1e-10.
-PI_HIGH, PI_LOW = 3.141592653589793, 1.2246467991473532e-16
+PI_HIGH = 3.141592653589793
+PI_LOW = 1.2246467991473532e-16
 
 # Where rows of lanes begin: angles; their sines and cosines, and those of three angles more that are always 0; a matrix
 # (3, 4) from the world to the frame that joints are placed in; bones (26, 3) in their own frames; frames (27, 4, 3) of
 # joints, three axes and a place each; and these places once more, each coordinate of all 27 in turn.
-_ANGLES, _BONES, _JOINTS = 66, 26, 27
+_ANGLES = 66
+_BONES = 26
+_JOINTS = 27
 _ANGLE, _SINE, _COSINE = (kind * (_ANGLES + 3) * LANES for kind in range(3))
 _VIEW = _COSINE + (_ANGLES + 3) * LANES
 _OFFSETS = _VIEW + 12 * LANES
 _FRAMES = _OFFSETS + 3 * _BONES * LANES
 X, Y, Z = (_FRAMES + (12 + i) * _JOINTS * LANES for i in range(3))
 _END = Z + _JOINTS * LANES
-NATURAL = 0x7FFFFFFF  # an index that is provably not negative needs no check whether it counts from the end
+# an index that is provably not negative needs no check whether it counts from the end
+NATURAL = 0x7FFFFFFF
 
 
 class Chain(NamedTuple):
     """A skeleton as the kernel wants it; bones in an order where parents come first."""
 
     parents: NDArray[np.int64]  # (26,) joint a bone starts from; it ends in joint b + 1
-    angles: NDArray[np.int64]  # (26,) index in the pose of the bone's rx, or -1 where it cannot turn
+    # (26,) index in the pose of the bone's rx, or -1 where it cannot turn
+    angles: NDArray[np.int64]
     turns: Array  # (26, 3, 3) parent's frame from this bone's frame, at rest
     offsets: Array  # (26, 3) the bone in its own frame
 
@@ -84,7 +90,10 @@ def empty_lanes():
     for k in range(12 * LANES):
         lanes[_VIEW + k] = 1.0 if k // LANES % 5 == 0 else 0.0
     for k in range(3 * LANES):
-        lanes[_SINE + _ANGLES * LANES + k], lanes[_COSINE + _ANGLES * LANES + k] = 0.0, 1.0
+        lanes[_SINE + _ANGLES * LANES + k], lanes[_COSINE + _ANGLES * LANES + k] = (
+            0.0,
+            1.0,
+        )
     return lanes
 
 
@@ -93,7 +102,11 @@ def set_view(lanes, first, stop, rotation, translation, focal, centre):
     """Place the joints of some lanes in a camera's picture: x and y in pixels, times the depth, and the depth."""
     for i in range(translation.size):
         for j in range(translation.size + 1):
-            coordinate, depth = (rotation[i, j], rotation[2, j]) if j < 3 else (translation[i], translation[2])
+            coordinate, depth = (
+                (rotation[i, j], rotation[2, j])
+                if j < 3
+                else (translation[i], translation[2])
+            )
             value = focal[i] * coordinate + centre[i] * depth if i < 2 else depth
             for lane in range(first, stop):
                 lanes[_VIEW + LANES * (4 * i + j) + lane] = value
@@ -102,7 +115,8 @@ def set_view(lanes, first, stop, rotation, translation, focal, centre):
 @inlined
 def set_offsets(lanes, first, stop, offsets):
     """Give some lanes the bones of a body (26, 3)."""
-    for b in range(offsets.shape[0]):  # numbers known to the compiler would have it write out every turn
+    # numbers known to the compiler would have it write out every turn
+    for b in range(offsets.shape[0]):
         for i in range(offsets.shape[1]):
             for lane in range(first, stop):
                 lanes[_OFFSETS + LANES * (3 * b + i) + lane] = offsets[b, i]
@@ -112,15 +126,30 @@ def set_offsets(lanes, first, stop, offsets):
 def place_roots(places, rows, lanes):
     """Write the frames of the root joints: Ry @ Rx @ Rz of yaw, pitch and roll, at places (n, 3)."""
     for k in range(LANES):
-        sy, sp, sr = lanes[_SINE + k], lanes[_SINE + LANES + k], lanes[_SINE + 2 * LANES + k]
-        cy, cp, cr = lanes[_COSINE + k], lanes[_COSINE + LANES + k], lanes[_COSINE + 2 * LANES + k]
-        ux, uy, uz = cy * cr + sy * sp * sr, cp * sr, cy * sp * sr - sy * cr
-        vx, vy, vz = sy * sp * cr - cy * sr, cp * cr, cy * sp * cr + sy * sr
-        wx, wy, wz = sy * cp, -sp, cy * cp
-        x, y, z = places[rows[k], 0], places[rows[k], 1], places[rows[k], 2]
+        sy = lanes[_SINE + k]
+        sp = lanes[_SINE + LANES + k]
+        sr = lanes[_SINE + 2 * LANES + k]
+        cy = lanes[_COSINE + k]
+        cp = lanes[_COSINE + LANES + k]
+        cr = lanes[_COSINE + 2 * LANES + k]
+        ux = cy * cr + sy * sp * sr
+        uy = cp * sr
+        uz = cy * sp * sr - sy * cr
+        vx = sy * sp * cr - cy * sr
+        vy = cp * cr
+        vz = cy * sp * cr + sy * sr
+        wx = sy * cp
+        wy = -sp
+        wz = cy * cp
+        x = places[rows[k], 0]
+        y = places[rows[k], 1]
+        z = places[rows[k], 2]
         for i in range(3):
-            at, to = _VIEW + 4 * LANES * i + k, _FRAMES + LANES * i + k
-            a, b, c = lanes[at], lanes[at + LANES], lanes[at + 2 * LANES]
+            at = _VIEW + 4 * LANES * i + k
+            to = _FRAMES + LANES * i + k
+            a = lanes[at]
+            b = lanes[at + LANES]
+            c = lanes[at + 2 * LANES]
             lanes[to] = a * ux + b * uy + c * uz
             lanes[to + 3 * LANES] = a * vx + b * vy + c * vz
             lanes[to + 2 * 3 * LANES] = a * wx + b * wy + c * wz
@@ -134,24 +163,45 @@ def place_bones(chain, lanes):
     for b in range(parents.size):
         a = angles[b] if angles[b] >= 0 else _ANGLES
         # read before the loop: for all that the compiler knows, writing a row of lanes could change them
-        xx, xy, xz = turns[b, 0, 0], turns[b, 0, 1], turns[b, 0, 2]
-        yx, yy, yz = turns[b, 1, 0], turns[b, 1, 1], turns[b, 1, 2]
-        zx, zy, zz = turns[b, 2, 0], turns[b, 2, 1], turns[b, 2, 2]
-        sine, cosine = (_SINE + LANES * a) & NATURAL, (_COSINE + LANES * a) & NATURAL
+        xx = turns[b, 0, 0]
+        xy = turns[b, 0, 1]
+        xz = turns[b, 0, 2]
+        yx = turns[b, 1, 0]
+        yy = turns[b, 1, 1]
+        yz = turns[b, 1, 2]
+        zx = turns[b, 2, 0]
+        zy = turns[b, 2, 1]
+        zz = turns[b, 2, 2]
+        sine = (_SINE + LANES * a) & NATURAL
+        cosine = (_COSINE + LANES * a) & NATURAL
         offset = (_OFFSETS + 3 * LANES * b) & NATURAL
         for i in range(3):
             start = (_FRAMES + LANES * (12 * parents[b] + i)) & NATURAL
             end = (_FRAMES + LANES * (12 * b + 12 + i)) & NATURAL
             for k in range(LANES):
-                x, y, z = lanes[start + k], lanes[start + 3 * LANES + k], lanes[start + 6 * LANES + k]
-                u, v, w = x * xx + y * yx + z * zx, x * xy + y * yy + z * zy, x * xz + y * yz + z * zz
+                x = lanes[start + k]
+                y = lanes[start + 3 * LANES + k]
+                z = lanes[start + 6 * LANES + k]
+                u = x * xx + y * yx + z * zx
+                v = x * xy + y * yy + z * zy
+                w = x * xz + y * yz + z * zz
                 # Rz @ Ry @ Rx
-                u, v = rotated(u, v, lanes[sine + 2 * LANES + k], lanes[cosine + 2 * LANES + k])
+                u, v = rotated(
+                    u, v, lanes[sine + 2 * LANES + k], lanes[cosine + 2 * LANES + k]
+                )
                 w, u = rotated(w, u, lanes[sine + LANES + k], lanes[cosine + LANES + k])
                 v, w = rotated(v, w, lanes[sine + k], lanes[cosine + k])
-                x, y, z = lanes[offset + k], lanes[offset + LANES + k], lanes[offset + 2 * LANES + k]
-                lanes[end + k], lanes[end + 3 * LANES + k], lanes[end + 6 * LANES + k] = u, v, w
-                lanes[end + 9 * LANES + k] = lanes[start + 9 * LANES + k] + u * x + v * y + w * z
+                x = lanes[offset + k]
+                y = lanes[offset + LANES + k]
+                z = lanes[offset + 2 * LANES + k]
+                (
+                    lanes[end + k],
+                    lanes[end + 3 * LANES + k],
+                    lanes[end + 6 * LANES + k],
+                ) = u, v, w
+                lanes[end + 9 * LANES + k] = (
+                    lanes[start + 9 * LANES + k] + u * x + v * y + w * z
+                )
 
 
 @jit
@@ -184,7 +234,9 @@ def place_frames(chain, poses, places, sines, cosines, frames):
 
     And the sines and cosines (n, 66) of their angles.
     """
-    n, rows, lanes = poses.shape[0], np.empty(LANES, np.int64), empty_lanes()
+    n = poses.shape[0]
+    rows = np.empty(LANES, np.int64)
+    lanes = empty_lanes()
     set_offsets(lanes, 0, LANES, chain.offsets)
     for first in range(0, n, LANES):
         set_rows(rows, first, n)
@@ -192,11 +244,16 @@ def place_frames(chain, poses, places, sines, cosines, frames):
         for lane in range(min(LANES, n - first)):
             for a in range(_ANGLES):
                 at = LANES * a + lane
-                sines[first + lane, a], cosines[first + lane, a] = lanes[_SINE + at], lanes[_COSINE + at]
+                sines[first + lane, a], cosines[first + lane, a] = (
+                    lanes[_SINE + at],
+                    lanes[_COSINE + at],
+                )
             for j in range(_JOINTS):
                 for k in range(4):
                     for i in range(3):
-                        frames[first + lane, j, k, i] = lanes[_FRAMES + 3 * LANES * (4 * j + k) + LANES * i + lane]
+                        frames[first + lane, j, k, i] = lanes[
+                            _FRAMES + 3 * LANES * (4 * j + k) + LANES * i + lane
+                        ]
 
 
 @inlined
@@ -210,7 +267,9 @@ def read_joints(lanes, lane, joints):
 @jit
 def joint_positions(chain, poses, places):
     """Return the joints (n, 27, 3) of poses (n, 66) with their roots at places (n, 3)."""
-    n, rows, lanes = poses.shape[0], np.empty(LANES, np.int64), empty_lanes()
+    n = poses.shape[0]
+    rows = np.empty(LANES, np.int64)
+    lanes = empty_lanes()
     joints = np.empty((n, _JOINTS, 3))
     set_offsets(lanes, 0, LANES, chain.offsets)
     for first in range(0, n, LANES):

@@ -12,7 +12,8 @@ from posefit.arrays import Array
 ROOT_ORDER = (1, 0, 2)
 # Acclaim files: rx first, so that the matrix is Rz @ Ry @ Rx.
 JOINT_ORDER = (2, 1, 0)
-LOCKED = 1e-7  # radians from the singularity, where the outer and the inner axis are one
+# radians from the singularity, where the outer and the inner axis are one
+LOCKED = 1e-7
 
 
 def rotation_from_root_angles(angles: Array) -> Array:
@@ -27,7 +28,9 @@ def yaw_first(angles: Array) -> Array:
     `angles` (..., 3) are in the order of yaw, pitch and roll, too: about y, x and z.
     """
     y, x, z = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
-    return root_angles_from_rotation(rotation_about(0, x) @ rotation_about(1, y) @ rotation_about(2, z))
+    return root_angles_from_rotation(
+        rotation_about(0, x) @ rotation_about(1, y) @ rotation_about(2, z)
+    )
 
 
 def root_angles_from_rotation(rotations: Array) -> Array:
@@ -51,19 +54,29 @@ def shortest_turn(start: Array, end: Array) -> Array:
 
     Between opposite directions it is any of half a turn.
     """
-    start, end = np.broadcast_arrays(np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64))
+    start, end = np.broadcast_arrays(
+        np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    )
     lengths = np.linalg.norm(start, axis=-1) * np.linalg.norm(end, axis=-1)
     known = lengths > 0.0
     cross = np.cross(start, end)
-    cosine, sine = (start * end).sum(axis=-1), np.linalg.norm(cross, axis=-1)
+    cosine = (start * end).sum(axis=-1)
+    sine = np.linalg.norm(cross, axis=-1)
     opposite = known & (sine <= 1e-12 * lengths) & (cosine < 0.0)
-    other = along_y(np.where(known[..., None], start, 1.0))[..., 0]  # across the direction
-    axis = np.where(opposite[..., None], other, cross / np.where(sine > 0.0, sine, 1.0)[..., None])
+    # across the direction
+    other = along_y(np.where(known[..., None], start, 1.0))[..., 0]
+    axis = np.where(
+        opposite[..., None], other, cross / np.where(sine > 0.0, sine, 1.0)[..., None]
+    )
     x, y, z = np.moveaxis(axis, -1, 0)
     zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(
+        *x.shape, 3, 3
+    )
     angle = np.where(known, np.arctan2(sine, cosine), 0.0)[..., None, None]
-    return np.asarray(np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew)
+    return np.asarray(
+        np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
+    )
 
 
 def along_y(directions: Array) -> Array:
@@ -71,7 +84,9 @@ def along_y(directions: Array) -> Array:
     y = np.asarray(directions, dtype=np.float64)
     length = np.linalg.norm(y, axis=-1, keepdims=True)
     y = np.where(length > 0.0, y, (0.0, 1.0, 0.0)) / np.where(length > 0.0, length, 1.0)
-    x = np.cross(y, np.where(np.abs(y[..., 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    x = np.cross(
+        y, np.where(np.abs(y[..., 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    )
     x /= np.linalg.norm(x, axis=-1, keepdims=True)
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
@@ -88,7 +103,8 @@ def quaternions(rotations: Array) -> Array:
 def wrapped(angles: Array) -> Array:
     """Return angles brought to [-pi, pi). Interpretation S13."""
     angles = np.asarray(angles, dtype=np.float64)
-    return np.asarray(angles - 2.0 * np.pi * np.floor(angles / (2.0 * np.pi) + 0.5))  # faster than a remainder
+    # faster than a remainder
+    return np.asarray(angles - 2.0 * np.pi * np.floor(angles / (2.0 * np.pi) + 0.5))
 
 
 def unwrapped(angles: Array) -> Array:
@@ -121,16 +137,23 @@ def steady_angles(angles: Array) -> Array:
 def geodesic(first: Array, second: Array) -> Array:
     """Return the angle (...), 0 to pi, of the rotation that takes `first` to `second`, both (..., 3, 3)."""
     relative = np.swapaxes(first, -1, -2) @ second
-    twist = relative - np.swapaxes(relative, -1, -2)  # twice the sine of the angle times the axis
-    sine = 0.5 * np.sqrt(twist[..., 2, 1] ** 2 + twist[..., 0, 2] ** 2 + twist[..., 1, 0] ** 2)
-    return np.asarray(np.arctan2(sine, 0.5 * (np.trace(relative, axis1=-2, axis2=-1) - 1.0)))
+    # twice the sine of the angle times the axis
+    twist = relative - np.swapaxes(relative, -1, -2)
+    sine = 0.5 * np.sqrt(
+        twist[..., 2, 1] ** 2 + twist[..., 0, 2] ** 2 + twist[..., 1, 0] ** 2
+    )
+    return np.asarray(
+        np.arctan2(sine, 0.5 * (np.trace(relative, axis1=-2, axis2=-1) - 1.0))
+    )
 
 
 def rotation_about(axis: int, angles: Array) -> Array:
     """Return the rotations (..., 3, 3) about an axis by angles (...)."""
-    sines, cosines = np.sin(angles), np.cos(angles)
+    sines = np.sin(angles)
+    cosines = np.cos(angles)
     rotations = np.zeros((*np.shape(angles), 3, 3))
-    j, k = (axis + 1) % 3, (axis + 2) % 3
+    j = (axis + 1) % 3
+    k = (axis + 2) % 3
     rotations[..., axis, axis] = 1.0
     rotations[..., j, j] = rotations[..., k, k] = cosines
     rotations[..., j, k], rotations[..., k, j] = -sines, sines
@@ -145,14 +168,19 @@ def angles_about(axes: tuple[int, int, int], rotations: Array) -> Array:
     i, j, k = axes
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     rotations = np.asarray(rotations, dtype=np.float64)
-    level = np.hypot(rotations[..., i, i], rotations[..., i, j])  # the cosine of the middle angle
+    # the cosine of the middle angle
+    level = np.hypot(rotations[..., i, i], rotations[..., i, j])
     outer = np.arctan2(-sign * rotations[..., j, k], rotations[..., k, k])
     inner = np.arctan2(-sign * rotations[..., i, j], rotations[..., i, i])
     locked = level < LOCKED
     if i < k:
         alone = np.arctan2(sign * rotations[..., k, j], rotations[..., j, j])
-        outer, inner = np.where(locked, alone, outer), np.where(locked, 0.0, inner)
+        outer = np.where(locked, alone, outer)
+        inner = np.where(locked, 0.0, inner)
     else:
         alone = np.arctan2(sign * rotations[..., j, i], rotations[..., j, j])
-        outer, inner = np.where(locked, 0.0, outer), np.where(locked, alone, inner)
-    return np.stack([outer, np.arctan2(sign * rotations[..., i, k], level), inner], axis=-1)
+        outer = np.where(locked, 0.0, outer)
+        inner = np.where(locked, alone, inner)
+    return np.stack(
+        [outer, np.arctan2(sign * rotations[..., i, k], level), inner], axis=-1
+    )

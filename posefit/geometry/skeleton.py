@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, frozen, writeable
 from posefit.errors import InputError
 from posefit.geometry import kernels
-from posefit.geometry.rotation import rotation_from_joint_angles, rotation_from_root_angles
+from posefit.geometry.rotation import (
+    rotation_from_joint_angles,
+    rotation_from_root_angles,
+)
 
 # The chains of bones between the joints where several begin; l and r are left and right.
 LIMBS: Mapping[str, Sequence[str]] = {
@@ -26,10 +29,15 @@ LIMBS: Mapping[str, Sequence[str]] = {
     "right arm": ("rclavicle", "rhumerus", "rradius", "rwrist", "rhand"),
     "head": ("lowerneck", "upperneck", "head"),
 }
-_LEGS, _ARMS = (LIMBS["left leg"], LIMBS["right leg"]), (LIMBS["left arm"], LIMBS["right arm"])
+_LEGS = (LIMBS["left leg"], LIMBS["right leg"])
+_ARMS = (LIMBS["left arm"], LIMBS["right arm"])
 _TORSO = ("lowerback", "upperback", "thorax", *LIMBS["head"])
 _PARENT = {"root": "root"}  # of each joint, parents before children
-for _start, *_chain in (*(("root", *leg) for leg in _LEGS), ("root", *_TORSO), *(("thorax", *arm) for arm in _ARMS)):
+for _start, *_chain in (
+    *(("root", *leg) for leg in _LEGS),
+    ("root", *_TORSO),
+    *(("thorax", *arm) for arm in _ARMS),
+):
     _PARENT.update(zip(_chain, [_start, *_chain], strict=False))
 
 JOINTS = tuple(_PARENT)  # 27 names, parents before children
@@ -41,7 +49,8 @@ ANGLES = 3 + 3 * len(INNER)  # M = 66
 
 Channels = tuple[tuple[str, tuple[str, ...]], ...]
 Side = Literal["left", "right", "middle"]
-_OTHER = {"l": "r", "r": "l"}  # first letters of names that come in pairs, such as lfemur and rfemur
+# first letters of names that come in pairs, such as lfemur and rfemur
+_OTHER = {"l": "r", "r": "l"}
 
 
 def mirrored(bone: str) -> str:
@@ -67,8 +76,10 @@ def both(kind: str) -> tuple[str, str]:
     return f"l{kind}", f"r{kind}"
 
 
-MIRROR = tuple(JOINTS.index(mirrored(name)) for name in JOINTS)  # (27,) the joint on the other side of the body
-SIDES: tuple[Side, ...] = tuple(side(name) for name in JOINTS)  # (27,) left, right or middle
+# (27,) the joint on the other side of the body
+MIRROR = tuple(JOINTS.index(mirrored(name)) for name in JOINTS)
+# (27,) left, right or middle
+SIDES: tuple[Side, ...] = tuple(side(name) for name in JOINTS)
 
 
 def angle_index(joint: int) -> int:
@@ -79,16 +90,22 @@ def angle_index(joint: int) -> int:
 def channel_angles(bone: str, channels: Sequence[str]) -> list[int]:
     """Return the places in a pose (66,) of some angles of a bone, such as `rx` and `rz`; none for an end bone."""
     start = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
-    return [start + "xyz".index(channel[1]) for channel in channels] if start > 0 else []
+    return (
+        [start + "xyz".index(channel[1]) for channel in channels] if start > 0 else []
+    )
 
 
 def angles_of(bones: Sequence[str]) -> NDArray[np.intp]:
     """Return the places in a pose (66,) of all angles that turn some bones."""
-    return np.array([angle for bone in bones for angle in channel_angles(bone, ("rx", "ry", "rz"))], dtype=np.intp)
+    return np.array(
+        [angle for bone in bones for angle in channel_angles(bone, ("rx", "ry", "rz"))],
+        dtype=np.intp,
+    )
 
 
 # (26,) of each bone: the joint it starts from, and the place in a pose of its first angle, -1 for an end bone
-_STARTS, _FIRST_ANGLES = np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))])
+_STARTS = np.array(PARENTS[1:])
+_FIRST_ANGLES = np.array([angle_index(j) for j in range(1, len(JOINTS))])
 
 
 def root_centred(joints: Array) -> Array:
@@ -98,7 +115,9 @@ def root_centred(joints: Array) -> Array:
 
 def joint_distances(first: Array, second: Array) -> Array:
     """Return the distances (..., 27) between joints (..., 27, 3), both roots at one point."""
-    return np.asarray(np.linalg.norm(root_centred(first) - root_centred(second), axis=-1))
+    return np.asarray(
+        np.linalg.norm(root_centred(first) - root_centred(second), axis=-1)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,18 +125,25 @@ class Skeleton:
     """Bone vectors at rest and the frames their angles are counted in. Lengths are metres."""
 
     name: str
-    offsets: Array = field(repr=False)  # (26, 3) from a bone's start to its end, at rest, in the world frame
-    axes: Array = field(repr=False)  # (26, 3, 3) world_from_bone at rest: the frame of the bone's angles
-    channels: Channels = field(repr=False)  # the .amc layout after the root: (bone, its free angles) in file order
+    # (26, 3) from a bone's start to its end, at rest, in the world frame
+    offsets: Array = field(repr=False)
+    # (26, 3, 3) world_from_bone at rest: the frame of the bone's angles
+    axes: Array = field(repr=False)
+    # the .amc layout after the root: (bone, its free angles) in file order
+    channels: Channels = field(repr=False)
     # (63, 2) radians: lowest and highest of each joint angle, 0 for padding; None where unknown
     limits: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        shapes = {"offsets": (26, 3), "axes": (26, 3, 3)} | ({} if self.limits is None else {"limits": (63, 2)})
+        shapes = {"offsets": (26, 3), "axes": (26, 3, 3)} | (
+            {} if self.limits is None else {"limits": (63, 2)}
+        )
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         if self.limits is not None and (self.limits[:, 0] > self.limits[:, 1]).any():
-            raise InputError("limits must not be reversed, got a lowest angle above the highest")
+            raise InputError(
+                "limits must not be reversed, got a lowest angle above the highest"
+            )
 
     @cached_property
     def lengths(self) -> Array:
@@ -139,7 +165,12 @@ class Skeleton:
         before = np.concatenate([np.eye(3)[None], self.axes])[_STARTS]
         turns = np.swapaxes(before, 1, 2) @ self.axes
         turns[np.abs(turns - np.eye(3)).max(axis=(1, 2)) <= 1e-12] = np.eye(3)
-        return kernels.Chain(_STARTS, _FIRST_ANGLES, turns, np.einsum("bji,bj->bi", self.axes, self.offsets))
+        return kernels.Chain(
+            _STARTS,
+            _FIRST_ANGLES,
+            turns,
+            np.einsum("bji,bj->bi", self.axes, self.offsets),
+        )
 
     def turns(self, poses: Array) -> Array:
         """Return how each bone, named by the joint it ends in, turns (27, T, 3, 3) from rest in poses (T, 66).
@@ -149,8 +180,11 @@ class Skeleton:
         turns = np.tile(np.eye(3), (len(JOINTS), len(poses), 1, 1))
         turns[0] = rotation_from_root_angles(poses[:, :3])
         for joint in INNER:
-            first, axes = angle_index(joint), self.axes[joint - 1]
-            turns[joint] = axes @ rotation_from_joint_angles(poses[:, first : first + 3]) @ axes.T
+            first = angle_index(joint)
+            axes = self.axes[joint - 1]
+            turns[joint] = (
+                axes @ rotation_from_joint_angles(poses[:, first : first + 3]) @ axes.T
+            )
         return turns
 
     def frames(self, poses: Array, translations: Array) -> tuple[Array, Array, Array]:
@@ -159,8 +193,16 @@ class Skeleton:
         A frame is three axes and a place. With them come the sines and the cosines (n, 66) of the angles.
         """
         frames = np.empty((len(poses), len(JOINTS), 4, 3))
-        sines, cosines = np.empty((len(poses), ANGLES)), np.empty((len(poses), ANGLES))
-        kernels.place_frames(self.chain, writeable(poses), writeable(translations), sines, cosines, frames)
+        sines = np.empty((len(poses), ANGLES))
+        cosines = np.empty((len(poses), ANGLES))
+        kernels.place_frames(
+            self.chain,
+            writeable(poses),
+            writeable(translations),
+            sines,
+            cosines,
+            frames,
+        )
         return frames, sines, cosines
 
     def joints(self, poses: Array, translations: Array | None = None) -> Array:
@@ -171,11 +213,21 @@ class Skeleton:
         """
         poses = np.asarray(poses, dtype=np.float64)
         if poses.ndim < 1 or poses.shape[-1] != ANGLES:
-            raise InputError(f"poses must have shape (..., {ANGLES}), got {poses.shape}")
+            raise InputError(
+                f"poses must have shape (..., {ANGLES}), got {poses.shape}"
+            )
         lead = poses.shape[:-1]
-        where = np.zeros((*lead, 3)) if translations is None else np.asarray(translations, dtype=np.float64)
+        where = (
+            np.zeros((*lead, 3))
+            if translations is None
+            else np.asarray(translations, dtype=np.float64)
+        )
         if where.shape != (*lead, 3):
-            raise InputError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
+            raise InputError(
+                f"translations must have shape {(*lead, 3)}, got {where.shape}"
+            )
         flat = writeable(poses.reshape(-1, ANGLES))
-        positions = kernels.joint_positions(self.chain, flat, writeable(where.reshape(-1, 3)))
+        positions = kernels.joint_positions(
+            self.chain, flat, writeable(where.reshape(-1, 3))
+        )
         return np.asarray(positions).reshape(*lead, len(JOINTS), 3)

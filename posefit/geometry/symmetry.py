@@ -15,8 +15,19 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles, wrapped
-from posefit.geometry.skeleton import INNER, JOINTS, LIMBS, MIRROR, Skeleton, angle_index
+from posefit.geometry.rotation import (
+    joint_angles_from_rotation,
+    rotation_from_joint_angles,
+    wrapped,
+)
+from posefit.geometry.skeleton import (
+    INNER,
+    JOINTS,
+    LIMBS,
+    MIRROR,
+    Skeleton,
+    angle_index,
+)
 from posefit.reading import quoted
 
 Limbs = Literal["legs", "arms"]
@@ -71,7 +82,9 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     cross, and the silhouette is nearly the same whichever of them is in front.
     """
     if limbs not in _BONES:
-        raise InputError(f"limbs must be one of {', '.join(_BONES)}, got {quoted(limbs)}")
+        raise InputError(
+            f"limbs must be one of {', '.join(_BONES)}, got {quoted(limbs)}"
+        )
     return _exchanged(skeleton, poses, _BONES[limbs])
 
 
@@ -88,7 +101,8 @@ def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
     for j, frame in _frames(skeleton):
         if JOINTS[j] not in names:
             continue
-        angles, first = poses[:, angle_index(MIRROR[j]) :][:, :3], angle_index(j)
+        angles = poses[:, angle_index(MIRROR[j]) :][:, :3]
+        first = angle_index(j)
         if frame is None:
             result[:, first : first + 3] = angles * [1.0, -1.0, -1.0]
         else:
@@ -103,5 +117,10 @@ def _frames(skeleton: Skeleton) -> list[tuple[int, Array | None]]:
 
     None stands for a mere reflection, which keeps angles of more than half a turn as they are.
     """
-    frames = [(j, skeleton.axes[j - 1].T @ _LEFT_RIGHT @ skeleton.axes[MIRROR[j] - 1]) for j in INNER]
-    return [(j, None if np.allclose(frame, _LEFT_RIGHT) else frame) for j, frame in frames]
+    frames = [
+        (j, skeleton.axes[j - 1].T @ _LEFT_RIGHT @ skeleton.axes[MIRROR[j] - 1])
+        for j in INNER
+    ]
+    return [
+        (j, None if np.allclose(frame, _LEFT_RIGHT) else frame) for j, frame in frames
+    ]

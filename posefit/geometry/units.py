@@ -11,7 +11,14 @@ Unit = Literal["m", "cm", "mm", "inch", "foot", "cmu"]
 UNITS: tuple[Unit, ...] = get_args(Unit)
 INCH = 0.0254  # metres
 CMU_UNIT = INCH / 0.45  # of the CMU database: its .asf files say `length 0.45`
-METRES: Mapping[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": INCH, "foot": 12 * INCH, "cmu": CMU_UNIT}
+METRES: Mapping[Unit, float] = {
+    "m": 1.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "inch": INCH,
+    "foot": 12 * INCH,
+    "cmu": CMU_UNIT,
+}
 UNIT_NAMES: Mapping[Unit, str] = {
     "m": "metres",
     "cm": "centimetres",
@@ -39,6 +46,8 @@ def unit_of(stature: float) -> Unit | None:
         return None
     low, high = STATURES
     middle = math.log(low * high) / 2.0
-    off = {unit: abs(float(math.log(stature * METRES[unit])) - middle) for unit in UNITS}
+    off = {
+        unit: abs(float(math.log(stature * METRES[unit])) - middle) for unit in UNITS
+    }
     best = min(UNITS, key=off.__getitem__)
     return best if low <= stature * METRES[best] <= high else None

@@ -14,15 +14,31 @@ from posefit.measuring.segments import SIDES, segment_rotations
 
 # Each joint's angles, with what a positive one is.
 MEANINGS = {
-    "hip": {"flexion": "thigh forwards", "adduction": "thigh inwards", "internal_rotation": "knee inwards"},
-    "knee": {"flexion": "heel to the seat", "adduction": "shank inwards (varus)", "internal_rotation": "toes inwards"},
-    "ankle": {"dorsiflexion": "toes up", "inversion": "sole inwards", "internal_rotation": "toes inwards"},
+    "hip": {
+        "flexion": "thigh forwards",
+        "adduction": "thigh inwards",
+        "internal_rotation": "knee inwards",
+    },
+    "knee": {
+        "flexion": "heel to the seat",
+        "adduction": "shank inwards (varus)",
+        "internal_rotation": "toes inwards",
+    },
+    "ankle": {
+        "dorsiflexion": "toes up",
+        "inversion": "sole inwards",
+        "internal_rotation": "toes inwards",
+    },
     "shoulder": {
         "plane": "of elevation: 0 sideways (abduction), 90 forwards (flexion)",
         "elevation": "arm away from hanging, 0 to 180",
         "internal_rotation": "of the arm about itself",
     },
-    "elbow": {"flexion": "hand to the shoulder", "adduction": "forearm inwards", "pronation": "palm backwards"},
+    "elbow": {
+        "flexion": "hand to the shoulder",
+        "adduction": "forearm inwards",
+        "pronation": "palm backwards",
+    },
 }
 BETWEEN = {  # the segments of each, the proximal first
     "hip": ("pelvis", "thigh"),  # WU2002 (hip)
@@ -32,10 +48,16 @@ BETWEEN = {  # the segments of each, the proximal first
     "elbow": ("upper_arm", "forearm"),  # WU2005 (elbow)
 }
 COLUMNS = tuple(
-    f"{side}_{joint}_{angle}" for joint, angles in MEANINGS.items() for side in SIDES for angle in angles
+    f"{side}_{joint}_{angle}"
+    for joint, angles in MEANINGS.items()
+    for side in SIDES
+    for angle in angles
 )  # of angles.csv, in its order
-_ACROSS = np.diag([1.0, 1.0, -1.0])  # the mirror between left and right, in segments' axes
-NEAR_POLE = 10.0  # degrees from hanging or pointing straight up: 2 degrees of error turn the plane by more than ten
+# the mirror between left and right, in segments' axes
+_ACROSS = np.diag([1.0, 1.0, -1.0])
+# degrees from hanging or pointing straight up: 2 degrees of error turn the plane by
+# more than ten
+NEAR_POLE = 10.0
 _LEVEL = 1e-9  # the sine of an elevation, below which its plane is not determined
 
 
@@ -53,7 +75,9 @@ def joint_angles(joint: str, proximal: Array, distal: Array) -> Array:
     """Return the angles (..., 3) of a joint of the right side, in the order of `MEANINGS`, in radians."""
     if joint == "shoulder":
         return shoulder_angles(proximal, distal)
-    return joint_coordinates(proximal, distal) * ([-1.0, 1.0, 1.0] if joint == "knee" else 1.0)
+    return joint_coordinates(proximal, distal) * (
+        [-1.0, 1.0, 1.0] if joint == "knee" else 1.0
+    )
 
 
 def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
@@ -68,7 +92,9 @@ def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
     elevation = np.arctan2(level, relative[..., 1, 1])  # WU2005 (shoulder)
     plane = np.where(pole, 0.0, np.arctan2(-relative[..., 0, 1], -relative[..., 2, 1]))
     alone = np.arctan2(relative[..., 0, 2], relative[..., 0, 0])
-    rotation = np.where(pole, alone, np.arctan2(-relative[..., 1, 0], relative[..., 1, 2]))
+    rotation = np.where(
+        pole, alone, np.arctan2(-relative[..., 1, 0], relative[..., 1, 2])
+    )
     return np.stack([plane, elevation, rotation], axis=-1)
 
 
@@ -84,15 +110,24 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     for side in SIDES:
         # a left side is measured as the right one that it is in the mirror
         axes = {
-            name.removeprefix(f"{side}_"): _ACROSS @ rotation @ _ACROSS if side == "left" else rotation
+            name.removeprefix(f"{side}_"): _ACROSS @ rotation @ _ACROSS
+            if side == "left"
+            else rotation
             for name, rotation in segments.items()
         }
-        by_joint = {joint: joint_angles(joint, *(axes[segment] for segment in pair)) for joint, pair in BETWEEN.items()}
+        by_joint = {
+            joint: joint_angles(joint, *(axes[segment] for segment in pair))
+            for joint, pair in BETWEEN.items()
+        }
         for joint, values in by_joint.items():
-            level = np.sin(values[:, 1]) if joint == "shoulder" else np.cos(values[:, 1])
+            level = (
+                np.sin(values[:, 1]) if joint == "shoulder" else np.cos(values[:, 1])
+            )
             values[level < np.sin(np.radians(NEAR_POLE))] *= [np.nan, 1.0, np.nan]
             for k, angle in enumerate(MEANINGS[joint]):
-                columns[f"{side}_{joint}_{angle}"] = np.degrees(_continuous(values[:, k]))
+                columns[f"{side}_{joint}_{angle}"] = np.degrees(
+                    _continuous(values[:, k])
+                )
     return {name: columns[name] for name in COLUMNS}
 
 
@@ -101,4 +136,6 @@ def _continuous(angles: Array) -> Array:
     series = unwrapped(angles)
     if np.isnan(series).all():
         return series
-    return np.asarray(series - 2.0 * np.pi * np.floor(np.nanmedian(series) / (2.0 * np.pi) + 0.5))
+    return np.asarray(
+        series - 2.0 * np.pi * np.floor(np.nanmedian(series) / (2.0 * np.pi) + 0.5)
+    )

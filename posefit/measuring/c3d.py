@@ -17,32 +17,62 @@ from posefit.motion.motion import Motion
 from posefit.version import __version__
 
 BLOCK = 512  # bytes
-MAGIC, INTEL = 0x50, 84
+MAGIC = 0x50
+INTEL = 84
 MAX_FRAMES = 0xFFFF  # frames that the header can count; more are in TRIAL
 MAX_EVENTS = 255  # that a parameter can hold
 MILLIMETRES = 1e3  # in a metre
 _ICONS = {"Foot Strike": 1, "Foot Off": 2}
 
 
-def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gait: Gait | None = None) -> None:
+def write_c3d(
+    path: str | Path,
+    motion: Motion,
+    blank: Collection[int] = (),
+    gait: Gait | None = None,
+) -> None:
     """Write the 27 joints of every frame as points named by `PLACES`, y up; of `blank` frames, by number, none.
 
     Strikes and toe-offs of `gait` are the file's events, the first 255 of them.
     """
     joints = motion.joints * MILLIMETRES
-    points = np.concatenate([joints, np.zeros((*joints.shape[:2], 1))], axis=2).astype("<f4")
+    points = np.concatenate([joints, np.zeros((*joints.shape[:2], 1))], axis=2).astype(
+        "<f4"
+    )
     points[[number - motion.first for number in blank]] = (0.0, 0.0, 0.0, -1.0)
-    parameters, start = b"", 0
-    while start != 2 + len(parameters) // BLOCK:  # once more, as the parameters state the block that comes after them
+    parameters = b""
+    start = 0
+    # once more, as the parameters state the block that comes after them
+    while start != 2 + len(parameters) // BLOCK:
         start = 2 + len(parameters) // BLOCK
         parameters = _section(_parameters(motion, start, gait))
-    first, last = (min(number, MAX_FRAMES) for number in (motion.first + 1, motion.first + len(motion)))
-    header = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, first, last, 0, -1.0, start, 1, motion.fps)
+    first, last = (
+        min(number, MAX_FRAMES)
+        for number in (motion.first + 1, motion.first + len(motion))
+    )
+    header = struct.pack(
+        "<BBHHHHHfHHf",
+        2,
+        MAGIC,
+        len(PLACES),
+        0,
+        first,
+        last,
+        0,
+        -1.0,
+        start,
+        1,
+        motion.fps,
+    )
     data = points.tobytes()
-    Path(path).write_bytes(header.ljust(BLOCK, b"\0") + parameters + data + bytes(-len(data) % BLOCK))
+    Path(path).write_bytes(
+        header.ljust(BLOCK, b"\0") + parameters + data + bytes(-len(data) % BLOCK)
+    )
 
 
-def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict[str, Any]]:
+def _parameters(
+    motion: Motion, start: int, gait: Gait | None
+) -> dict[str, dict[str, Any]]:
     frames = len(motion)
     groups: dict[str, dict[str, Any]] = {
         "POINT": {
@@ -93,12 +123,23 @@ def _section(groups: dict[str, dict[str, Any]]) -> bytes:
     """Return the parameter section, in whole blocks, of parameters by group and name."""
     records = b""
     for number, (group, parameters) in enumerate(groups.items(), 1):
-        records += struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0)
+        records += (
+            struct.pack("<bb", len(group), -number)
+            + group.encode()
+            + struct.pack("<hB", 3, 0)
+        )
         for name, value in parameters.items():
             body = _encoded(value) + b"\0"  # no description
-            records += struct.pack("<bb", len(name), number) + name.encode() + struct.pack("<h", 2 + len(body)) + body
+            records += (
+                struct.pack("<bb", len(name), number)
+                + name.encode()
+                + struct.pack("<h", 2 + len(body))
+                + body
+            )
     size = -(-(4 + len(records)) // BLOCK)
-    return (struct.pack("<BBBB", 1, MAGIC, size, INTEL) + records).ljust(size * BLOCK, b"\0")
+    return (struct.pack("<BBBB", 1, MAGIC, size, INTEL) + records).ljust(
+        size * BLOCK, b"\0"
+    )
 
 
 def _encoded(value: Any) -> bytes:
@@ -107,6 +148,14 @@ def _encoded(value: Any) -> bytes:
     if array.dtype.kind == "U":
         words = array.astype("S").reshape(-1)
         sizes = bytes((words.itemsize, *array.shape))
-        return struct.pack("<bB", -1, len(sizes)) + sizes + b"".join(word.ljust(words.itemsize) for word in words)
+        return (
+            struct.pack("<bB", -1, len(sizes))
+            + sizes
+            + b"".join(word.ljust(words.itemsize) for word in words)
+        )
     kind, stored = (2, "<u2") if array.dtype.kind == "i" else (4, "<f4")
-    return struct.pack("<bB", kind, array.ndim) + bytes(array.shape[::-1]) + array.astype(stored).tobytes()
+    return (
+        struct.pack("<bB", kind, array.ndim)
+        + bytes(array.shape[::-1])
+        + array.astype(stored).tobytes()
+    )

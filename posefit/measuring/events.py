@@ -16,10 +16,15 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.segments import FORWARDS, SIDES
 from posefit.motion.motion import Motion
 
-CUTOFF_HZ = 6.0  # above it there is next to nothing of a walk. Winter, Biomechanics and motor control, 2009
+# above it there is next to nothing of a walk. Winter, Biomechanics and motor control,
+# 2009
+CUTOFF_HZ = 6.0
 MIN_FPS = 2.0 * CUTOFF_HZ  # frames a second: the Nyquist rate
-SWAY_HZ = 0.3  # the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
-MIN_FOOT_SWING = 0.1  # metres that a foot moves to and fro at least, relative to the pelvis, for an event
+# the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the
+# person turns
+SWAY_HZ = 0.3
+# metres that a foot moves to and fro at least, relative to the pelvis, for an event
+MIN_FOOT_SWING = 0.1
 MIN_SWING_SHARE = 0.2  # and at least this share of the range of all its swings
 
 
@@ -29,7 +34,8 @@ class GaitEvents:
 
     strikes: dict[str, Array]  # initial contact, by side
     offs: dict[str, Array]  # toe off, by side
-    heading: Array  # (T, 2) of x and z: the unit vector that the pelvis faces along, without its sway
+    # (T, 2) of x and z: the unit vector that the pelvis faces along, without its sway
+    heading: Array
     pelvis: Array  # (T, 2) metres
     ankles: dict[str, Array]  # (T, 2) metres, by side
 
@@ -40,17 +46,23 @@ def gait_events(motion: Motion) -> GaitEvents:
     Raises InputError where there are too few frames a second.
     """
     if motion.fps < MIN_FPS:
-        raise InputError(f"fps must be at least {MIN_FPS:g} to find the events of gait, got {motion.fps:g}")
-    joints = low_pass(motion.joints[:, :, ::2], CUTOFF_HZ, motion.fps)  # over the ground: x and z
+        raise InputError(
+            f"fps must be at least {MIN_FPS:g} to find the events of gait, got {motion.fps:g}"
+        )
+    # over the ground: x and z
+    joints = low_pass(motion.joints[:, :, ::2], CUTOFF_HZ, motion.fps)
     facing = rotation_from_root_angles(motion.poses[:, :3]) @ FORWARDS
     heading = low_pass(facing[:, ::2], SWAY_HZ, motion.fps)
     heading /= np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-9)
     pelvis = joints[:, 0]
 
     def ahead(place: str) -> Array:
-        return np.asarray(((joints[:, PLACES.index(place)] - pelvis) * heading).sum(axis=1))
+        return np.asarray(
+            ((joints[:, PLACES.index(place)] - pelvis) * heading).sum(axis=1)
+        )
 
-    strikes = {side: _tops(ahead(f"{side}_ankle")) for side in SIDES}  # ZENI2008 (heel strike)
+    # ZENI2008 (heel strike)
+    strikes = {side: _tops(ahead(f"{side}_ankle")) for side in SIDES}
     offs = {side: _tops(-ahead(f"{side}_toe")) for side in SIDES}  # ZENI2008 (toe off)
     ankles = {side: joints[:, PLACES.index(f"{side}_ankle")] for side in SIDES}
     return GaitEvents(strikes, offs, heading, pelvis, ankles)
@@ -65,7 +77,8 @@ def low_pass(series: Array, cutoff: float, fps: float) -> Array:
     width = np.sqrt(np.log(2.0)) / (2.0 * np.pi * cutoff) * fps  # frames
     reach = min(int(4.0 * width) + 1, len(series) - 1)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    before, after = 2.0 * series[0] - series[reach:0:-1], 2.0 * series[-1] - series[-2 : -reach - 2 : -1]
+    before = 2.0 * series[0] - series[reach:0:-1]
+    after = 2.0 * series[-1] - series[-2 : -reach - 2 : -1]
     longer = np.concatenate([before, series, after])
     smooth = np.zeros_like(series)
     for k, weight in enumerate(weights / weights.sum()):
@@ -84,7 +97,9 @@ def _tops(series: Array) -> Array:
         return np.empty(0)  # without a library that takes a tenth of a second to import
     from scipy.signal import find_peaks
 
-    return np.array([_between(series, int(k)) for k in find_peaks(series, prominence=step)[0]])
+    return np.array(
+        [_between(series, int(k)) for k in find_peaks(series, prominence=step)[0]]
+    )
 
 
 def _between(series: Array, k: int) -> float:

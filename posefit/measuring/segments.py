@@ -14,7 +14,8 @@ from posefit.geometry.skeleton import BONES, PARENTS, Skeleton, both
 SIDES = ("left", "right")
 # In the pose of rest the body faces along z, and its right is at -x.
 TRUNK = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-FORWARDS, PALM = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
+FORWARDS = np.array([0.0, 0.0, 1.0])
+PALM = np.array([0.0, -1.0, 0.0])
 # An elbow bends forwards and, as CMU's skeletons have its hinge, 30 degrees up from there.
 BENDING = np.array([0.0, 0.5, 0.75**0.5])
 
@@ -44,7 +45,14 @@ def segment_rotations(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
         return np.asarray(-skeleton.offsets[BONES.index(bone)])
 
     segments = {"pelvis": turned[:, 0] @ TRUNK, "thorax": of("thorax") @ TRUNK}
-    bones = zip(SIDES, *(both(kind) for kind in ("femur", "tibia", "foot", "humerus", "radius", "wrist")), strict=True)
+    bones = zip(
+        SIDES,
+        *(
+            both(kind)
+            for kind in ("femur", "tibia", "foot", "humerus", "radius", "wrist")
+        ),
+        strict=True,
+    )
     for side, femur, tibia, foot, humerus, radius, wrist in bones:
         shank = _axes(FORWARDS, up(tibia))
         segments[f"{side}_thigh"] = of(femur) @ _axes(FORWARDS, up(femur))

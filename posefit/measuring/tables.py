@@ -22,7 +22,9 @@ def import_pandas() -> Any:
     try:
         return importlib.import_module("pandas")
     except ImportError as error:
-        raise ImportError("tables need the library pandas: python -m pip install 'posefit[sweep]'") from error
+        raise ImportError(
+            "tables need the library pandas: python -m pip install 'posefit[sweep]'"
+        ) from error
 
 
 def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
@@ -33,7 +35,10 @@ def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) 
         writer.writerow(["frame", "seconds", *angles])
         for k, row in enumerate(np.column_stack(list(angles.values()))):
             number = motion.first + k
-            cells = ["" if number in blank or np.isnan(value) else f"{value:.3f}" for value in row]
+            cells = [
+                "" if number in blank or np.isnan(value) else f"{value:.3f}"
+                for value in row
+            ]
             writer.writerow([number, f"{number / motion.fps:.6f}", *cells])
 
 
@@ -43,7 +48,12 @@ def write_gait(path: str | Path, gait: Gait) -> None:
         writer = csv.writer(file)
         writer.writerow(STEP_COLUMNS)
         for step in [] if gait.why else gait.steps:
-            writer.writerow(["" if v is None else v if isinstance(v, str) else f"{v:.6f}" for v in astuple(step)])
+            writer.writerow(
+                [
+                    "" if v is None else v if isinstance(v, str) else f"{v:.6f}"
+                    for v in astuple(step)
+                ]
+            )
 
 
 def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
@@ -52,18 +62,41 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
     Markers are named by `PLACES`. OpenSim and similar programs take an empty field for an unobserved marker.
     """
     path = Path(path)
-    count, fps = len(motion), f"{motion.fps:g}"
-    head = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame")
+    count = len(motion)
+    fps = f"{motion.fps:g}"
+    head = (
+        "DataRate",
+        "CameraRate",
+        "NumFrames",
+        "NumMarkers",
+        "Units",
+        "OrigDataRate",
+        "OrigDataStartFrame",
+    )
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "\t".join([*head, "OrigNumFrames"]),
-        "\t".join([fps, fps, str(count), str(len(PLACES)), "m", fps, str(motion.first + 1), str(count)]),
+        "\t".join(
+            [
+                fps,
+                fps,
+                str(count),
+                str(len(PLACES)),
+                "m",
+                fps,
+                str(motion.first + 1),
+                str(count),
+            ]
+        ),
         "Frame#\tTime\t" + "\t".join(f"{place}\t\t" for place in PLACES),
-        "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(PLACES) + 1) for axis in "XYZ"),
+        "\t\t"
+        + "\t".join(f"{axis}{k}" for k in range(1, len(PLACES) + 1) for axis in "XYZ"),
         "",
     ]
     for k, points in enumerate(motion.joints):
         number = motion.first + k
-        values = "\t".join("" if number in blank else f"{value:.6f}" for value in points.reshape(-1))
+        values = "\t".join(
+            "" if number in blank else f"{value:.6f}" for value in points.reshape(-1)
+        )
         lines.append(f"{number + 1}\t{number / motion.fps:.6f}\t{values}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

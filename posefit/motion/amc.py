@@ -38,7 +38,12 @@ Spans = dict[str, tuple[int, int]]  # bone: where its values start and stop in a
 
 
 def read_clip(
-    asf: str | Path, amc: str | Path, *, fps: float | None = None, unit: Unit | None = None, up: Up | None = None
+    asf: str | Path,
+    amc: str | Path,
+    *,
+    fps: float | None = None,
+    unit: Unit | None = None,
+    up: Up | None = None,
 ) -> Motion:
     """Return the motion of an .amc file over the skeleton of its .asf file, in that file's length unit or in `unit`.
 
@@ -47,11 +52,18 @@ def read_clip(
     """
     acclaim = parse_asf(asf, unit)
     motion = read_amc(amc, acclaim.skeleton, fps=fps, metres_per_unit=acclaim.metres)
-    return replace(motion if up is None else motion.turned(np.array(TURNS[up])), notes=(*acclaim.notes, *motion.notes))
+    return replace(
+        motion if up is None else motion.turned(np.array(TURNS[up])),
+        notes=(*acclaim.notes, *motion.notes),
+    )
 
 
 def read_amc(
-    path: str | Path, skeleton: Skeleton, *, fps: float | None = None, metres_per_unit: float = CMU_UNIT
+    path: str | Path,
+    skeleton: Skeleton,
+    *,
+    fps: float | None = None,
+    metres_per_unit: float = CMU_UNIT,
 ) -> Motion:
     """Return the motion of an .amc file, named after it: every frame, in radians and metres.
 
@@ -73,7 +85,14 @@ def read_amc(
     poses = np.zeros((len(values), ANGLES))
     poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
     poses[:, targets] = angles[:, columns]
-    return Motion(path.stem, skeleton, unwrapped(poses), values[:, :3] * metres_per_unit, rate, notes=notes)
+    return Motion(
+        path.stem,
+        skeleton,
+        unwrapped(poses),
+        values[:, :3] * metres_per_unit,
+        rate,
+        notes=notes,
+    )
 
 
 def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.int64]]:
@@ -107,7 +126,9 @@ def _head(lines: Iterator[Line]) -> tuple[bool, float | None, int]:
         elif (number := _frame_number(line)) is None:
             raise line.mistake("a header such as :DEGREES or the number of a frame")
         elif radians is None:
-            raise line.mistake(":DEGREES or :RADIANS before the first frame", f"frame {number}")
+            raise line.mistake(
+                ":DEGREES or :RADIANS before the first frame", f"frame {number}"
+            )
         else:
             return radians, rate, number
 
@@ -115,24 +136,35 @@ def _head(lines: Iterator[Line]) -> tuple[bool, float | None, int]:
 def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array:
     """Return all frames (T, values of a frame) in file units, from that of a number on."""
     width = max(stop for _, stop in spans.values())
-    data, row, bones_read = array("d"), [0.0] * width, set[str]()
+    data = array("d")
+    row = [0.0] * width
+    bones_read = set[str]()
     for line in lines:
-        bone, number = line.words[0] if line.words else "", _frame_number(line)
+        bone = line.words[0] if line.words else ""
+        number = _frame_number(line)
         if bone in spans:
             if bone in bones_read:
-                raise line.mistake(f"each bone once in frame {frame}", f"{bone!r} again")
+                raise line.mistake(
+                    f"each bone once in frame {frame}", f"{bone!r} again"
+                )
             bones_read.add(bone)
             start, stop = spans[bone]
             row[start:stop] = line.numbers(stop - start)
         elif number is not None or not line.words:  # the frame is over
             if len(bones_read) < len(spans):
                 missing = quoted(next(bone for bone in spans if bone not in bones_read))
-                raise line.mistake(f"bone {missing} in frame {frame}", None if number is None else f"frame {number}")
+                raise line.mistake(
+                    f"bone {missing} in frame {frame}",
+                    None if number is None else f"frame {number}",
+                )
             data.extend(row)
             if number is not None and number != frame + 1:
                 raise line.mistake(f"frame {frame + 1}", f"frame {number}")
             if number is not None and len(data) >= min(LONGEST * width, VALUES):
-                raise line.mistake(f"at most {min(LONGEST, VALUES // width)} frames of {width} numbers", "more")
+                raise line.mistake(
+                    f"at most {min(LONGEST, VALUES // width)} frames of {width} numbers",
+                    "more",
+                )
             frame += 1
             bones_read.clear()
         elif not bone.startswith("#"):
@@ -142,7 +174,12 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
 
 def _frame_number(line: Line) -> int | None:
     """Return the number of a line that is one alone."""
-    alone = len(line.words) == 1 and line.key.isascii() and line.key.isdigit() and len(line.key) < 10
+    alone = (
+        len(line.words) == 1
+        and line.key.isascii()
+        and line.key.isdigit()
+        and len(line.key) < 10
+    )
     return int(line.key) if alone else None
 
 
@@ -150,7 +187,9 @@ def _rate(line: Line, word: str) -> float:
     """Return the rate that a comment states."""
     (rate,) = line._replace(words=["rate", word]).numbers(1)
     if not RATES[0] <= rate <= RATES[1]:
-        raise line.mistake(f"a rate of {RATES[0]:g} to {RATES[1]:g} frames a second", quoted(word))
+        raise line.mistake(
+            f"a rate of {RATES[0]:g} to {RATES[1]:g} frames a second", quoted(word)
+        )
     return rate
 
 
@@ -162,7 +201,9 @@ def write_amc(path: str | Path, motion: Motion) -> None:
     """
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)
     if lost > 1e-9:
-        raise InputError(f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one")
+        raise InputError(
+            f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one"
+        )
     spans, columns, targets = _layout(motion.skeleton)
     values = np.zeros((len(motion), max(stop for _, stop in spans.values())))
     values[:, :3] = motion.translations / CMU_UNIT

@@ -10,16 +10,40 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.body import Body
-from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
-from posefit.geometry.units import CMU_UNIT, INCH, STATURES, UNIT_NAMES, Unit, metres_of, unit_of
+from posefit.geometry.rotation import (
+    joint_angles_from_rotation,
+    rotation_from_joint_angles,
+)
+from posefit.geometry.skeleton import (
+    ANGLES,
+    BONES,
+    INNER,
+    JOINTS,
+    PARENTS,
+    Skeleton,
+    channel_angles,
+)
+from posefit.geometry.units import (
+    CMU_UNIT,
+    INCH,
+    STATURES,
+    UNIT_NAMES,
+    Unit,
+    metres_of,
+    unit_of,
+)
 from posefit.motion.lines import LARGEST, Line, lines_of
 from posefit.reading import check_size, quoted
 
 SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
 # Where to hang the bones that a Skeleton knows by their channels alone.
-_FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthumb": "rwrist"}
+_FINGERS = {
+    "lfingers": "lhand",
+    "lthumb": "lwrist",
+    "rfingers": "rhand",
+    "rthumb": "rwrist",
+}
 
 
 class _Bone(NamedTuple):
@@ -59,7 +83,8 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
         channels=tuple((name, bone.free) for name, bone in bones.items() if bone.free),
         limits=_limits(bones),
     )
-    wanted, notes = metres if unit is None else metres_of(unit), list[str]()
+    wanted = metres if unit is None else metres_of(unit)
+    notes = list[str]()
     stature = Body.of(stated).stature
     if unit is None and not STATURES[0] <= stature <= STATURES[1]:
         guess = unit_of(stature / metres)
@@ -69,7 +94,9 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
             came += f"; lengths are taken for {UNIT_NAMES[guess]}: {stature / metres * wanted:.2f} m; --unit sets it"
         notes.append(came)
     ratio = wanted / metres
-    skeleton = stated if ratio == 1.0 else replace(stated, offsets=stated.offsets * ratio)
+    skeleton = (
+        stated if ratio == 1.0 else replace(stated, offsets=stated.offsets * ratio)
+    )
     return Acclaim(skeleton, wanted, tuple(notes))
 
 
@@ -104,7 +131,8 @@ def _sections(path: Path) -> dict[str, list[Line]]:
 
 def _units(lines: list[Line]) -> tuple[float, bool]:
     """Return metres per file unit and whether angles are degrees; Acclaim's own defaults are inches and degrees."""
-    metres, degrees = INCH, True
+    metres = INCH
+    degrees = True
     for line in lines[1:]:
         if line.key == "length":
             (unit,) = line.numbers(1)
@@ -136,7 +164,9 @@ def _bones(lines: list[Line], radians: float) -> dict[str, _Bone]:
         if line.key == "begin" and block is None:
             block = {}
         elif block is None or line.key == "begin":
-            raise line.mistake("'begin'" if block is None else "'end' before the next bone")
+            raise line.mistake(
+                "'begin'" if block is None else "'end' before the next bone"
+            )
         elif line.key == "end":
             for key in ("name", "direction", "length", "axis"):
                 if key not in block:
@@ -147,7 +177,9 @@ def _bones(lines: list[Line], radians: float) -> dict[str, _Bone]:
             bones[name] = _bone(block, radians)
             block = None
         elif line.words[0].startswith("(") and "limits" in block:
-            block["limits"] = block["limits"]._replace(words=[*block["limits"].words, *line.words])
+            block["limits"] = block["limits"]._replace(
+                words=[*block["limits"].words, *line.words]
+            )
         else:
             block[line.key] = line
     if block is not None:
@@ -156,7 +188,10 @@ def _bones(lines: list[Line], radians: float) -> dict[str, _Bone]:
 
 
 def _bone(block: dict[str, Line], radians: float) -> _Bone:
-    direction, (length,) = np.array(block["direction"].numbers(3)), block["length"].numbers(1)
+    direction, (length,) = (
+        np.array(block["direction"].numbers(3)),
+        block["length"].numbers(1),
+    )
     norm = float(np.linalg.norm(direction))
     if length < 0.0:
         raise block["length"].mistake("a length of 0 or more")
@@ -166,23 +201,41 @@ def _bone(block: dict[str, Line], radians: float) -> _Bone:
     if len(axis.words) != 5 or axis.words[4].upper() != "XYZ":
         raise axis.mistake("axis order XYZ")
     angles = np.array(axis._replace(words=axis.words[:4]).numbers(3))
-    free = tuple(word.lower() for word in block["dof"].words[1:]) if "dof" in block else ()
+    free = (
+        tuple(word.lower() for word in block["dof"].words[1:]) if "dof" in block else ()
+    )
     if not set(free) <= {"rx", "ry", "rz"} or sorted(set(free)) != list(free):
         raise block["dof"].mistake("dof out of rx ry rz, in this order")
     limits = None
-    if "limits" in block:  # (lowest highest) for each free angle, such as `(-160.0 20.0)`, on one line or several
-        words = " ".join(block["limits"].words).replace("(", " ").replace(")", " ").split()
-        limits = np.array(block["limits"]._replace(words=words).numbers(2 * len(free))).reshape(-1, 2) * radians
+    # (lowest highest) for each free angle, such as `(-160.0 20.0)`, on one line or
+    # several
+    if "limits" in block:
+        words = (
+            " ".join(block["limits"].words).replace("(", " ").replace(")", " ").split()
+        )
+        limits = (
+            np.array(
+                block["limits"]._replace(words=words).numbers(2 * len(free))
+            ).reshape(-1, 2)
+            * radians
+        )
         if (limits[:, 0] > limits[:, 1]).any():
             raise block["limits"].mistake("limits (lowest highest) in order")
-    return _Bone(direction / norm * length if length > 0.0 else np.zeros(3), angles * radians, free, limits)
+    return _Bone(
+        direction / norm * length if length > 0.0 else np.zeros(3),
+        angles * radians,
+        free,
+        limits,
+    )
 
 
 def _check_tree(path: Path, lines: list[Line], bones: Iterable[str]) -> None:
     known = {"root", *bones}
     for name in BONES:
         if name not in known:
-            raise InputError(f"{path}: the skeleton needs bone {name!r}, which this file does not define")
+            raise InputError(
+                f"{path}: the skeleton needs bone {name!r}, which this file does not define"
+            )
     parents: dict[str, tuple[str, Line]] = {}
     for line in lines[1:]:
         if line.key in ("begin", "end") and len(line.words) == 1:
@@ -192,14 +245,18 @@ def _check_tree(path: Path, lines: list[Line], bones: Iterable[str]) -> None:
                 raise line.mistake("bones that :bonedata defines", repr(name))
         for name in line.words[1:]:
             if name in parents or name == "root":
-                raise line.mistake("one parent a bone", f"another one for {quoted(name)}")
+                raise line.mistake(
+                    "one parent a bone", f"another one for {quoted(name)}"
+                )
             parents[name] = line.words[0], line
     for name, above in zip(BONES, PARENTS[1:], strict=True):
         if name not in parents:
             raise lines[-1].mistake(f"bone {name!r} in the hierarchy", "none")
         parent, line = parents[name]
         if parent != JOINTS[above]:
-            raise line.mistake(f"bone {name!r} under {JOINTS[above]!r}", f"it under {quoted(parent)}")
+            raise line.mistake(
+                f"bone {name!r} under {JOINTS[above]!r}", f"it under {quoted(parent)}"
+            )
 
 
 def write_asf(path: str | Path, skeleton: Skeleton) -> None:
@@ -215,9 +272,14 @@ def write_asf(path: str | Path, skeleton: Skeleton) -> None:
     )
     text = [header]
     turning = dict(skeleton.channels)
-    channels = [*((name, ()) for name in BONES if name not in turning), *skeleton.channels]
+    channels = [
+        *((name, ()) for name in BONES if name not in turning),
+        *skeleton.channels,
+    ]
     for number, (name, free) in enumerate(channels, 1):
-        direction, length, axis = [1.0, 0.0, 0.0], 0.0, [0.0, 0.0, 0.0]
+        direction = [1.0, 0.0, 0.0]
+        length = 0.0
+        axis = [0.0, 0.0, 0.0]
         if name in BONES:
             bone = BONES.index(name)
             length = float(skeleton.lengths[bone])
@@ -227,14 +289,24 @@ def write_asf(path: str | Path, skeleton: Skeleton) -> None:
         dof = f"    dof {' '.join(free)}\n" if free else ""
         if skeleton.limits is not None and (angles := channel_angles(name, free)):
             rows = np.degrees(skeleton.limits[[angle - 3 for angle in angles]]).tolist()
-            dof += "    limits " + "\n           ".join(f"({low!r} {high!r})" for low, high in rows) + "\n"
+            dof += (
+                "    limits "
+                + "\n           ".join(f"({low!r} {high!r})" for low, high in rows)
+                + "\n"
+            )
         text.append(
             f"  begin\n    id {number}\n    name {name}\n    direction {_spaced(direction)}\n"
             f"    length {length / CMU_UNIT!r}\n    axis {_spaced(axis)} XYZ\n{dof}  end\n"
         )
     text.append(":hierarchy\n  begin\n")
-    parents = {name: JOINTS[above] for name, above in zip(BONES, PARENTS[1:], strict=True)}
-    parents |= {name: _FINGERS.get(name, "root") for name, _ in skeleton.channels if name not in JOINTS}
+    parents = {
+        name: JOINTS[above] for name, above in zip(BONES, PARENTS[1:], strict=True)
+    }
+    parents |= {
+        name: _FINGERS.get(name, "root")
+        for name, _ in skeleton.channels
+        if name not in JOINTS
+    }
     for parent in JOINTS:
         children = [name for name, above in parents.items() if above == parent]
         if children:

@@ -29,7 +29,9 @@ from posefit.reading import quoted, suggestion
 @lru_cache(maxsize=1)
 def _stored() -> dict[str, Any]:
     """Return what built_in.json holds: the average skeleton, and the models by style."""
-    stored: dict[str, Any] = json.loads((files("posefit.motion") / "built_in.json").read_text(encoding="utf-8"))
+    stored: dict[str, Any] = json.loads(
+        (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
+    )
     return stored
 
 
@@ -48,7 +50,11 @@ def activity_of(name: str) -> str:
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind, what its prior is trained on by default."""
     _check(name)
-    return tuple(style for style in _stored()["motions"] if activity_of(style) == activity_of(name) and style != name)
+    return tuple(
+        style
+        for style in _stored()["motions"]
+        if activity_of(style) == activity_of(name) and style != name
+    )
 
 
 @lru_cache(maxsize=1)
@@ -64,11 +70,20 @@ def stored_skeleton(name: str, stored: Mapping[str, Any]) -> Skeleton:
         np.array(stored["offsets"]),
         rotation_from_joint_angles(np.radians(stored["axes_degrees"])),
         tuple((bone, tuple(free)) for bone, free in stored["channels"]),
-        None if stored["limits_degrees"] is None else np.radians(stored["limits_degrees"]),
+        None
+        if stored["limits_degrees"] is None
+        else np.radians(stored["limits_degrees"]),
     )
 
 
-def motion(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0, phase: float = 0.0) -> Motion:
+def motion(
+    name: str,
+    *,
+    frames: int = 60,
+    fps: float = 30.0,
+    speed: float = 1.0,
+    phase: float = 0.0,
+) -> Motion:
     """Return a built-in motion of so many frames. It goes along +z, and half its way is behind the origin.
 
     `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
@@ -76,8 +91,14 @@ def motion(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0
     off. Raises InputError for an unknown name, and where a number is not what it should be.
     """
     angles, series, period, pace = _model(name)
-    if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 1:
-        raise InputError(f"frames must be a whole number of at least 1, got {quoted(frames)}")
+    if (
+        isinstance(frames, bool)
+        or not isinstance(frames, int | np.integer)
+        or frames < 1
+    ):
+        raise InputError(
+            f"frames must be a whole number of at least 1, got {quoted(frames)}"
+        )
     if frames > LONGEST:
         raise InputError(f"frames must be at most {LONGEST}, got {quoted(frames)}")
     if not (np.isfinite(fps) and fps > 0.0 and np.isfinite(speed) and speed > 0.0):
@@ -85,7 +106,11 @@ def motion(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0
     if not np.isfinite(phase):
         raise InputError(f"phase must be finite, got {phase}")
     times = np.arange(frames) * speed / fps
-    turns = 2.0 * np.pi * np.outer(times / period + phase, np.arange(1, series.shape[1] // 2 + 1))
+    turns = (
+        2.0
+        * np.pi
+        * np.outer(times / period + phase, np.arange(1, series.shape[1] // 2 + 1))
+    )
     values = np.column_stack([np.ones(frames), np.cos(turns), np.sin(turns)]) @ series.T
     poses = np.zeros((frames, ANGLES))
     poses[:, angles] = values[:, 3:]
@@ -100,7 +125,10 @@ def _model(name: str) -> tuple[list[int], Array, float, float]:
     _check(name)
     styles = [name] if name in _stored()["motions"] else other_styles(name)
     models = [_stored()["motions"][style] for style in styles]
-    series, period, pace = (np.mean([model[key] for model in models], axis=0) for key in ("series", "period", "speed"))
+    series, period, pace = (
+        np.mean([model[key] for model in models], axis=0)
+        for key in ("series", "period", "speed")
+    )
     return models[0]["angles"], series, float(period), float(pace)
 
 

@@ -47,7 +47,11 @@ NAMES = {
     "lowerneck": "Neck",
     "upperneck": "Neck1",
     "head": "Head",
-    **{f"{side[0].lower()}{bone}": f"{side}{name}" for side in ("Left", "Right") for bone, name in _LIMBS.items()},
+    **{
+        f"{side[0].lower()}{bone}": f"{side}{name}"
+        for side in ("Left", "Right")
+        for bone, name in _LIMBS.items()
+    },
     "lhipjoint": "LHipJoint",
     "rhipjoint": "RHipJoint",
 }
@@ -55,11 +59,15 @@ ROTATIONS = "Zrotation Xrotation Yrotation"
 LONGEST_LINE = 100_000  # bytes; a frame of CMU's files has about 1,000
 NODES = 1_000  # joints and ends of a file
 FRAME_TIMES = (1e-4, 10.0)  # seconds
-WHOLE_RATE = 1e-4  # how far a rate may be from a whole number, as a share: files state 0.0083333 for 1 / 120
+# how far a rate may be from a whole number, as a share: files state 0.0083333 for 1 /
+# 120
+WHOLE_RATE = 1e-4
 MISSED = 1e-3  # metres that a joint may be off its place in the file without a word
 
 
-def read_bvh(path: str | Path, *, unit: Unit | None = None, up: Up | None = None) -> Motion:
+def read_bvh(
+    path: str | Path, *, unit: Unit | None = None, up: Up | None = None
+) -> Motion:
     """Return the motion of a .bvh file, with a skeleton of its own, in radians and metres, y up.
 
     Joints may have the names of many programs. Those that are missing, of toes, hands, neck or spine, are at rest, with
@@ -86,21 +94,40 @@ def read_bvh(path: str | Path, *, unit: Unit | None = None, up: Up | None = None
         expected = f"a person of a stature in a unit that is known, or --unit {'|'.join(UNITS)}"
         raise InputError(f"{path}: expected {expected}, got one of {stature:g} units")
     metres = METRES[chosen] if known is None else known
-    skeleton = replace(result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres)
+    skeleton = replace(
+        result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres
+    )
     notes = []
     if unit is None and chosen != "m":
         stands = f"as the person stands {stature:.4g} of them"
-        notes.append(f"{path}: lengths are taken for {UNIT_NAMES[chosen]}, {stands}; --unit sets it")
+        notes.append(
+            f"{path}: lengths are taken for {UNIT_NAMES[chosen]}, {stands}; --unit sets it"
+        )
     elif unit is not None and unit_of(stature * metres) is None:
-        notes.append(f"{path}: the person stands {stature * metres:.2f} m with lengths in {UNIT_NAMES[unit]}")
+        notes.append(
+            f"{path}: the person stands {stature * metres:.2f} m with lengths in {UNIT_NAMES[unit]}"
+        )
     if up is None and axis != "y":
-        notes.append(f"{path}: {axis} is taken to be up, as the person stands along it; --up sets it")
+        notes.append(
+            f"{path}: {axis} is taken to be up, as the person stands along it; --up sets it"
+        )
     if result.filled:
-        notes.append(f"{path}: without {', '.join(result.filled)}, which are an average person's at rest")
+        notes.append(
+            f"{path}: without {', '.join(result.filled)}, which are an average person's at rest"
+        )
     if result.off * metres > MISSED:
         off = f"{1e3 * result.off * metres:.1f} mm off"
-        notes.append(f"{path}: bones change their lengths or fork; joints are up to {off}")
-    return Motion(path.stem, skeleton, result.poses, result.places * metres, fps, notes=tuple(notes))
+        notes.append(
+            f"{path}: bones change their lengths or fork; joints are up to {off}"
+        )
+    return Motion(
+        path.stem,
+        skeleton,
+        result.poses,
+        result.places * metres,
+        fps,
+        notes=tuple(notes),
+    )
 
 
 def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
@@ -114,7 +141,11 @@ def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
     if abs(cosine) < STANDING:
         return "y", np.eye(3)
     turn = np.array(TURNS[name], dtype=np.float64)
-    return (name, turn) if cosine > 0.0 else (f"-{name}", np.diag([1.0, -1.0, -1.0]) @ turn)
+    return (
+        (name, turn)
+        if cosine > 0.0
+        else (f"-{name}", np.diag([1.0, -1.0, -1.0]) @ turn)
+    )
 
 
 @dataclass
@@ -122,7 +153,8 @@ class _Node:
     name: str  # "" of an End Site
     parent: int
     offset: Array | None = None
-    channels: list[tuple[bool, int]] = field(default_factory=list)  # whether it turns, and its axis
+    # whether it turns, and its axis
+    channels: list[tuple[bool, int]] = field(default_factory=list)
     column: int = 0  # of its first channel
 
 
@@ -131,7 +163,8 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
     lines = lines_of(path, LONGEST_LINE)
     nodes, width = _hierarchy(lines)
     count, frame_time = _head(lines)
-    data, rows = array("d"), 0
+    data = array("d")
+    rows = 0
     for line in lines:
         if not line.words:
             break
@@ -148,9 +181,15 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
         raise line.mistake(f"{max(count, 1)} frames", f"{rows}")
     values = np.array(data).reshape(rows, width)
     if not (np.abs(values) < LARGEST).all():
-        raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
+        raise InputError(
+            f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}"
+        )
     rate = 1.0 / frame_time
-    return nodes, values, float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate
+    return (
+        nodes,
+        values,
+        float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate,
+    )
 
 
 def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
@@ -164,12 +203,18 @@ def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
         brace = line.words[-1:] == ["{"]
         node = nodes[opened[-1]] if opened else None
         if line.key in ("root", "joint", "end"):
-            if waiting or (line.key == "root") != (node is None) or (node is not None and not node.name):
+            if (
+                waiting
+                or (line.key == "root") != (node is None)
+                or (node is not None and not node.name)
+            ):
                 raise line.mistake("a ROOT, with JOINT and End Site inside")
             if len(nodes) >= NODES:
                 raise line.mistake(f"at most {NODES} joints and ends", "more")
             name = " ".join(line.words[1:-1] if brace else line.words[1:]) or "unnamed"
-            nodes.append(_Node("" if line.key == "end" else name, opened[-1] if opened else -1))
+            nodes.append(
+                _Node("" if line.key == "end" else name, opened[-1] if opened else -1)
+            )
             waiting = True
         elif line.key == "}" and node is not None:
             if node.offset is None:
@@ -177,13 +222,21 @@ def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
             opened.pop()
         elif line.key == "offset" and node is not None:
             node.offset = np.array(line.numbers(3))
-        elif line.key == "channels" and node is not None and node.name and not node.channels:
-            node.channels, node.column = _channels(line), width
+        elif (
+            line.key == "channels"
+            and node is not None
+            and node.name
+            and not node.channels
+        ):
+            node.channels = _channels(line)
+            node.column = width
             width += len(node.channels)
         elif line.key == "motion" and not opened and nodes:
             return nodes, width
         elif not (line.key == "{" and waiting) and (line.key != "hierarchy" or nodes):
-            raise line.mistake("HIERARCHY, ROOT, JOINT, End Site, OFFSET, CHANNELS or MOTION")
+            raise line.mistake(
+                "HIERARCHY, ROOT, JOINT, End Site, OFFSET, CHANNELS or MOTION"
+            )
         if brace and waiting:
             opened.append(len(nodes) - 1)
             waiting = False
@@ -194,13 +247,23 @@ def _head(lines: Iterator[Line]) -> tuple[int, float]:
     count = -1
     while True:
         line = next(lines)
-        if line.key == "frames:" and len(line.words) == 2 and line.words[1].isdecimal() and len(line.words[1]) < 10:
+        if (
+            line.key == "frames:"
+            and len(line.words) == 2
+            and line.words[1].isdecimal()
+            and len(line.words[1]) < 10
+        ):
             count = int(line.words[1])
-        elif [word.lower() for word in line.words[:2]] == ["frame", "time:"] and count >= 0:
+        elif [word.lower() for word in line.words[:2]] == [
+            "frame",
+            "time:",
+        ] and count >= 0:
             (frame_time,) = line._replace(words=line.words[1:]).numbers(1)
             if not FRAME_TIMES[0] <= frame_time <= FRAME_TIMES[1]:
                 low, high = FRAME_TIMES
-                raise line.mistake(f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}")
+                raise line.mistake(
+                    f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}"
+                )
             return count, frame_time
         else:
             raise line.mistake("Frames: and Frame Time:")
@@ -210,7 +273,8 @@ def _channels(line: Line) -> list[tuple[bool, int]]:
     """Return the channels of a joint, in their order."""
     channels = []
     for word in line.words[2:]:
-        axis, kind = "XYZ".find(word[:1].upper()), word[1:].lower()
+        axis = "XYZ".find(word[:1].upper())
+        kind = word[1:].lower()
         if axis < 0 or kind not in ("position", "rotation"):
             raise line.mistake("channels such as Xposition or Zrotation")
         channels.append((kind == "rotation", axis))
@@ -222,24 +286,40 @@ def _channels(line: Line) -> list[tuple[bool, int]]:
 
 def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
     """Return the joints of a file, at rest and in each frame. Raises InputError where they are not a person's."""
-    names, parents = [node.name for node in nodes], [node.parent for node in nodes]
+    names = [node.name for node in nodes]
+    parents = [node.parent for node in nodes]
     joints = joints_of(names, parents)
     if isinstance(joints, list):
-        raise InputError(f"a person's joints, got one without {cut(', '.join(joints), 200)}")
+        raise InputError(
+            f"a person's joints, got one without {cut(', '.join(joints), 200)}"
+        )
     wanted: set[int] = set()  # the joints of the person, and all above them
-    for number in (joints.hips, joints.chest, *joints.limbs.values(), *joints.spine, *joints.neck, joints.head or 0):
+    for number in (
+        joints.hips,
+        joints.chest,
+        *joints.limbs.values(),
+        *joints.spine,
+        *joints.neck,
+        joints.head or 0,
+    ):
         while number >= 0 and number not in wanted:
             wanted.add(number)
             number = parents[number]
     shape = (len(nodes), len(values), 3)
-    rest, turns, places = np.zeros((len(nodes), 3)), np.zeros((*shape, 3)), np.zeros(shape)
+    rest = np.zeros((len(nodes), 3))
+    turns = np.zeros((*shape, 3))
+    places = np.zeros(shape)
     for number, (node, above) in enumerate(zip(nodes, parents, strict=True)):
         assert node.offset is not None
         rest[number] = node.offset + (rest[above] if above >= 0 else 0.0)
         if number in wanted:
             turn, offset = _movement(node, values)
             turns[number] = turn if above < 0 else turns[above] @ turn
-            places[number] = offset if above < 0 else places[above] + np.einsum("tij,tj->ti", turns[above], offset)
+            places[number] = (
+                offset
+                if above < 0
+                else places[above] + np.einsum("tij,tj->ti", turns[above], offset)
+            )
     at_rest = np.tile(np.eye(3), (len(nodes), 1, 1))
     return Rig(names, parents, joints, (at_rest, rest), (turns, places))
 
@@ -247,7 +327,8 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
 def _movement(node: _Node, values: Array) -> tuple[Array, Array]:
     """Return how a node turns (T or 1, 3, 3) and where it is (T, 3), in the frame of the node above it."""
     assert node.offset is not None
-    turn, offset = np.eye(3)[None], np.tile(node.offset, (len(values), 1))
+    turn = np.eye(3)[None]
+    offset = np.tile(node.offset, (len(values), 1))
     positions = []
     for column, (turning, axis) in enumerate(node.channels, node.column):
         if turning:
@@ -256,8 +337,10 @@ def _movement(node: _Node, values: Array) -> tuple[Array, Array]:
             offset[:, axis] = values[:, column]
             positions.append(axis)
     if positions and node.parent >= 0:
-        at_rest, stated = node.offset[positions], offset[:, positions]
-        if np.abs(stated).mean() < np.abs(stated - at_rest).mean():  # some programs write what is added to the offset
+        at_rest = node.offset[positions]
+        stated = offset[:, positions]
+        # some programs write what is added to the offset
+        if np.abs(stated).mean() < np.abs(stated - at_rest).mean():
             offset[:, positions] += at_rest
     return turn, offset
 
@@ -268,26 +351,47 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
     Joint names are those of the CMU conversions, as `read_bvh` takes them. Angles are counted in other axes there, so
     the poses that come back differ, and the joints do not.
     """
-    lines, order = ["HIERARCHY"], []
+    lines = ["HIERARCHY"]
+    order = []
 
     def visit(joint: int, depth: int) -> None:
         tab = "\t" * depth
-        where = np.zeros(3) if PARENTS[joint] <= 0 else motion.skeleton.offsets[PARENTS[joint] - 1]
+        where = (
+            np.zeros(3)
+            if PARENTS[joint] <= 0
+            else motion.skeleton.offsets[PARENTS[joint] - 1]
+        )
         order.append(joint)
         lines.append(f"{tab}{'JOINT' if joint else 'ROOT'} {NAMES[JOINTS[joint]]}")
         channels = "6 Xposition Yposition Zposition" if joint == 0 else "3"
-        lines.extend([f"{tab}{{", f"{tab}\tOFFSET {_plain(where)}", f"{tab}\tCHANNELS {channels} {ROTATIONS}"])
+        lines.extend(
+            [
+                f"{tab}{{",
+                f"{tab}\tOFFSET {_plain(where)}",
+                f"{tab}\tCHANNELS {channels} {ROTATIONS}",
+            ]
+        )
         for child, parent in enumerate(PARENTS):
             if parent == joint:
                 visit(child, depth + 1)
         if joint in ENDS:
             end = _plain(motion.skeleton.offsets[joint - 1])
-            lines.extend([f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\tOFFSET {end}", f"{tab}\t}}"])
+            lines.extend(
+                [
+                    f"{tab}\tEnd Site",
+                    f"{tab}\t{{",
+                    f"{tab}\t\tOFFSET {end}",
+                    f"{tab}\t}}",
+                ]
+            )
         lines.append(f"{tab}}}")
 
     visit(0, 0)
     turns = motion.skeleton.turns(motion.poses)[order]
-    angles = np.degrees(steady_angles(np.swapaxes(angles_about((2, 0, 1), turns), 0, 1)))  # ZXY
+    # ZXY
+    angles = np.degrees(
+        steady_angles(np.swapaxes(angles_about((2, 0, 1), turns), 0, 1))
+    )
     angles = angles.reshape(len(motion), -1)
     lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
     lines += [_plain(row) for row in np.hstack([motion.translations, angles])]

@@ -18,16 +18,30 @@ from posefit.geometry.rotation import along_y, quaternions
 from posefit.geometry.skeleton import BONES, INNER, PARENTS, side
 from posefit.motion.motion import Motion
 
-COLOURS = {"left": (0.87, 0.38, 0.08), "right": (0.1, 0.36, 0.75), "middle": (0.6, 0.6, 0.6)}
+COLOURS = {
+    "left": (0.87, 0.38, 0.08),
+    "right": (0.1, 0.36, 0.75),
+    "middle": (0.6, 0.6, 0.6),
+}
 MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.7}
-RING_CORNERS, CAP = 16, 4  # corners of a ring, and rings of a cap
-FLOAT, SHORT, ARRAY, ELEMENTS = 5126, 5123, 34962, 34963  # glTF's numbers of types and of what a buffer is for
-MAGIC, VERSION, JSON, BINARY = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
+# corners of a ring, and rings of a cap
+RING_CORNERS = 16
+CAP = 4
+# glTF's numbers of types and of what a buffer is for
+FLOAT = 5126
+SHORT = 5123
+ARRAY = 34962
+ELEMENTS = 34963
+MAGIC = 0x46546C67
+VERSION = 2
+JSON = 0x4E4F534A
+BINARY = 0x004E4942
 
 
 def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     """Write a motion of a body whose bones have these radii (26, 2), in metres."""
-    skeleton, data = motion.skeleton, _Buffer()
+    skeleton = motion.skeleton
+    data = _Buffer()
     sides = list(COLOURS)
     nodes: list[dict[str, Any]] = [{"name": "root"}]
     meshes = []
@@ -38,17 +52,27 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
         nodes[start].setdefault("children", []).append(bone + 1)
         points, normals, corners = _capped_cone(skeleton.offsets[bone], radii[bone])
         primitive = {
-            "attributes": {"POSITION": data.add(points, ARRAY, True), "NORMAL": data.add(normals, ARRAY)},
+            "attributes": {
+                "POSITION": data.add(points, ARRAY, True),
+                "NORMAL": data.add(normals, ARRAY),
+            },
             "indices": data.add(corners, ELEMENTS),
             "material": sides.index(side(name)),
         }
         meshes.append({"name": name, "primitives": [primitive]})
-    times = data.add((motion.first + np.arange(len(motion)))[:, None] / motion.fps, None, True)
+    times = data.add(
+        (motion.first + np.arange(len(motion)))[:, None] / motion.fps, None, True
+    )
     turns = motion.skeleton.turns(motion.poses)
     moved = [(0, "translation", motion.translations)]
     moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]
-    samplers = [{"input": times, "output": data.add(values, None)} for _, _, values in moved]
-    channels = [{"sampler": k, "target": {"node": node, "path": path}} for k, (node, path, _) in enumerate(moved)]
+    samplers = [
+        {"input": times, "output": data.add(values, None)} for _, _, values in moved
+    ]
+    channels = [
+        {"sampler": k, "target": {"node": node, "path": path}}
+        for k, (node, path, _) in enumerate(moved)
+    ]
     document = {
         "asset": {"version": "2.0", "generator": "posefit"},
         "scene": 0,
@@ -56,7 +80,10 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
         "nodes": nodes,
         "meshes": meshes,
         "materials": [
-            {"name": name, "pbrMetallicRoughness": {**MATT, "baseColorFactor": [*colour, 1.0]}}
+            {
+                "name": name,
+                "pbrMetallicRoughness": {**MATT, "baseColorFactor": [*colour, 1.0]},
+            }
             for name, colour in COLOURS.items()
         ],
         "animations": [{"name": "track", "samplers": samplers, "channels": channels}],
@@ -67,8 +94,15 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     binary = data.bytes
-    chunks = struct.pack("<II", len(text), JSON) + text + struct.pack("<II", len(binary), BINARY) + binary
-    Path(path).write_bytes(struct.pack("<III", MAGIC, VERSION, 12 + len(chunks)) + chunks)
+    chunks = (
+        struct.pack("<II", len(text), JSON)
+        + text
+        + struct.pack("<II", len(binary), BINARY)
+        + binary
+    )
+    Path(path).write_bytes(
+        struct.pack("<III", MAGIC, VERSION, 12 + len(chunks)) + chunks
+    )
 
 
 class _Buffer:
@@ -79,34 +113,58 @@ class _Buffer:
         self.views: list[dict[str, int]] = []
         self.accessors: list[dict[str, Any]] = []
 
-    def add(self, values: NDArray[Any], target: int | None, bounds: bool = False) -> int:
+    def add(
+        self, values: NDArray[Any], target: int | None, bounds: bool = False
+    ) -> int:
         """Add vectors (n, k) of 32 bits, or indices (n,) of 16, and return their number; with `bounds` their ends."""
         indices = values.ndim == 1
         raw = values.astype("<u2" if indices else "<f4")
         view = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": raw.nbytes}
         self.views.append(view if target is None else {**view, "target": target})
         kind = "SCALAR" if indices or raw.shape[1] == 1 else f"VEC{raw.shape[1]}"
-        accessor: dict[str, Any] = {"bufferView": len(self.views) - 1, "componentType": SHORT if indices else FLOAT}
+        accessor: dict[str, Any] = {
+            "bufferView": len(self.views) - 1,
+            "componentType": SHORT if indices else FLOAT,
+        }
         accessor |= {"count": len(raw), "type": kind}
         if bounds:
-            accessor |= {"min": raw.min(axis=0).tolist(), "max": raw.max(axis=0).tolist()}
+            accessor |= {
+                "min": raw.min(axis=0).tolist(),
+                "max": raw.max(axis=0).tolist(),
+            }
         self.accessors.append(accessor)
         self.bytes += raw.tobytes() + b"\0" * (-raw.nbytes % 4)
         return len(self.accessors) - 1
 
 
-def _capped_cone(offset: Array, radii: Sequence[float] | Array) -> tuple[Array, Array, NDArray[np.int64]]:
+def _capped_cone(
+    offset: Array, radii: Sequence[float] | Array
+) -> tuple[Array, Array, NDArray[np.int64]]:
     """Return points and normals (n, 3) and triangles' corners (3 m,) of a cone with half balls at its ends."""
     length = float(np.linalg.norm(offset))
-    down, up = np.linspace(-0.5 * np.pi, 0.0, CAP), np.linspace(0.0, 0.5 * np.pi, CAP)
-    rings = [(angle, radii[0], 0.0) for angle in down] + [(angle, radii[1], length) for angle in up]
+    down = np.linspace(-0.5 * np.pi, 0.0, CAP)
+    up = np.linspace(0.0, 0.5 * np.pi, CAP)
+    rings = [(angle, radii[0], 0.0) for angle in down] + [
+        (angle, radii[1], length) for angle in up
+    ]
     around = np.linspace(0.0, 2.0 * np.pi, RING_CORNERS, endpoint=False)
-    normals = np.array([(np.cos(a) * np.cos(b), np.sin(a), np.cos(a) * np.sin(b)) for a, _, _ in rings for b in around])
+    normals = np.array(
+        [
+            (np.cos(a) * np.cos(b), np.sin(a), np.cos(a) * np.sin(b))
+            for a, _, _ in rings
+            for b in around
+        ]
+    )
     scale = np.repeat([radius for _, radius, _ in rings], RING_CORNERS)[:, None]
-    points = scale * normals + np.repeat([(0.0, base, 0.0) for _, _, base in rings], RING_CORNERS, axis=0)
+    points = scale * normals + np.repeat(
+        [(0.0, base, 0.0) for _, _, base in rings], RING_CORNERS, axis=0
+    )
     ring, k = np.divmod(np.arange((len(rings) - 1) * RING_CORNERS), RING_CORNERS)
-    low, high = ring * RING_CORNERS, (ring + 1) * RING_CORNERS
+    low = ring * RING_CORNERS
+    high = (ring + 1) * RING_CORNERS
     after = (k + 1) % RING_CORNERS
-    corners = np.stack([low + k, high + k, low + after, low + after, high + k, high + after], axis=1).ravel()
+    corners = np.stack(
+        [low + k, high + k, low + after, low + after, high + k, high + after], axis=1
+    ).ravel()
     turn = along_y(offset).T
     return points @ turn, normals @ turn, corners

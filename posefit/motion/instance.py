@@ -17,7 +17,8 @@ from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
 
 RNG_STREAM_INSTANCE = 2013
-SPEED = 0.15  # how far the cadence of a built-in motion's instance is from its own at most
+# how far the cadence of a built-in motion's instance is from its own at most
+SPEED = 0.15
 VIEW_DEGREES = 10.0  # how far the cameras of an instance are turned at most
 
 
@@ -49,17 +50,23 @@ def variation(number: int) -> Variation:
     )
 
 
-def motion_of_instance(source: str | Motion, number: int, *, frames: int, fps: float) -> Motion:
+def motion_of_instance(
+    source: str | Motion, number: int, *, frames: int, fps: float
+) -> Motion:
     """Return so many frames of an instance of a motion: a built-in motion's name, a file or a motion.
 
     Raises InputError where a file has fewer frames.
     """
     varied = variation(number)
     if isinstance(source, str) and source in built_in.names():
-        return built_in.motion(source, frames=frames, fps=fps, speed=varied.speed, phase=varied.phase)
+        return built_in.motion(
+            source, frames=frames, fps=fps, speed=varied.speed, phase=varied.phase
+        )
     motion = load_motion(source, fps)
     if frames > len(motion):
         name = source if isinstance(source, str) else source.name
-        raise InputError(f"frames must be at most {len(motion)}, the length of {name}, got {frames}")
+        raise InputError(
+            f"frames must be at most {len(motion)}, the length of {name}, got {frames}"
+        )
     first = int(varied.start * (len(motion) - frames + 1))
     return motion.frames(first, first + frames)

@@ -14,22 +14,56 @@ from typing import NamedTuple
 # Of each joint of a side, from the trunk outwards: its names, and those that also other joints have.
 _LIMBS: Mapping[str, tuple[set[str], set[str]]] = {
     "thigh": ({"upleg", "upperleg", "thigh", "femur", "uleg", "legupper"}, {"hip"}),
-    "shin": ({"leg", "lowleg", "lowerleg", "shin", "shank", "calf", "knee", "tibia", "leglower"}, set()),
+    "shin": (
+        {
+            "leg",
+            "lowleg",
+            "lowerleg",
+            "shin",
+            "shank",
+            "calf",
+            "knee",
+            "tibia",
+            "leglower",
+        },
+        set(),
+    ),
     "foot": ({"foot", "ankle"}, set()),
     "toe": ({"toe", "toes", "toebase", "ball", "footindex", "forefoot"}, set()),
     "clavicle": ({"clavicle", "collar", "collarbone"}, {"shoulder"}),
-    "arm": ({"arm", "uparm", "upperarm", "uarm", "shldr", "humerus", "armupper"}, {"shoulder"}),
-    "forearm": ({"forearm", "lowarm", "lowerarm", "farm", "elbow", "radius", "armlower"}, set()),
+    "arm": (
+        {"arm", "uparm", "upperarm", "uarm", "shldr", "humerus", "armupper"},
+        {"shoulder"},
+    ),
+    "forearm": (
+        {"forearm", "lowarm", "lowerarm", "farm", "elbow", "radius", "armlower"},
+        set(),
+    ),
     "hand": ({"hand", "wrist"}, set()),
-    "palm": ({"fingerbase", "handmiddle", "middle", "fmiddle", "handmid", "mid"}, set()),
+    "palm": (
+        {"fingerbase", "handmiddle", "middle", "fmiddle", "handmid", "mid"},
+        set(),
+    ),
 }
-_MIDDLE = {"head": {"head", "face", "skull"}, "neck": {"neck", "lowerneck", "upperneck"}}
+_MIDDLE = {
+    "head": {"head", "face", "skull"},
+    "neck": {"neck", "lowerneck", "upperneck"},
+}
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
-_JOINED = {"lu": ("left", "u"), "ru": ("right", "u"), "lf": ("left", "f"), "rf": ("right", "f")}  # LUArm, RFArm
+# LUArm, RFArm
+_JOINED = {
+    "lu": ("left", "u"),
+    "ru": ("right", "u"),
+    "lf": ("left", "f"),
+    "rf": ("right", "f"),
+}
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
-_KNOWN = set().union(*(first | second for first, second in _LIMBS.values()), *_MIDDLE.values())
+_KNOWN = set().union(
+    *(first | second for first, second in _LIMBS.values()), *_MIDDLE.values()
+)
 _ENDINGS = {"joint", "jnt", "bone"}
-LEGS, ARMS = ("thigh", "shin", "foot"), ("arm", "forearm", "hand")
+LEGS = ("thigh", "shin", "foot")
+ARMS = ("arm", "forearm", "hand")
 NEEDED = tuple((side, joint) for side in ("left", "right") for joint in (*LEGS, *ARMS))
 LONGEST_NAME = 200  # characters; of what is longer, the end counts
 
@@ -44,7 +78,9 @@ class Part(NamedTuple):
 
 def part_of(name: str) -> Part:
     """Return what a joint's name says; without a known part, the part is ""."""
-    words = [word.lower() for word in _WORD.findall(name[-LONGEST_NAME:].rpartition(":")[2])]
+    words = [
+        word.lower() for word in _WORD.findall(name[-LONGEST_NAME:].rpartition(":")[2])
+    ]
     sides: list[str] = []
     rest: list[str] = []
     for word in words:
@@ -54,7 +90,8 @@ def part_of(name: str) -> Part:
             side, letter = _JOINED[word]
             sides.append(side)
             rest.append(letter)
-        elif word not in _KNOWN and word[0] in "lr" and word[1:] in _KNOWN:  # lThigh in small letters, lfemur
+        # lThigh in small letters, lfemur
+        elif word not in _KNOWN and word[0] in "lr" and word[1:] in _KNOWN:
             sides.append(_SIDES[word[0]])
             rest.append(word[1:])
         else:
@@ -75,7 +112,8 @@ def part_of(name: str) -> Part:
 class Joints(NamedTuple):
     """Which nodes of a tree are a person's joints, by their numbers."""
 
-    limbs: Mapping[tuple[str, str], int]  # such as ("left", "thigh"); those of `NEEDED` at least
+    # such as ("left", "thigh"); those of `NEEDED` at least
+    limbs: Mapping[tuple[str, str], int]
     hips: int
     chest: int  # from which arms and head go
     spine: Sequence[int]  # from behind the hips to the joint that bears the neck
@@ -94,10 +132,17 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
         paths.append([*(paths[parent] if parent >= 0 else []), node])
     limbs: dict[tuple[str, str], int] = {}
     for side in ("left", "right"):
-        limbs.update({(side, joint): node for joint, node in _limbs(side, parts, paths).items()})
-        for above, end in (("shin", "foot"), ("forearm", "hand")):  # a limb may end there
+        limbs.update(
+            {(side, joint): node for joint, node in _limbs(side, parts, paths).items()}
+        )
+        # a limb may end there
+        for above, end in (("shin", "foot"), ("forearm", "hand")):
             last = limbs.get((side, above))
-            ends = [child for child, parent in enumerate(parents) if parent == last and not names[child]]
+            ends = [
+                child
+                for child, parent in enumerate(parents)
+                if parent == last and not names[child]
+            ]
             if ends and (side, end) not in limbs:
                 limbs[side, end] = ends[0]
     if missing := _missing(limbs, names, paths):
@@ -105,60 +150,118 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     legs = [limbs[side, "thigh"] for side in ("left", "right")]
     arms = [limbs[side, "arm"] for side in ("left", "right")]
     hips = _common(paths, legs)
-    heads = [node for node, part in enumerate(parts) if part.part in _MIDDLE["head"] and not part.side]
-    head = min(heads, key=lambda node: (parts[node].part != "head", parts[node].others, len(paths[node])), default=None)
-    if hips is None or (chest := _common(paths, arms if head is None else [*arms, head])) is None:
+    heads = [
+        node
+        for node, part in enumerate(parts)
+        if part.part in _MIDDLE["head"] and not part.side
+    ]
+    head = min(
+        heads,
+        key=lambda node: (
+            parts[node].part != "head",
+            parts[node].others,
+            len(paths[node]),
+        ),
+        default=None,
+    )
+    if (
+        hips is None
+        or (chest := _common(paths, arms if head is None else [*arms, head])) is None
+    ):
         return ["a root from which legs, arms and head go"]
     if hips not in paths[chest]:
         return [f"arms and head above the hips ({names[hips]!r})"]
     between = paths[chest][paths[chest].index(hips) + 1 :]
     if head is None:
-        necks = [node for node, part in enumerate(parts) if part.part == "neck" and not part.side]
+        necks = [
+            node
+            for node, part in enumerate(parts)
+            if part.part == "neck" and not part.side
+        ]
         neck = min(necks, key=lambda node: len(paths[node]), default=None)
-        bearing = [] if neck is None or chest not in paths[neck] else paths[neck][paths[neck].index(chest) + 1 :]
+        bearing = (
+            []
+            if neck is None or chest not in paths[neck]
+            else paths[neck][paths[neck].index(chest) + 1 :]
+        )
     else:
         bearing = paths[head][paths[head].index(chest) + 1 : -1]
     if parts[chest].part == "neck" and between:  # Biped's shoulders hang from the neck
-        bearing, between = [between[-1], *bearing], between[:-1]
+        bearing = [between[-1], *bearing]
+        between = between[:-1]
     return Joints(limbs, hips, chest, between, bearing, head)
 
 
 # where two nodes in a row have names of one joint: `leg` and below it `knee`, `ankle` and `foot`, `wrist` and `hand`
-_TWO_IN_A_ROW = {"shin": ("thigh", "shin"), "foot": ("foot", "toe"), "hand": ("hand", "palm")}
+_TWO_IN_A_ROW = {
+    "shin": ("thigh", "shin"),
+    "foot": ("foot", "toe"),
+    "hand": ("hand", "palm"),
+}
 
 
-def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> dict[str, int]:
+def _limbs(
+    side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]
+) -> dict[str, int]:
     """Return the joints of a side's arm and leg: of nodes with names of one joint, that nearest to the root."""
 
     def nodes_named(names: set[str]) -> list[int]:
         """Return the nodes whose names have the fewest other words, from the root outwards."""
-        nodes = [node for node, part in enumerate(parts) if part.side == side and part.part in names]
+        nodes = [
+            node
+            for node, part in enumerate(parts)
+            if part.side == side and part.part in names
+        ]
         fewest = min((parts[node].others for node in nodes), default=0)
-        return sorted((node for node in nodes if parts[node].others == fewest), key=lambda node: len(paths[node]))
+        return sorted(
+            (node for node in nodes if parts[node].others == fewest),
+            key=lambda node: len(paths[node]),
+        )
 
     nodes = {joint: nodes_named(names) for joint, (names, _) in _LIMBS.items()}
-    for joint in ("thigh", "arm", "clavicle"):  # `shoulder` is the arm; with an `upperarm` below, it is the clavicle
-        if not nodes[joint] and not (joint == "clavicle" and nodes["arm"] == nodes_named({"shoulder"})):
+    # `shoulder` is the arm; with an `upperarm` below, it is the clavicle
+    for joint in ("thigh", "arm", "clavicle"):
+        if not nodes[joint] and not (
+            joint == "clavicle" and nodes["arm"] == nodes_named({"shoulder"})
+        ):
             nodes[joint] = nodes_named(_LIMBS[joint][1])
     for joint, (above, below) in _TWO_IN_A_ROW.items():
-        absent, two = below if joint == above else above, nodes[joint]
+        absent = below if joint == above else above
+        two = nodes[joint]
         if not nodes[absent] and len(two) > 1 and two[0] in paths[two[1]]:
             nodes[above], nodes[below] = two[:1], two[1:]
     return {joint: named[0] for joint, named in nodes.items() if named}
 
 
-def _missing(limbs: Mapping[tuple[str, str], int], names: Sequence[str], paths: Sequence[Sequence[int]]) -> list[str]:
+def _missing(
+    limbs: Mapping[tuple[str, str], int],
+    names: Sequence[str],
+    paths: Sequence[Sequence[int]],
+) -> list[str]:
     """Return what limbs lack: joints, and that each joint of a leg or an arm hangs from the one before it."""
-    missing = [f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs]
+    missing = [
+        f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs
+    ]
     for side in ("left", "right"):
         for above, below in (*pairwise(LEGS), *pairwise(ARMS)):
-            first, second = limbs.get((side, above)), limbs.get((side, below))
-            if first is not None and second is not None and first not in paths[second][:-1]:
-                missing.append(f"{side} {below} ({names[second]!r}) under {side} {above} ({names[first]!r})")
+            first = limbs.get((side, above))
+            second = limbs.get((side, below))
+            if (
+                first is not None
+                and second is not None
+                and first not in paths[second][:-1]
+            ):
+                missing.append(
+                    f"{side} {below} ({names[second]!r}) under {side} {above} ({names[first]!r})"
+                )
     return missing
 
 
 def _common(paths: Sequence[Sequence[int]], nodes: Sequence[int]) -> int | None:
     """Return the last node that is on the paths to all of some nodes."""
-    shared = [steps[0] for steps in zip(*(paths[node] for node in nodes), strict=False) if len(set(steps)) == 1]
+    shared = [
+        steps[0]
+        for steps in zip(*(paths[node] for node in nodes), strict=False)
+        if len(set(steps)) == 1
+    ]
     return shared[-1] if shared else None

@@ -8,7 +8,8 @@ from typing import NamedTuple
 from posefit.errors import InputError
 from posefit.reading import SHOWN, cut
 
-LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow
+# no angle or length of a person comes near; beyond it arithmetic would overflow
+LARGEST = 1e6
 BOM = b"\xef\xbb\xbf"  # which some editors write first
 
 
@@ -28,11 +29,14 @@ class Line(NamedTuple):
         """Return the error of this line; what came is all of it where it is not stated."""
         if got is None:
             got = quoted_words(self.words) if self.words else "the end of the file"
-        return InputError(f"{self.path}:{self.number}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
+        return InputError(
+            f"{self.path}:{self.number}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}"
+        )
 
     def numbers(self, count: int) -> list[float]:
         """Return the numbers after the first word. Raises InputError where they are not so many small ones."""
-        first, words = quoted_words(self.words[:1]), self.words[1:]
+        first = quoted_words(self.words[:1])
+        words = self.words[1:]
         if len(words) != count:
             raise self.mistake(f"{count} values for {first}", f"{len(words)}")
         try:
@@ -40,7 +44,9 @@ class Line(NamedTuple):
         except ValueError:
             raise self.mistake(f"numbers for {first}", quoted_words(words)) from None
         if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
-            raise self.mistake(f"finite numbers below {LARGEST:g} for {first}", quoted_words(words))
+            raise self.mistake(
+                f"finite numbers below {LARGEST:g} for {first}", quoted_words(words)
+            )
         return values
 
 
@@ -53,7 +59,9 @@ def lines_of(path: Path, longest: int) -> Iterator[Line]:
     with path.open("rb") as file:
         for number, raw in enumerate(iter(partial(file.readline, longest + 1), b""), 1):
             if len(raw) > longest:
-                raise Line(path, number, ()).mistake(f"a line of at most {longest} bytes", "a longer one")
+                raise Line(path, number, ()).mistake(
+                    f"a line of at most {longest} bytes", "a longer one"
+                )
             if words := raw.removeprefix(BOM).decode("utf-8", errors="replace").split():
                 yield Line(path, number, words)
     yield Line(path, max(number, 1), ())

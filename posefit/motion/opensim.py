@@ -13,7 +13,13 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
-from posefit.geometry.rotation import JOINT_ORDER, ROOT_ORDER, along_y, angles_about, unwrapped
+from posefit.geometry.rotation import (
+    JOINT_ORDER,
+    ROOT_ORDER,
+    along_y,
+    angles_about,
+    unwrapped,
+)
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Skeleton, channel_angles
 from posefit.motion.motion import Motion
 
@@ -39,12 +45,28 @@ def coordinates(skeleton: Skeleton) -> dict[str, int]:
 
 def write_mot(path: str | Path, motion: Motion) -> None:
     """Write a motion's coordinates, one row a frame: time in seconds, angles in degrees, the root's place in metres."""
-    path, angles = Path(path), coordinates(motion.skeleton)
+    path = Path(path)
+    angles = coordinates(motion.skeleton)
     turns = np.degrees(unwrapped(motion.poses[:, list(angles.values())]))
-    table = np.column_stack([(motion.first + np.arange(len(motion))) / motion.fps, turns, motion.translations])
-    head = [path.name, "version=1", f"nRows={len(table)}", f"nColumns={table.shape[1]}", "inDegrees=yes", "endheader"]
+    table = np.column_stack(
+        [
+            (motion.first + np.arange(len(motion))) / motion.fps,
+            turns,
+            motion.translations,
+        ]
+    )
+    head = [
+        path.name,
+        "version=1",
+        f"nRows={len(table)}",
+        f"nColumns={table.shape[1]}",
+        "inDegrees=yes",
+        "endheader",
+    ]
     head.append("\t".join(["time", *angles, *_ROOT[3:]]))
-    np.savetxt(path, table, "%.8f", "\t", header="\n".join(head), comments="", encoding="utf-8")
+    np.savetxt(
+        path, table, "%.8f", "\t", header="\n".join(head), comments="", encoding="utf-8"
+    )
 
 
 def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
@@ -61,15 +83,29 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
     free = coordinates(skeleton)
     _body(bodies, "root", ROOT_KILOGRAMS, np.zeros(3), 1e-6 * np.eye(3))
     root = _joint(joints, "CustomJoint", "root", "/ground", np.zeros(3), np.eye(3))
-    _mobile(root, [_ROOT[axis] for axis in ROOT_ORDER], np.eye(3)[list(ROOT_ORDER)], _ROOT[3:], skeleton)
+    _mobile(
+        root,
+        [_ROOT[axis] for axis in ROOT_ORDER],
+        np.eye(3)[list(ROOT_ORDER)],
+        _ROOT[3:],
+        skeleton,
+    )
     _marker(marked, markers[0], "root", np.zeros(3))
     for bone, name in enumerate(BONES):
-        start, offset = PARENTS[bone + 1], skeleton.offsets[bone]
-        _body(bodies, name, *_inertia(offset, body.radii[bone]), shape=(offset, body.radii[bone]))
+        start = PARENTS[bone + 1]
+        offset = skeleton.offsets[bone]
+        _body(
+            bodies,
+            name,
+            *_inertia(offset, body.radii[bone]),
+            shape=(offset, body.radii[bone]),
+        )
         at = skeleton.offsets[start - 1] if start else np.zeros(3)
         turns = [f"{name}_{_TURNS[axis]}" for axis in JOINT_ORDER]
         kind = "CustomJoint" if any(turn in free for turn in turns) else "WeldJoint"
-        joint = _joint(joints, kind, name, f"/bodyset/{JOINTS[start]}", at, skeleton.axes[bone])
+        joint = _joint(
+            joints, kind, name, f"/bodyset/{JOINTS[start]}", at, skeleton.axes[bone]
+        )
         if kind == "CustomJoint":
             own = [turn if turn in free else "" for turn in turns]
             _mobile(joint, own, np.eye(3)[list(JOINT_ORDER)], ("", "", ""), skeleton)
@@ -84,28 +120,52 @@ def _inertia(offset: Array, radii: Array) -> tuple[float, Array, Array]:
     square = float(first * first + first * last + last * last) / 3.0
     mass = max(DENSITY * np.pi * length * square, ROOT_KILOGRAMS)
     along = offset / max(length, 1e-9)
-    across, about = mass * (3.0 * square + length * length) / 12.0, 0.5 * mass * square
+    across = mass * (3.0 * square + length * length) / 12.0
+    about = 0.5 * mass * square
     line = np.outer(along, along)
-    return mass, 0.5 * offset, across * (np.eye(3) - line) + about * line + 1e-9 * np.eye(3)
+    return (
+        mass,
+        0.5 * offset,
+        across * (np.eye(3) - line) + about * line + 1e-9 * np.eye(3),
+    )
 
 
 def _body(
-    bodies: Element, name: str, mass: float, centre: Array, inertia: Array, shape: tuple[Array, Array] | None = None
+    bodies: Element,
+    name: str,
+    mass: float,
+    centre: Array,
+    inertia: Array,
+    shape: tuple[Array, Array] | None = None,
 ) -> None:
     body = SubElement(bodies, "Body", name=name)
     if shape is not None:
         offset, radii = shape
         length = float(np.linalg.norm(offset))
-        middle = _frame(SubElement(body, "components"), f"{name}_middle", "..", 0.5 * offset, along_y(offset))
-        cylinder = SubElement(SubElement(middle, "attached_geometry"), "Cylinder", name=f"{name}_shape")
+        middle = _frame(
+            SubElement(body, "components"),
+            f"{name}_middle",
+            "..",
+            0.5 * offset,
+            along_y(offset),
+        )
+        cylinder = SubElement(
+            SubElement(middle, "attached_geometry"), "Cylinder", name=f"{name}_shape"
+        )
         _text(cylinder, "radius", [radii.mean()])
         _text(cylinder, "half_height", [0.5 * length])
     _text(body, "mass", [mass])
     _text(body, "mass_center", centre)
-    _text(body, "inertia", [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
+    _text(
+        body,
+        "inertia",
+        [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]],
+    )
 
 
-def _joint(joints: Element, kind: str, name: str, parent: str, at: Array, axes: Array) -> Element:
+def _joint(
+    joints: Element, kind: str, name: str, parent: str, at: Array, axes: Array
+) -> Element:
     """Return a joint from a point of a parent's frame to a body's origin, whose angles are about some axes (3, 3)."""
     joint = SubElement(joints, kind, name=f"{name}_joint")
     SubElement(joint, "socket_parent_frame").text = f"{name}_parent"
@@ -116,7 +176,13 @@ def _joint(joints: Element, kind: str, name: str, parent: str, at: Array, axes: 
     return joint
 
 
-def _mobile(joint: Element, turns: Sequence[str], axes: Array, moves: Sequence[str], skeleton: Skeleton) -> None:
+def _mobile(
+    joint: Element,
+    turns: Sequence[str],
+    axes: Array,
+    moves: Sequence[str],
+    skeleton: Skeleton,
+) -> None:
     """Give a joint its coordinates: turns about axes (3, 3), the outermost first, and moves; "" is none."""
     listed = SubElement(joint, "coordinates")
     for name in (*turns, *moves):
@@ -124,13 +190,20 @@ def _mobile(joint: Element, turns: Sequence[str], axes: Array, moves: Sequence[s
             coordinate = SubElement(listed, "Coordinate", name=name)
             _text(coordinate, "range", _limits(name, skeleton))
     transform = SubElement(joint, "SpatialTransform")
-    for kind, names, about in (("rotation", turns, axes), ("translation", moves, np.eye(3))):
+    for kind, names, about in (
+        ("rotation", turns, axes),
+        ("translation", moves, np.eye(3)),
+    ):
         for k, (name, axis) in enumerate(zip(names, about, strict=True)):
             along = SubElement(transform, "TransformAxis", name=f"{kind}{k + 1}")
             SubElement(along, "coordinates").text = name
             _text(along, "axis", axis)
             if name:
-                _text(SubElement(along, "LinearFunction", name="function"), "coefficients", (1.0, 0.0))
+                _text(
+                    SubElement(along, "LinearFunction", name="function"),
+                    "coefficients",
+                    (1.0, 0.0),
+                )
             else:
                 _text(SubElement(along, "Constant", name="function"), "value", (0.0,))
 

@@ -44,7 +44,8 @@ class RecordedClip:
     skeleton: Skeleton = field(repr=False)
     poses: Array = field(repr=False)  # (K, 66) radians
     translations: Array = field(repr=False)  # (K, 3) metres
-    times: NDArray[np.int64] = field(repr=False)  # (K,) frames since the first pose, at 30 frames a second
+    # (K,) frames since the first pose, at 30 frames a second
+    times: NDArray[np.int64] = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -65,32 +66,46 @@ class RecordedClip:
         Angles and translations between the poses are interpolated; after the last, it is held.
         """
         frames = np.minimum(frames, self.times[-1])
-        before = np.minimum(np.searchsorted(self.times, frames, "right") - 1, max(len(self) - 2, 0))
+        before = np.minimum(
+            np.searchsorted(self.times, frames, "right") - 1, max(len(self) - 2, 0)
+        )
         after = np.minimum(before + 1, len(self) - 1)
         gap = np.maximum(self.times[after] - self.times[before], 1)
         share = ((frames - self.times[before]) / gap)[:, None]
         poses, translations = (
-            (1.0 - share) * series[before] + share * series[after] for series in (self.poses, self.translations)
+            (1.0 - share) * series[before] + share * series[after]
+            for series in (self.poses, self.translations)
         )
         return poses, translations
 
 
 @lru_cache(maxsize=1)
 def _stored() -> dict[str, RecordedClip]:
-    with (files("posefit.motion") / "recorded.npz").open("rb") as file, np.load(file) as stored:
+    with (
+        (files("posefit.motion") / "recorded.npz").open("rb") as file,
+        np.load(file) as stored,
+    ):
         skeletons_json = json.loads(str(stored["skeletons"]))
-        names, owners = stored["names"].tolist(), stored["owners"].tolist()
+        names = stored["names"].tolist()
+        owners = stored["owners"].tolist()
         ends = np.cumsum(stored["counts"], dtype=np.int64)
-        changes, gaps = stored["changes"].T.astype(np.int64), stored["gaps"].astype(np.int64)
-    skeletons = [stored_skeleton(skeleton["name"], skeleton) for skeleton in skeletons_json]
+        changes = stored["changes"].T.astype(np.int64)
+        gaps = stored["gaps"].astype(np.int64)
+    skeletons = [
+        stored_skeleton(skeleton["name"], skeleton) for skeleton in skeletons_json
+    ]
     clips = {}
-    for name, owner, start, stop in zip(names, owners, [0, *ends[:-1].tolist()], ends.tolist(), strict=True):
+    for name, owner, start, stop in zip(
+        names, owners, [0, *ends[:-1].tolist()], ends.tolist(), strict=True
+    ):
         values = STEP * np.cumsum(changes[start:stop], axis=0)
         times = np.cumsum(gaps[start:stop])
         for array in (values, times):
             array.setflags(write=False)
         skeleton = skeletons[owner]
-        clips[name] = RecordedClip(name, skeleton.name, skeleton, values[:, :ANGLES], values[:, ANGLES:], times)
+        clips[name] = RecordedClip(
+            name, skeleton.name, skeleton, values[:, :ANGLES], values[:, ANGLES:], times
+        )
     return clips
 
 
@@ -101,27 +116,40 @@ def subjects() -> tuple[str, ...]:
 
 def is_recorded(name: object) -> bool:
     """Return whether a name is that of a recorded clip."""
-    return isinstance(name, str) and _NAME.fullmatch(name) is not None and name in _stored()
+    return (
+        isinstance(name, str)
+        and _NAME.fullmatch(name) is not None
+        and name in _stored()
+    )
 
 
 def clip(name: str) -> RecordedClip:
     """Return the clip of a name such as 16_15. Raises InputError where there is none."""
     if not is_recorded(name):
-        raise InputError(f"a recorded motion must be one that posefit motions lists, got {quoted(name)}")
+        raise InputError(
+            f"a recorded motion must be one that posefit motions lists, got {quoted(name)}"
+        )
     return _stored()[name]
 
 
-def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[RecordedClip]:
+def clips(
+    only: Iterable[str] = (), without: Iterable[str] = ()
+) -> Sequence[RecordedClip]:
     """Return the clips of some people, or of all, but not of those `without`.
 
     Raises InputError where one of them is not in the library, or where no one is left.
     """
-    only, without = tuple(only), tuple(without)
+    only = tuple(only)
+    without = tuple(without)
     for subject in (*only, *without):
         if subject not in subjects():
-            raise InputError(f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}")
+            raise InputError(
+                f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}"
+            )
     chosen = [
-        clip for clip in _stored().values() if clip.subject not in without and clip.subject in (only or subjects())
+        clip
+        for clip in _stored().values()
+        if clip.subject not in without and clip.subject in (only or subjects())
     ]
     if not chosen:
         raise InputError("the library must keep at least one person, got all left out")
@@ -141,8 +169,13 @@ def named(name: str) -> Sequence[RecordedClip]:
     _, colon, listed = name.partition(":")
     people = [person.strip() for person in listed.split(",")] if colon else []
     if not is_library(name) or "" in people or "-" in people:
-        raise InputError(f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}")
-    return clips([name for name in people if name[0] != "-"], [name[1:] for name in people if name[0] == "-"])
+        raise InputError(
+            f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}"
+        )
+    return clips(
+        [name for name in people if name[0] != "-"],
+        [name[1:] for name in people if name[0] == "-"],
+    )
 
 
 def leaving_out(name: str, subjects: Iterable[str]) -> str:

@@ -6,11 +6,15 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 
-PACE = 30.0  # a second: the rate at which places are compared, so that jitter counts the same at any frame rate
-BALLS = JOINTS.index("lfoot"), JOINTS.index("rfoot")  # of the feet, which stay where they are while a foot rolls off
+# a second: the rate at which places are compared, so that jitter counts the same at any
+# frame rate
+PACE = 30.0
+# of the feet, which stay where they are while a foot rolls off
+BALLS = JOINTS.index("lfoot"), JOINTS.index("rfoot")
 MAX_STANDING_HEIGHT = 0.05  # metres above the lowest place of either foot
 MAX_STANDING_SPEED = 0.2  # metres a second
-WINDOW_SECONDS = 2.0  # about a frame, for that lowest place: the ground may rise, and depth may drift
+# about a frame, for that lowest place: the ground may rise, and depth may drift
+WINDOW_SECONDS = 2.0
 MIN_STANDING_SECONDS = 0.1
 
 
@@ -23,7 +27,9 @@ def acceleration(joints: Array, fps: float) -> Array:
     accelerations = np.full(len(joints), np.nan)
     if len(joints) > 2 * step:
         change = joints[2 * step :] - 2.0 * joints[step:-step] + joints[: -2 * step]
-        accelerations[step:-step] = np.linalg.norm(change, axis=2).mean(axis=1) * (fps / step) ** 2
+        accelerations[step:-step] = (
+            np.linalg.norm(change, axis=2).mean(axis=1) * (fps / step) ** 2
+        )
     return accelerations
 
 
@@ -38,9 +44,16 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
     if half == 0:
         return np.zeros(feet.shape[:2], dtype=bool)
     around = np.arange(len(feet))
-    before, after = np.maximum(around - half, 0), np.minimum(around + half, len(feet) - 1)
-    speed = np.linalg.norm(feet[after] - feet[before], axis=2) * fps / (after - before)[:, None]
-    stands = (speed < MAX_STANDING_SPEED) & low(feet, fps, WINDOW_SECONDS, MAX_STANDING_HEIGHT)
+    before = np.maximum(around - half, 0)
+    after = np.minimum(around + half, len(feet) - 1)
+    speed = (
+        np.linalg.norm(feet[after] - feet[before], axis=2)
+        * fps
+        / (after - before)[:, None]
+    )
+    stands = (speed < MAX_STANDING_SPEED) & low(
+        feet, fps, WINDOW_SECONDS, MAX_STANDING_HEIGHT
+    )
     for side in range(2):
         for start, stop in runs(stands[:, side]):
             stands[start:stop, side] &= stop - start >= MIN_STANDING_SECONDS * fps
@@ -50,7 +63,9 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
 def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bool_]:
     """Return whether feet (T, n, 3) are less than `height` above the lowest of all (T, n) in so many seconds around."""
     reach = max(round(0.5 * seconds * fps), 1)
-    lowest = np.array([feet[max(k - reach, 0) : k + reach + 1, :, 1].min() for k in range(len(feet))])
+    lowest = np.array(
+        [feet[max(k - reach, 0) : k + reach + 1, :, 1].min() for k in range(len(feet))]
+    )
     return np.asarray(feet[:, :, 1] < lowest[:, None] + height)
 
 
@@ -69,5 +84,7 @@ def slides(joints: Array, stands: NDArray[np.bool_]) -> Array:
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first frame of each run of true flags (T,), and the frame after its last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8))
+    )
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]

@@ -81,9 +81,19 @@ class Content:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """Everything but the frames, as summary.json holds it."""
-        trust, gait = None if self.trust is None else asdict(self.trust), self.gait.as_dict()
-        values = {**asdict(self.setup), **asdict(self.measures), **asdict(self.log), "trust": trust, "gait": gait}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+        trust = None if self.trust is None else asdict(self.trust)
+        gait = self.gait.as_dict()
+        values = {
+            **asdict(self.setup),
+            **asdict(self.measures),
+            **asdict(self.log),
+            "trust": trust,
+            "gait": gait,
+        }
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in values.items()
+        }
 
     @cached_property
     def motion(self) -> Motion:
@@ -104,16 +114,24 @@ class Content:
         """
         if all(frame.posterior is None for frame in self.frames):
             return {}
-        skeleton, camera = self.scene.body.skeleton, self.scene.cameras[0]
+        skeleton = self.scene.body.skeleton
+        camera = self.scene.cameras[0]
         radii, places = np.full((2, len(self.frames), len(LEVELS), len(JOINTS)), np.nan)
         halves = np.full((len(self.frames), len(LEVELS), ANGLES), np.nan)
         for k, frame in enumerate(self.frames):
             if frame.posterior is not None:
                 radii[k], in_world = (
-                    joint_intervals(skeleton, frame.posterior, frame.pose, world) for world in (False, True)
+                    joint_intervals(skeleton, frame.posterior, frame.pose, world)
+                    for world in (False, True)
                 )
                 model = frame.posterior.recalibration or Recalibration()
-                places[k] = np.hypot(in_world, depth_halves(model, camera, frame.translation))
+                places[k] = np.hypot(
+                    in_world, depth_halves(model, camera, frame.translation)
+                )
                 halves[k] = angle_intervals(frame.posterior, frame.pose)
-        intervals = {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
+        intervals = {
+            "levels": np.array(LEVELS),
+            "joint_radii": radii,
+            "angle_halves": halves,
+        }
         return intervals | ({"place_radii": places} if self.scene.truth is None else {})

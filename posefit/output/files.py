@@ -52,11 +52,16 @@ def _write_table(path: Path, content: Content) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([*content.table, "activity", *names])
-        for k, (frame, points) in enumerate(zip(content.frames, content.motion.joints, strict=True)):
+        for k, (frame, points) in enumerate(
+            zip(content.frames, content.motion.joints, strict=True)
+        ):
             number = content.scene.first + k
             values = [column[k].item() for column in content.table.values()]
             cells = ["" if np.isnan(value) else value for value in values]
-            places = ("" if number in content.blank else f"{value:.6f}" for value in points.reshape(-1))
+            places = (
+                "" if number in content.blank else f"{value:.6f}"
+                for value in points.reshape(-1)
+            )
             writer.writerow([*cells, frame.activity, *places])
 
 
@@ -69,8 +74,10 @@ FILES = (
 
 def write_files(folder: Path, content: Content) -> None:
     """Write all `FILES` of a track to a folder."""
-    scene, table = content.scene, content.table
-    motion, blank = content.motion, content.blank
+    scene = content.scene
+    table = content.table
+    motion = content.motion
+    blank = content.blank
     _write_npz(folder / "poses.npz", content)
     write_asf(folder / "skeleton.asf", motion.skeleton)
     write_amc(folder / "track.amc", motion)
@@ -84,8 +91,11 @@ def write_files(folder: Path, content: Content) -> None:
     write_angles(folder / "angles.csv", motion, blank)
     write_gait(folder / "gait.csv", content.gait)
     (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
-    (folder / "summary.json").write_text(json.dumps(content.summary, indent=1) + "\n", encoding="utf-8")
-    stills, painter = Stills(scene), Painter(scene, table["usable"] == 1.0)
+    (folder / "summary.json").write_text(
+        json.dumps(content.summary, indent=1) + "\n", encoding="utf-8"
+    )
+    stills = Stills(scene)
+    painter = Painter(scene, table["usable"] == 1.0)
     writer: VideoWriter | None = None
     radii = content.intervals.get("joint_radii", repeat(None))
     filmed = zip(content.frames, *_filmed(scene), radii, strict=False)
@@ -94,12 +104,20 @@ def write_files(folder: Path, content: Content) -> None:
         row = {name: float(values[k]) for name, values in table.items()}
         image = painter.add(frame, observation, row, picture, spread)
         if writer is None:
-            writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
+            writer = VideoWriter(
+                folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0])
+            )
         writer.write(image)
     assert writer is not None
     writer.close()
-    notes = ("" if content.trust is None else content.trust.sentence, undetermined(content))
-    if not cv2.imwrite(opencv_name(folder / "summary.png"), painter.summary(table, [*filter(None, notes)])):
+    notes = (
+        "" if content.trust is None else content.trust.sentence,
+        undetermined(content),
+    )
+    if not cv2.imwrite(
+        opencv_name(folder / "summary.png"),
+        painter.summary(table, [*filter(None, notes)]),
+    ):
         raise OSError("no room for summary.png")
     page = track_document(track_data(content, stills))
     (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
@@ -108,10 +126,14 @@ def write_files(folder: Path, content: Content) -> None:
 def page_of(content: Content) -> str:
     """Return the page of a track, `track.html`."""
     stills = Stills(content.scene)
-    for frame, observation, picture in zip(content.frames, *_filmed(content.scene), strict=False):
+    for frame, observation, picture in zip(
+        content.frames, *_filmed(content.scene), strict=False
+    ):
         stills.add(frame, observation, picture)
     return track_document(track_data(content, stills))
 
 
 def _filmed(scene: Scene) -> tuple[Iterable[Observation], Iterable[Image | None]]:
-    return scene.observations, repeat(None) if scene.pictures is None else scene.pictures()
+    return scene.observations, repeat(
+        None
+    ) if scene.pictures is None else scene.pictures()

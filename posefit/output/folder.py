@@ -19,7 +19,8 @@ from posefit.output.record import append_frame, read_frames
 from posefit.reading import cut, parsed_json, read_text
 
 RECORD = "frames.jsonl"
-SUMMARY, MAX_SUMMARY_BYTES = "summary.json", 10_000_000
+SUMMARY = "summary.json"
+MAX_SUMMARY_BYTES = 10_000_000
 _WRITTEN = (*FILES, RECORD)  # the names of what a track writes to its folder
 
 
@@ -29,7 +30,9 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _: object
+    ) -> None:
         """Nothing has to be closed."""
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
@@ -58,7 +61,8 @@ class OutputFolder(Recorder):
         log: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._log = Path(path), dict(spec), log
-        self._recorded, self._force = 0, force
+        self._recorded = 0
+        self._force = force
         _check_target(self.path, force)
         self._unfinished = _interrupted(self.path, self._spec) if resume else None
 
@@ -70,10 +74,14 @@ class OutputFolder(Recorder):
                 self._unfinished = Unfinished.begin(self.path, self._spec)
             self.building = self._unfinished.path
         except OSError as error:
-            raise InputError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
+            raise InputError(
+                f"{self.path}: expected a place to write to, got {error.strerror}"
+            ) from None
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _: object
+    ) -> None:
         assert self._unfinished is not None
         if kind is None:
             try:
@@ -81,7 +89,9 @@ class OutputFolder(Recorder):
             except OSError as failure:
                 self._unfinished.close()
                 where = f"{failure.strerror}; the results are in {self.building}"
-                raise InputError(f"{self.path}: expected its name to be free, got {where}") from None
+                raise InputError(
+                    f"{self.path}: expected its name to be free, got {where}"
+                ) from None
             (self.path / RECORD).unlink(missing_ok=True)
             return
         notice = ""
@@ -94,7 +104,9 @@ class OutputFolder(Recorder):
             self._unfinished.remove(_WRITTEN)
         if isinstance(error, OSError):
             came = f"{error.strerror or error}{notice}"
-            raise InputError(f"{self.path}: expected room to write to, got {came}") from error
+            raise InputError(
+                f"{self.path}: expected room to write to, got {came}"
+            ) from error
         if notice and isinstance(error, InputError):
             raise InputError(f"{error}{notice}") from error
         if notice:
@@ -127,21 +139,29 @@ def _check_target(path: Path, force: bool) -> None:
         came = "a link" if path.is_symlink() else "a file"
         raise InputError(f"{path}: expected a folder to write to, got {came}")
     if not force:
-        raise InputError(f"{path}: expected a new folder, got one that exists; --force replaces it")
+        raise InputError(
+            f"{path}: expected a new folder, got one that exists; --force replaces it"
+        )
     if others := other_entries(path, _WRITTEN) or _unmarked(path):
         came = f"one with {cut(others[0])}, which is none of posefit's"
-        raise InputError(f"{path}: expected a folder of earlier results to replace, got {came}")
+        raise InputError(
+            f"{path}: expected a folder of earlier results to replace, got {came}"
+        )
 
 
 def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
     """Return the unfinished folder of the track that goes on: the latest with the same arguments."""
     interrupted = Unfinished.interrupted(path)
     if not interrupted:
-        raise InputError(f"{path}: expected a track that was interrupted to resume, got none")
+        raise InputError(
+            f"{path}: expected a track that was interrupted to resume, got none"
+        )
     try:
         others = [difference(folder.info, spec) for folder in interrupted]
     except (AttributeError, TypeError):
-        raise InputError(f"{interrupted[0].path / MARK}: expected the arguments of a track, got others") from None
+        raise InputError(
+            f"{interrupted[0].path / MARK}: expected the arguments of a track, got others"
+        ) from None
     place = interrupted[others.index(None)] if None in others else None
     for folder in interrupted:
         if folder is not place:
@@ -158,5 +178,8 @@ def _unmarked(folder: Path) -> list[str]:
         summary = parsed_json(read_text(folder / SUMMARY, MAX_SUMMARY_BYTES))
     except (OSError, ValueError):
         return names
-    marked = isinstance(summary, dict) and {"version", "method", "evaluations", "trust"} <= summary.keys()
+    marked = (
+        isinstance(summary, dict)
+        and {"version", "method", "evaluations", "trust"} <= summary.keys()
+    )
     return [] if marked else names

@@ -40,16 +40,21 @@ from posefit.uncertainty.modes import Mode, other_mode, other_modes
 
 Row = Mapping[str, float]  # of a table
 PANEL = 480  # pixels high
-OVERLAP = np.array([BACKGROUND, MISSED, SPILLED, BOTH], dtype=np.uint8)  # of neither, the mask, the body, and both
+# of neither, the mask, the body, and both
+OVERLAP = np.array([BACKGROUND, MISSED, SPILLED, BOTH], dtype=np.uint8)
 SUMMARY_STILLS = 6  # frames on the summary
 SUMMARY_SCALE = 0.65  # of its words, which a page shows at three quarters of their size
 LABEL_HEIGHT = 38  # pixels that the label stands on
 SOLID = 0.65  # how much of the footage the body hides
 MIN_OTHER_WEIGHT = 0.2  # above which another mode is drawn
-ALTERNATIVES, MIN_WEIGHT = 3, 0.05  # other modes on the summary of a single frame, at most, and their least weight
+# other modes on the summary of a single frame, at most, and their least weight
+ALTERNATIVES = 3
+MIN_WEIGHT = 0.05
 BORDER = 6  # pixels around a lost frame
 LINE_HEIGHT = 22  # pixels from one line to the next
-PEAK, PEAK_QUANTILE = 2.0, 0.9  # a curve ends at twice what nine in ten frames have at most; what is above is a peak
+# a curve ends at twice what nine in ten frames have at most; what is above is a peak
+PEAK = 2.0
+PEAK_QUANTILE = 0.9
 MAX_PEAKS = 3  # that are named
 
 
@@ -59,7 +64,9 @@ class Painter:
     def __init__(self, scene: Scene, usable: Sequence[bool] = ()) -> None:
         self._scene = scene
         shown = np.flatnonzero(usable) if any(usable) else np.arange(scene.count)
-        self._wanted = np.unique(shown[np.linspace(0, len(shown) - 1, SUMMARY_STILLS).round().astype(int)]).tolist()
+        self._wanted = np.unique(
+            shown[np.linspace(0, len(shown) - 1, SUMMARY_STILLS).round().astype(int)]
+        ).tolist()
         self._stills: list[Image] = []
         self._count = 0
 
@@ -79,16 +86,34 @@ class Painter:
         solid = None if radii is None else opacities(radii[MAIN_LEVEL])
         other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
         image = self._panels(frame, observation, filmed, solid, other)
-        others = other_modes(skeleton, frame.modes, frame.pose) if self._scene.count == 1 else []
+        others = (
+            other_modes(skeleton, frame.modes, frame.pose)
+            if self._scene.count == 1
+            else []
+        )
         if self._count in self._wanted:
-            weight = sum(mode.weight for mode in frame.modes) - sum(mode.weight for mode in others)
-            self._stills.append(self._still(image, row, f", {100.0 * weight:.0f} %" if others else ""))
-        for mode in [mode for mode in others if mode.weight > MIN_WEIGHT][:ALTERNATIVES]:
+            weight = sum(mode.weight for mode in frame.modes) - sum(
+                mode.weight for mode in others
+            )
+            self._stills.append(
+                self._still(image, row, f", {100.0 * weight:.0f} %" if others else "")
+            )
+        for mode in [mode for mode in others if mode.weight > MIN_WEIGHT][
+            :ALTERNATIVES
+        ]:
             alternative = replace(frame, pose=mode.pose, translation=mode.translation)
             still = self._panels(alternative, observation, filmed)
-            self._stills.append(_labelled(still, f"or this, {100.0 * mode.weight:.0f} %"))
-        label = [f"frame {self._scene.first + self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
-        label += [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
+            self._stills.append(
+                _labelled(still, f"or this, {100.0 * mode.weight:.0f} %")
+            )
+        label = [
+            f"frame {self._scene.first + self._count}",
+            f"cost {row['cost']:.2f}",
+            f"IoU {row['iou']:.3f}",
+        ]
+        label += (
+            [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
+        )
         label += [] if observation.usable else ["pose held"]
         image[:LABEL_HEIGHT] //= 4  # so that the label stands out from a bright sky
         write(image, "   ".join(label), (12, 26))
@@ -98,8 +123,14 @@ class Painter:
             _write_legend(image, PANEL - 14)
         lost = row["lost"] >= LOST
         notes = [("lost", MISSED)] if lost else []
-        notes += [("left and right unknown", OTHER)] if row["unknown_sides"] == 1.0 else []
-        notes += [(f"thin: may be this, {100.0 * other.weight:.0f} %", OTHER)] if other is not None else []
+        notes += (
+            [("left and right unknown", OTHER)] if row["unknown_sides"] == 1.0 else []
+        )
+        notes += (
+            [(f"thin: may be this, {100.0 * other.weight:.0f} %", OTHER)]
+            if other is not None
+            else []
+        )
         for k, (words, colour) in enumerate(reversed(notes)):
             write(image, words, (side_column, PANEL - 14 - LINE_HEIGHT * k), colour)
         if lost:
@@ -116,7 +147,9 @@ class Painter:
         other: Mode | None = None,
     ) -> Image:
         """Return the `overlay` of a frame, and to its right the body viewed from its side."""
-        body, pose, place = self._scene.body, frame.pose, frame.translation
+        body = self._scene.body
+        pose = frame.pose
+        place = frame.translation
         camera = side_camera(body, self._scene.cameras[0], pose, place, PANEL)
         side = blank(PANEL, PANEL)
         draw_body(side, body, camera, pose, place, solid)
@@ -126,7 +159,11 @@ class Painter:
 
     def _still(self, image: Image, row: Row, weight: str) -> Image:
         """Return a small picture whose words, with the `weight` of its pose, can be read in a page."""
-        worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
+        worth = (
+            f"error {row['error_degrees']:.1f} deg"
+            if "error_degrees" in row
+            else f"cost {row['cost']:.1f}"
+        )
         label = f"frame {self._scene.first + self._count}, {worth}{weight}"
         return _labelled(image, label, row["lost"] >= LOST)
 
@@ -142,7 +179,9 @@ class Painter:
 
         On masks its bones show which side is left.
         """
-        body, pose, place = self._scene.body, frame.pose, frame.translation
+        body = self._scene.body
+        pose = frame.pose
+        place = frame.translation
         columns = min(2, len(self._scene.cameras))
         height = PANEL // -(-len(self._scene.cameras) // columns)
         panels = []
@@ -150,22 +189,41 @@ class Painter:
             if filmed is not None and number == 0:
                 drawn = filmed.copy()
                 draw_body(drawn, body, camera, pose, place, solid)
-                panel = panel_of(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), height)
+                panel = panel_of(
+                    np.asarray(
+                        cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0),
+                        np.uint8,
+                    ),
+                    height,
+                )
                 zoomed = _zoomed(camera, panel)
             else:
-                mask, fitted = observation.silhouettes[number].mask, project(body, camera, pose, place)
-                panel = OVERLAP[panel_of(mask.view(np.uint8) + 2 * fitted.view(np.uint8), height, sharp=True)]
+                mask = observation.silhouettes[number].mask
+                fitted = project(body, camera, pose, place)
+                panel = OVERLAP[
+                    panel_of(
+                        mask.view(np.uint8) + 2 * fitted.view(np.uint8),
+                        height,
+                        sharp=True,
+                    )
+                ]
                 zoomed = _zoomed(camera, panel)
                 if solid is not None:
                     share = solid_map(body, zoomed, pose, place, solid)
-                    faint, share = share < 1.0, share[share < 1.0, None]
-                    panel[faint] = share * panel[faint] + (1.0 - share) * np.array(BACKGROUND)
+                    faint = share < 1.0
+                    share = share[share < 1.0, None]
+                    panel[faint] = share * panel[faint] + (1.0 - share) * np.array(
+                        BACKGROUND
+                    )
                 draw_bones(panel, body, zoomed, pose, place)
             if other is not None:
                 draw_bones(panel, body, zoomed, other.pose, other.translation, OTHER)
             panels.append(panel)
         widest = max(panel.shape[1] for panel in panels)
-        panels = [np.pad(panel, ((0, 0), (0, widest - panel.shape[1]), (0, 0))) for panel in panels]
+        panels = [
+            np.pad(panel, ((0, 0), (0, widest - panel.shape[1]), (0, 0)))
+            for panel in panels
+        ]
         return _grid(panels, columns, 0)
 
     def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:
@@ -186,12 +244,21 @@ class Painter:
         if self._scene.count == 1:
             return np.vstack(parts)
         name = "error_degrees" if "error_degrees" in table else "cost"
-        return np.vstack([*parts, curve(table[name], name.replace("_", " "), width, 180, self._scene.first)])
+        return np.vstack(
+            [
+                *parts,
+                curve(
+                    table[name], name.replace("_", " "), width, 180, self._scene.first
+                ),
+            ]
+        )
 
 
 def _labelled(image: Image, label: str, lost: bool = False) -> Image:
     """Return a picture at half its size below a label."""
-    still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+    still = np.asarray(
+        cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8
+    )
     if lost:
         _draw_border(still, BORDER // 2)
     head = blank(LABEL_HEIGHT, still.shape[1])
@@ -200,12 +267,18 @@ def _labelled(image: Image, label: str, lost: bool = False) -> Image:
 
 
 def _draw_border(image: Image, width: int) -> None:
-    cv2.rectangle(image, (0, 0), (image.shape[1] - 1, image.shape[0] - 1), MISSED, 2 * width - 1)
+    cv2.rectangle(
+        image, (0, 0), (image.shape[1] - 1, image.shape[0] - 1), MISSED, 2 * width - 1
+    )
 
 
 def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:
     at = 12
-    for name, colour in (("both", BOTH), ("observed only", MISSED), ("body only", SPILLED)):
+    for name, colour in (
+        ("both", BOTH),
+        ("observed only", MISSED),
+        ("body only", SPILLED),
+    ):
         write(image, name, (at, row), colour, scale)
         at += width_of(name, scale) + 24
 
@@ -213,42 +286,73 @@ def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:
 def panel_of(image: Image, height: int, sharp: bool = False) -> Image:
     """Return a picture in another height, and an even width; a sharp one has no values between its own."""
     width = 2 * round(image.shape[1] * height / image.shape[0] / 2)
-    how = cv2.INTER_NEAREST if sharp else cv2.INTER_AREA if height < image.shape[0] else cv2.INTER_LINEAR
-    return np.asarray(cv2.resize(image, (width, height), interpolation=how), dtype=np.uint8)
+    how = (
+        cv2.INTER_NEAREST
+        if sharp
+        else cv2.INTER_AREA
+        if height < image.shape[0]
+        else cv2.INTER_LINEAR
+    )
+    return np.asarray(
+        cv2.resize(image, (width, height), interpolation=how), dtype=np.uint8
+    )
 
 
 def _zoomed(camera: Camera, panel: Image) -> Camera:
     """Return a camera that sees the same in a panel."""
     height, width = panel.shape[:2]
     zoom = np.array([width / camera.width, height / camera.height])
-    return replace(camera, width=width, height=height, focal=zoom * camera.focal, centre=zoom * camera.centre)
+    return replace(
+        camera,
+        width=width,
+        height=height,
+        focal=zoom * camera.focal,
+        centre=zoom * camera.centre,
+    )
 
 
 def _grid(panels: list[Image], columns: int, background: int) -> Image:
     panels = panels + [np.full_like(panels[0], background)] * (-len(panels) % columns)
-    return np.vstack([np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)])
+    return np.vstack(
+        [np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)]
+    )
 
 
 def curve(values: Array, name: str, width: int, height: int, first: int = 0) -> Image:
     """Return a plot (height, width, 3) of values (T,), one a frame, from 0 up; peaks above its top are named."""
     image = blank(height, width)
-    left, right, limit = 66, width - 16, PEAK * float(np.quantile(values, PEAK_QUANTILE))
+    left = 66
+    right = width - 16
+    limit = PEAK * float(np.quantile(values, PEAK_QUANTILE))
     # one a run of frames, the highest first
     peaks = sorted(
-        (start + int(values[start:stop].argmax()) for start, stop in runs(values > limit)), key=lambda k: -values[k]
+        (
+            start + int(values[start:stop].argmax())
+            for start, stop in runs(values > limit)
+        ),
+        key=lambda k: -values[k],
     )
     top = limit if peaks and limit > 0.0 else float(values.max())
     scale = (height - 56) / (max(top, 1e-9) * 1.15)
     for lines, level in enumerate((0.0, float(np.mean(values)), top)):
         row = int(height - 24 - level * scale)
         cv2.line(image, (left, row), (right, row), LINES, 1)
-        write(image, f"{level:.2f}", (8, min(row, height - 24 - lines * LINE_HEIGHT) + 6), scale=SUMMARY_SCALE - 0.1)
+        write(
+            image,
+            f"{level:.2f}",
+            (8, min(row, height - 24 - lines * LINE_HEIGHT) + 6),
+            scale=SUMMARY_SCALE - 0.1,
+        )
     x = np.linspace(left, right, max(len(values), 2))[: len(values)]
-    points = np.rint(np.column_stack([x, height - 24 - scale * np.minimum(values, 1.1 * top)]) * 16).astype(np.int32)
+    points = np.rint(
+        np.column_stack([x, height - 24 - scale * np.minimum(values, 1.1 * top)]) * 16
+    ).astype(np.int32)
     cv2.polylines(image, [points], False, BOTH, 2, cv2.LINE_AA, 4)
     words = "mean and maximum"
     if top == limit:
-        named = ", ".join(f"{values[k]:.1f} in frame {first + k}" for k in peaks[:MAX_PEAKS])
+        named = ", ".join(
+            f"{values[k]:.1f} in frame {first + k}" for k in peaks[:MAX_PEAKS]
+        )
         more = f" and {len(peaks) - MAX_PEAKS} more" if len(peaks) > MAX_PEAKS else ""
         words = f"mean, and the top; above it {named}{more}"
     write(image, f"{name}, frame by frame: 0, {words}", (left, 20), scale=SUMMARY_SCALE)

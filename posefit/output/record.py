@@ -17,7 +17,9 @@ from posefit.uncertainty.modes import Posterior
 def append_frame(path: Path, frame: Frame, state: Mapping[str, Any]) -> None:
     """Add a frame to a file, and the state of the random generator after it."""
     posterior = None if frame.posterior is None else frame.posterior.as_dict()
-    text = json.dumps({**vars(frame), "posterior": posterior, "state": state}, default=_encoded).encode()
+    text = json.dumps(
+        {**vars(frame), "posterior": posterior, "state": state}, default=_encoded
+    ).encode()
     with path.open("ab") as file:
         file.write(b"%08x %s\n" % (zlib.crc32(text), text))
 
@@ -27,8 +29,10 @@ def read_frames(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
 
     From there on it is cut off; a line that was being written when the track ended is no damage.
     """
-    frames, whole_lines = list[Frame](), list[bytes]()
-    state, damage = None, ""
+    frames = list[Frame]()
+    whole_lines = list[bytes]()
+    state = None
+    damage = ""
     recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
     for number, line in enumerate(recorded.splitlines(keepends=True), 1):
         try:
@@ -63,6 +67,9 @@ def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
     if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
         raise InputError("a damaged one")
     row = json.loads(text, object_hook=_decoded)
-    state, posterior = row.pop("state"), row.pop("posterior")
+    state = row.pop("state")
+    posterior = row.pop("posterior")
     np.random.default_rng(0).bit_generator.state = state  # raises where it is none
-    return Frame(**row, posterior=None if posterior is None else Posterior.from_dict(posterior)), state
+    return Frame(
+        **row, posterior=None if posterior is None else Posterior.from_dict(posterior)
+    ), state

@@ -20,14 +20,29 @@ def part(package: str, name: str) -> str:
 def assembled(mark: str, markup: str, style: str, data: Any, script: str) -> str:
     """Return a document: its first line `mark`, the shared head, and its markup with style, data and script in it."""
     before, middle, after, end = f"{part(__package__, 'head.html')}{markup}".split(PART)
-    json_element = f'<script type="application/json" id="data">{embedded(data)}</script>'
+    json_element = (
+        f'<script type="application/json" id="data">{embedded(data)}</script>'
+    )
     style_element = f"<style>\n{part(__package__, 'base.css')}{style}</style>"
-    return "".join([mark, before, style_element, middle, json_element, after, f"<script>\n{script}</script>", end])
+    return "".join(
+        [
+            mark,
+            before,
+            style_element,
+            middle,
+            json_element,
+            after,
+            f"<script>\n{script}</script>",
+            end,
+        ]
+    )
 
 
 def one_script(package: str, names: Sequence[str]) -> str:
     """Return the shared scripts and those of a package as one whose names are not global."""
-    parts = [part(__package__, f"{name}.js") for name in SHARED] + [part(package, f"{name}.js") for name in names]
+    parts = [part(__package__, f"{name}.js") for name in SHARED] + [
+        part(package, f"{name}.js") for name in names
+    ]
     return '"use strict";\n(() => {\n' + "\n".join(parts) + "})();\n"
 
 
@@ -55,11 +70,20 @@ def plain(value: Any) -> Any:
         return int(value)
     if isinstance(value, float | np.floating):
         rounded = float(f"{value:.5g}")
-        return None if not np.isfinite(value) else rounded if np.isfinite(rounded) else float(value)
+        return (
+            None
+            if not np.isfinite(value)
+            else rounded
+            if np.isfinite(rounded)
+            else float(value)
+        )
     return value
 
 
 def colour_style(light: dict[str, str], dark: dict[str, str]) -> str:
     """Return named colours as variables of a page's style, for light and for dark screens."""
-    bright, dim = ("".join(f" --{name}: {colour};" for name, colour in scheme.items()) for scheme in (light, dark))
+    bright, dim = (
+        "".join(f" --{name}: {colour};" for name, colour in scheme.items())
+        for scheme in (light, dark)
+    )
     return f":root {{{bright} }}\n@media (prefers-color-scheme: dark) {{ :root {{{dim} }} }}\n"

@@ -49,15 +49,39 @@ class Chart:
 
 def track_charts(contest: Contest, drawn: Contest) -> list[Chart]:
     """Return the charts of tracks; curves over evaluations use the runs of `drawn`, which are fewer."""
-    evaluations, charts = grid(drawn), []
+    evaluations = grid(drawn)
+    charts = []
     if len(evaluations):
-        title, x, lines = "Convergence: best cost of a frame", "evaluations of a frame", convergence(drawn, evaluations)
-        charts.append(Chart(name="convergence", title=title, x_label=x, y_label="best cost", lines=lines, log=True))
+        title = "Convergence: best cost of a frame"
+        x = "evaluations of a frame"
+        lines = convergence(drawn, evaluations)
+        charts.append(
+            Chart(
+                name="convergence",
+                title=title,
+                x_label=x,
+                y_label="best cost",
+                lines=lines,
+                log=True,
+            )
+        )
     errors = contest.of("error")
     levels = np.linspace(0.0, float(errors.max()), PROFILE)
     profiles = [Line(levels, share) for share in performance_profile(errors, levels)]
-    title, x, y = "Runs within an error", "error, degrees", "share of runs"
-    charts.append(Chart(name="profile", title=title, x_label=x, y_label=y, lines=profiles, most=1.0, stepped=True))
+    title = "Runs within an error"
+    x = "error, degrees"
+    y = "share of runs"
+    charts.append(
+        Chart(
+            name="profile",
+            title=title,
+            x_label=x,
+            y_label=y,
+            lines=profiles,
+            most=1.0,
+            stepped=True,
+        )
+    )
     return [chart for chart in charts if any(chart.lines)]
 
 
@@ -66,7 +90,9 @@ def grid(contest: Contest) -> Array:
     used = [used for used, _ in _traces(contest, contest.rows) if len(used)]
     if not used:
         return np.empty(0)
-    return np.unique(np.rint(np.geomspace(min(map(np.min, used)), max(map(np.max, used)), POINTS)))
+    return np.unique(
+        np.rint(np.geomspace(min(map(np.min, used)), max(map(np.max, used)), POINTS))
+    )
 
 
 def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
@@ -80,12 +106,20 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         traces = _traces(contest, rows)
         if not all(len(used) for used, _ in traces):
             return None
-        first, last = max(used[0] for used, _ in traces), max(used[-1] for used, _ in traces)
+        first = max(used[0] for used, _ in traces)
+        last = max(used[-1] for used, _ in traces)
         points = evaluations[(evaluations >= first) & (evaluations <= last)]
         if not len(points):
             return None
-        costs = np.array([best[np.searchsorted(used, points, side="right") - 1] for used, best in traces])
-        part = iqm_intervals(costs.T.reshape(-1, *rows.shape), contest.rng(), resamples=count)
+        costs = np.array(
+            [
+                best[np.searchsorted(used, points, side="right") - 1]
+                for used, best in traces
+            ]
+        )
+        part = iqm_intervals(
+            costs.T.reshape(-1, *rows.shape), contest.rng(), resamples=count
+        )
         return Line(points, part.values, part.low, part.high)
 
     return [line(rows) for rows in contest.rows]
@@ -95,10 +129,14 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     """Return each method's interquartile mean of every joint's error (27,) in mm, with its interval."""
     count = contest.resamples(contest.rows.size * len(JOINTS))
     joints = contest.runs.data["joint_errors"][contest.rows]
-    errors = np.moveaxis(joints, -1, 1).astype(np.float64)  # (methods, 27, instances, seeds)
+    # (methods, 27, instances, seeds)
+    errors = np.moveaxis(joints, -1, 1).astype(np.float64)
     if not np.isfinite(errors).all():
         return []
-    return [iqm_intervals(method_errors, contest.rng(), resamples=count) for method_errors in errors]
+    return [
+        iqm_intervals(method_errors, contest.rng(), resamples=count)
+        for method_errors in errors
+    ]
 
 
 def certainty(contest: Contest) -> dict[str, Any] | None:
@@ -125,7 +163,9 @@ def _certainty_of(contest: Contest, rows: Array) -> dict[str, Any] | None:
     return {
         "coverage": coverage,
         "width": width,
-        "ece": float(np.abs(probability - right).sum() / frames.sum()) if len(bins) else None,
+        "ece": float(np.abs(probability - right).sum() / frames.sum())
+        if len(bins)
+        else None,
     }
 
 

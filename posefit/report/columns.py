@@ -28,7 +28,8 @@ def average_by(function: Callable[[Array], Any]) -> Callable[[Array], float | No
 
 
 interquartile_mean = average_by(lambda values: trim_mean(values, TRIMMED))
-mean, median = average_by(np.mean), average_by(np.median)
+mean = average_by(np.mean)
+median = average_by(np.median)
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,10 @@ class Column:
     per_frame: bool = False  # the row has the sum over all frames
     higher_is_better: bool = False
     in_tables: bool = True
-    optional: bool = False  # only methods with an uncertainty have it: tables show it if some row has it
-    average: Callable[[Array], float | None] = interquartile_mean  # of a method's runs; of shares the mean
+    # only methods with an uncertainty have it: tables show it if some row has it
+    optional: bool = False
+    # of a method's runs; of shares the mean
+    average: Callable[[Array], float | None] = interquartile_mean
 
     def value(self, row: Mapping[str, Any]) -> float:
         """Return the figure of a row, nan where it has none."""
@@ -52,7 +55,11 @@ class Column:
             value = (value or {}).get(part)
         if value is None:
             return math.nan
-        return float(value) / row["spec"]["frames"] if self.per_frame else self.scale * float(value)
+        return (
+            float(value) / row["spec"]["frames"]
+            if self.per_frame
+            else self.scale * float(value)
+        )
 
     @property
     def heading(self) -> str:

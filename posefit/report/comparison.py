@@ -66,12 +66,21 @@ def compare(
     entries = [_named(entry, factories) for entry in methods]
     register(factories)
     crossed = {"methods": entries, "motions": list(motions), "seeds": seeds}
-    crossed |= {name: lists.pop(name) for name in ("views", "corruptions", "instances") if name in lists}
+    crossed |= {
+        name: lists.pop(name)
+        for name in ("views", "corruptions", "instances")
+        if name in lists
+    }
     grid = {"grid": lists.pop("grid")} if "grid" in lists else {}
     plan = Plan.of({"product": crossed, "defaults": lists, **grid})
     temporary = TemporaryDirectory(prefix="posefit-") if out is None else None
     folder = Path(temporary.name) / "results" if temporary else Path(str(out))
-    pool = Pool(cores() if workers is None else workers, Limits(), run_cell, partial(register, factories))
+    pool = Pool(
+        cores() if workers is None else workers,
+        Limits(),
+        run_cell,
+        partial(register, factories),
+    )
     tally = swept(plan, folder, pool, interactive().log)
     return Comparison(Ledger(folder), tally, temporary)
 

@@ -19,22 +19,34 @@ from posefit.statistics.intervals import RESAMPLES
 from posefit.suites.running import SHOWN
 from posefit.sweep.ledger import Ledger
 
-REASONS = 5  # of failures and warnings, the most frequent ones, that the first screen names
+# of failures and warnings, the most frequent ones, that the first screen names
+REASONS = 5
 MAX_MISSING = 20  # instances that it names if they are not compared
 FEW_RUNS = 20  # of a method, below which intervals are called wide
-POINTS = max(charts.POINTS, len(JOINTS))  # at which very many runs are drawn by some of them
+# at which very many runs are drawn by some of them
+POINTS = max(charts.POINTS, len(JOINTS))
 
 
 def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs; `sections` names the parts that it has."""
-    contest, kind = contest_of(runs), runs.kind
-    warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
+    contest = contest_of(runs)
+    kind = runs.kind
+    warnings = list(
+        dict.fromkeys(text for texts in runs.warnings.values() for text in texts)
+    )
     data: dict[str, Any] = {
         "title": kind.title,
         "made": f"{printable(ledger.path.resolve().name)}, {time.strftime('%d %B %Y', time.localtime(ledger.changed))}",
-        "answer": ["Every cell failed." if runs.failures else "No run has an error: nothing can be compared."],
+        "answer": [
+            "Every cell failed."
+            if runs.failures
+            else "No run has an error: nothing can be compared."
+        ],
         "header": _header(runs, contest),
-        "methods": [{"name": n, "settings": v["settings"]} for n, v in zip(runs.methods, runs.variants, strict=True)],
+        "methods": [
+            {"name": n, "settings": v["settings"]}
+            for n, v in zip(runs.methods, runs.variants, strict=True)
+        ],
         "instances": [{"name": name} for name in runs.instances],
         "baseline_names": kind.baselines,
         "joints": [place.replace("_", " ") for place in PLACES],
@@ -42,11 +54,15 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
         "columns": {name: kind.columns[name].as_dict() for name in runs.table_figures},
         "score": vars(kind.score),
         "warnings": warnings,
-        "warned": {row: [warnings.index(text) for text in texts] for row, texts in runs.warnings.items()},
+        "warned": {
+            row: [warnings.index(text) for text in texts]
+            for row, texts in runs.warnings.items()
+        },
         "failures": runs.failures,
     }
     if contest is not None:
-        board, baselines = leaderboard(contest), kind.baseline_rows(contest)
+        board = leaderboard(contest)
+        baselines = kind.baseline_rows(contest)
         data |= {
             "answer": leader_sentences(contest, board, baselines),
             "leaderboard": board,
@@ -66,21 +82,37 @@ def _track_part(runs: Runs, contest: Contest | None) -> dict[str, Any]:
     part: dict[str, Any] = {"sections": ["rows"] if len(runs) else []}
     if contest is not None:
         drawn = contest.fewer(POINTS)
-        errors, certainty = charts.joint_errors(drawn), charts.certainty(contest)
-        names = {"leaderboard": True, "comparison": True, "curves": True, "joints": errors, "certainty": certainty}
+        errors = charts.joint_errors(drawn)
+        certainty = charts.certainty(contest)
+        names = {
+            "leaderboard": True,
+            "comparison": True,
+            "curves": True,
+            "joints": errors,
+            "certainty": certainty,
+        }
         part = {
-            "sections": [name for name, present in names.items() if present] + part["sections"],
+            "sections": [name for name, present in names.items() if present]
+            + part["sections"],
             "pairs": paired_tests(contest),
-            "charts": [chart.as_dict() for chart in charts.track_charts(contest, drawn)],
+            "charts": [
+                chart.as_dict() for chart in charts.track_charts(contest, drawn)
+            ],
             "joint_errors": [vars(intervals) for intervals in errors],
             "certainty": certainty,
         }
     numbers = [_exact(place["instance"]) for place in runs.places]
     return {
         **part,
-        "instances": [{"name": name, "number": n} for name, n in zip(runs.instances, numbers, strict=True)],
+        "instances": [
+            {"name": name, "number": n}
+            for name, n in zip(runs.instances, numbers, strict=True)
+        ],
         "rows": {
-            **{name: getattr(runs, name) for name in ("method", "instance", "head", "seed")},
+            **{
+                name: getattr(runs, name)
+                for name in ("method", "instance", "head", "seed")
+            },
             **{name: runs.figures[name] for name in runs.table_figures},
             "key": [key[:8] for key in runs.keys],
         },
@@ -106,23 +138,43 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         {"instance": runs.instances[i], "missing": [runs.methods[m] for m in methods]}
         for i, methods in (contest.missing if contest else ())
     ]
-    failed = f"{counted(len(runs.failures), 'cell')} failed" if runs.failures else "no cell failed"
-    facts = {"methods": runs.methods, **runs.kind.facts(runs), "posefit": runs.values("version")}
-    texts = {name: fact if isinstance(fact, str) else "; ".join(map(str, fact)) for name, fact in facts.items()}
-    runs_words = counted(len(runs), runs.kind.name) if len(runs) == 1 else f"{len(runs):,} {runs.kind.noun}"
+    failed = (
+        f"{counted(len(runs.failures), 'cell')} failed"
+        if runs.failures
+        else "no cell failed"
+    )
+    facts = {
+        "methods": runs.methods,
+        **runs.kind.facts(runs),
+        "posefit": runs.values("version"),
+    }
+    texts = {
+        name: fact if isinstance(fact, str) else "; ".join(map(str, fact))
+        for name, fact in facts.items()
+    }
+    runs_words = (
+        counted(len(runs), runs.kind.name)
+        if len(runs) == 1
+        else f"{len(runs):,} {runs.kind.noun}"
+    )
     return {
         "version": runs.version,
         "summary": f"{runs_words} by {counted(len(runs.methods), 'method')}; {failed}.",
         "facts": [[name, printable(text)] for name, text in texts.items()],
-        "notes": _notes(runs, contest) + (_track_notes(contest) if contest and runs.kind.name == "track" else []),
+        "notes": _notes(runs, contest)
+        + (_track_notes(contest) if contest and runs.kind.name == "track" else []),
         "done": len(runs),
         "failed": len(runs.failures),
         "dropped": dropped,
-        "problems": _problems(runs, dropped, unpaired_sentence(contest) if contest else ""),
+        "problems": _problems(
+            runs, dropped, unpaired_sentence(contest) if contest else ""
+        ),
     }
 
 
-def _problems(runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str) -> list[tuple[str, list[str]]]:
+def _problems(
+    runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str
+) -> list[tuple[str, list[str]]]:
     """Return what failed, what is therefore not compared, and what warned: sentences with the most frequent details."""
     problems = []
 
@@ -132,21 +184,48 @@ def _problems(runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str) -
 
     if runs.failures:
         by = Counter(failure["method"] for failure in runs.failures)
-        reasons = Counter(reason for failure in runs.failures for reason in failure["reasons"]).most_common()
+        reasons = Counter(
+            reason for failure in runs.failures for reason in failure["reasons"]
+        ).most_common()
         text = "; ".join(f"{method} {count}" for method, count in by.items())
         failed = counted(len(runs.failures), "cell")
-        add(f"{failed} failed, left out of all figures: {text}", [f"{n} x {reason}" for reason, n in reasons], REASONS)
+        add(
+            f"{failed} failed, left out of all figures: {text}",
+            [f"{n} x {reason}" for reason, n in reasons],
+            REASONS,
+        )
     if runs.unfinished:
-        add(f"no cell finished, so not on the leaderboard: {'; '.join(runs.unfinished)}", [], 0)
+        add(
+            f"no cell finished, so not on the leaderboard: {'; '.join(runs.unfinished)}",
+            [],
+            0,
+        )
     if unpaired:
         add(unpaired, [], 0)
     if dropped:
-        whys = [f"no run of {'; '.join(gap['missing'])}" if gap["missing"] else "no seed in common" for gap in dropped]
-        details = [f"{gap['instance']}: {why}" for gap, why in zip(dropped, whys, strict=True)]
-        add(f"left out of the comparison, for every method: {counted(len(dropped), 'instance')}", details, MAX_MISSING)
+        whys = [
+            f"no run of {'; '.join(gap['missing'])}"
+            if gap["missing"]
+            else "no seed in common"
+            for gap in dropped
+        ]
+        details = [
+            f"{gap['instance']}: {why}" for gap, why in zip(dropped, whys, strict=True)
+        ]
+        add(
+            f"left out of the comparison, for every method: {counted(len(dropped), 'instance')}",
+            details,
+            MAX_MISSING,
+        )
     if runs.warnings:
-        texts = Counter(text for texts in runs.warnings.values() for text in texts).most_common()
-        add(f"{counted(len(runs.warnings), 'run')} with a warning", [f"{n} x {text}" for text, n in texts], REASONS)
+        texts = Counter(
+            text for texts in runs.warnings.values() for text in texts
+        ).most_common()
+        add(
+            f"{counted(len(runs.warnings), 'run')} with a warning",
+            [f"{n} x {text}" for text, n in texts],
+            REASONS,
+        )
     return problems
 
 
@@ -155,9 +234,15 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
     if contest is not None:
         (_, instances, seeds), size = contest.rows.shape, contest.rows.size
         if size < len(runs):
-            each = f"{counted(instances, 'instance')} with {counted(seeds, 'seed')} each"
-            notes.append(f"Methods are compared on the {size:,} of {len(runs):,} runs that all of them share: {each}.")
-        apart = [name for m, name in enumerate(runs.methods) if m not in contest.methods]
+            each = (
+                f"{counted(instances, 'instance')} with {counted(seeds, 'seed')} each"
+            )
+            notes.append(
+                f"Methods are compared on the {size:,} of {len(runs):,} runs that all of them share: {each}."
+            )
+        apart = [
+            name for m, name in enumerate(runs.methods) if m not in contest.methods
+        ]
         if apart:
             notes.append(
                 f"Too few runs in common with the others, so not compared: {'; '.join(apart)}. "
@@ -179,12 +264,18 @@ def _track_notes(contest: Contest) -> list[str]:
     (methods, instances, seeds), size = contest.rows.shape, contest.rows.size
     notes = []
     if seeds > 1 and size / methods < FEW_RUNS:
-        notes.append(f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide.")
+        notes.append(
+            f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide."
+        )
     if contest.resamples(size) < RESAMPLES:
-        notes.append(f"So many runs have {contest.resamples(size)} bootstrap resamples instead of {RESAMPLES:,}.")
+        notes.append(
+            f"So many runs have {contest.resamples(size)} bootstrap resamples instead of {RESAMPLES:,}."
+        )
     some = contest.fewer(POINTS).rows.shape
     if some[1] * some[2] < instances * seeds:
-        notes.append(f"Curves and joints use {some[1]:,} instances with {some[2]:,} seeds each, not all.")
+        notes.append(
+            f"Curves and joints use {some[1]:,} instances with {some[2]:,} seeds each, not all."
+        )
     return notes
 
 

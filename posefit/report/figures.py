@@ -27,7 +27,8 @@ _SIZE = (6.4, 3.6)  # inches
 def save(figure: "Figure", path: Path) -> None:
     """Write a figure as a new .png or .pdf; the same figure gives the same bytes."""
     metadata = {"CreationDate": None} if path.suffix == ".pdf" else {}
-    figure.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)  # long names too
+    # long names too
+    figure.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)
 
 
 def chart_figure(methods: Sequence[str], chart: Chart) -> "Figure":
@@ -38,15 +39,24 @@ def chart_figure(methods: Sequence[str], chart: Chart) -> "Figure":
     for k, line in enumerate(chart.lines):
         if line is None:
             continue
-        colour, style = COLOURS[k % len(COLOURS)], STYLES[k // len(COLOURS) % len(STYLES)]
-        label, step = methods[k].replace("$", r"\$"), "steps-post" if chart.stepped else None  # no mathematics
-        axes.plot(line.x, line.y, color=colour, linestyle=style, drawstyle=step, label=label)
+        colour = COLOURS[k % len(COLOURS)]
+        style = STYLES[k // len(COLOURS) % len(STYLES)]
+        # no mathematics
+        label = methods[k].replace("$", r"\$")
+        step = "steps-post" if chart.stepped else None
+        axes.plot(
+            line.x, line.y, color=colour, linestyle=style, drawstyle=step, label=label
+        )
         if line.low is not None and line.high is not None:
-            axes.fill_between(line.x, line.low, line.high, color=colour, alpha=0.18, linewidth=0)
+            axes.fill_between(
+                line.x, line.low, line.high, color=colour, alpha=0.18, linewidth=0
+            )
     axes.set_xscale("log" if chart.log else "linear")
     if chart.most is not None:
         axes.set_ylim(-0.02 * chart.most, 1.02 * chart.most)
-    figure.legend(loc="outside right upper", frameon=False, fontsize=8 if len(methods) < 20 else 6)
+    figure.legend(
+        loc="outside right upper", frameon=False, fontsize=8 if len(methods) < 20 else 6
+    )
     return figure
 
 
@@ -55,7 +65,9 @@ def library(name: str) -> Any:
     try:
         return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
     except ImportError as error:
-        raise ImportError("figures need the library matplotlib: pip install posefit[figures]") from error
+        raise ImportError(
+            "figures need the library matplotlib: pip install posefit[figures]"
+        ) from error
 
 
 def write_figures(runs: Runs, path: str | Path) -> None:
@@ -68,11 +80,22 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     if contest is None:
         raise InputError("figures must be of runs with errors, got none")
     names = [runs.methods[m] for m in contest.methods]
-    figures = {chart.name: chart_figure(names, chart) for chart in track_charts(contest, contest)}
+    figures = {
+        chart.name: chart_figure(names, chart)
+        for chart in track_charts(contest, contest)
+    }
     columns, (error, *others) = runs.kind.columns, runs.table_figures
-    table = {"method": "name", columns[error].heading: error, "low": "low", "high": "high"}
+    table = {
+        "method": "name",
+        columns[error].heading: error,
+        "low": "low",
+        "high": "high",
+    }
     table |= {**{columns[name].heading: name for name in others}, "runs": "runs"}
-    rows = [{title: row[key] for title, key in table.items()} for row in leaderboard(contest)]
+    rows = [
+        {title: row[key] for title, key in table.items()}
+        for row in leaderboard(contest)
+    ]
     with new_folder(path) as folder:
         for name, figure in figures.items():
             for kind in ("png", "pdf"):

@@ -35,9 +35,12 @@ class Kind(NamedTuple):
     read: Callable[[Mapping[str, Any], dict[bytes, Any]], tuple[Array, tuple[Any, ...]]]
     rank: Callable[[Place], tuple[Any, ...]]  # what instances are sorted by
     place_name: Callable[[Place], str]
-    tested_errors: Callable[["Contest"], Array]  # the errors (methods, blocks, 1) that tests compare
-    board: Callable[["Contest"], dict[int, dict[str, Any]]]  # what each method's row has besides averages
-    baseline_rows: Callable[["Contest"], list[dict[str, Any]]]  # on the same runs as the methods
+    # the errors (methods, blocks, 1) that tests compare
+    tested_errors: Callable[["Contest"], Array]
+    # what each method's row has besides averages
+    board: Callable[["Contest"], dict[int, dict[str, Any]]]
+    # on the same runs as the methods
+    baseline_rows: Callable[["Contest"], list[dict[str, Any]]]
     place_words: Callable[["Contest"], str]  # what a contest was on
     # how the best baseline compares with the leader, given its row and those of the baselines
     baseline_sentences: Callable[[Mapping[str, Any], Sequence[Any]], list[str]]
@@ -63,10 +66,13 @@ class Runs:
     seed: Array  # (n,)
     seeds: tuple[int, ...]  # rising
     keys: tuple[str, ...]
-    figures: dict[str, Array]  # name -> (n,), nan where a row has none; a lower `error` is better
-    data: dict[str, Any]  # what else each row has, by the names of `kind.data`: an array, or a tuple
+    # name -> (n,), nan where a row has none; a lower `error` is better
+    figures: dict[str, Array]
+    # what else each row has, by the names of `kind.data`: an array, or a tuple
+    data: dict[str, Any]
     warnings: Mapping[int, tuple[str, ...]]  # row -> its warnings, if any
-    failures: tuple[dict[str, Any], ...]  # quarantined cells: name, method, reasons, command
+    # quarantined cells: name, method, reasons, command
+    failures: tuple[dict[str, Any], ...]
     failed: tuple[int, ...]  # quarantined cells of each method
     unfinished: tuple[str, ...]  # names of methods whose every cell is in quarantine
     heads: tuple[str, ...]  # the beginnings of the commands that run rows again
@@ -81,12 +87,19 @@ class Runs:
         return [
             name
             for name, column in self.kind.columns.items()
-            if column.in_tables and not (column.optional and np.isnan(self.figures[name]).all())
+            if column.in_tables
+            and not (column.optional and np.isnan(self.figures[name]).all())
         ]
 
     def values(self, field: str) -> list[Any]:
         """Return the values of a field of methods or instances, rising."""
-        return sorted({fields[field] for fields in (*self.variants, *self.places) if field in fields})
+        return sorted(
+            {
+                fields[field]
+                for fields in (*self.variants, *self.places)
+                if field in fields
+            }
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -136,8 +149,11 @@ class Contest(Shared):
 
         These are the first seeds, and every second, third, ... instance.
         """
-        most = int(WORK / (MIN_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
+        # runs of a method
+        most = int(WORK / (MIN_RESAMPLES * max(points, 1) * len(self.methods)))
         _, instances, seeds = self.rows.shape
         seeds = min(seeds, max(2, most // instances))
         step = -(-instances * seeds // most)
-        return replace(self, instances=self.instances[::step], rows=self.rows[:, ::step, :seeds])
+        return replace(
+            self, instances=self.instances[::step], rows=self.rows[:, ::step, :seeds]
+        )

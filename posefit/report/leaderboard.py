@@ -23,7 +23,8 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     Figures are averages, the score has an interval, and the kind of runs adds its own by `Kind.board`. `behind` is the
     median difference from the leader in paired runs with its interval, `p` is Wilcoxon's after Holm.
     """
-    runs, score = contest.runs, contest.runs.kind.score
+    runs = contest.runs
+    score = contest.runs.kind.score
     more = runs.kind.board(contest)
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
@@ -36,18 +37,32 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
             "warned": sum(k in runs.warnings for k in rows.tolist()),
             "taking_part": m in contest.methods,
         }
-        row |= {figure: column.average(runs.figures[figure][rows]) for figure, column in runs.kind.columns.items()}
+        row |= {
+            figure: column.average(runs.figures[figure][rows])
+            for figure, column in runs.kind.columns.items()
+        }
         board.append({**row, **more[m]})
     sign = -1.0 if score.down else 1.0
-    worst = [math.inf if row[score.name] is None else sign * row[score.name] for row in board]
-    board.sort(key=lambda row: (not row["taking_part"], worst[row["method"]], row.get("above", 0.0)))
+    worst = [
+        math.inf if row[score.name] is None else sign * row[score.name] for row in board
+    ]
+    board.sort(
+        key=lambda row: (
+            not row["taking_part"],
+            worst[row["method"]],
+            row.get("above", 0.0),
+        )
+    )
     comparisons = _leader_comparisons(contest, board[0]["method"])
     return [{**row, **comparisons[row["method"]]} for row in board]
 
 
-def _leader_comparisons(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
+def _leader_comparisons(
+    contest: Contest, leader: int
+) -> dict[int, dict[str, float | None]]:
     """Return how far each method is behind the leader, with the p of the difference; None where there is no test."""
-    place, names = contest.methods.index(leader), ("behind", "behind_low", "behind_high", "p")
+    place = contest.methods.index(leader)
+    names = ("behind", "behind_low", "behind_high", "p")
     comparisons: dict[int, dict[str, float | None]] = {
         m: dict.fromkeys(names) for m in range(len(contest.runs.methods))
     }
@@ -71,4 +86,8 @@ def paired_tests(contest: Contest) -> dict[str, Any] | None:
     if not contest.testable:
         return None
     pairs = [astuple(comparison) for comparison in contest.comparisons]
-    return {"methods": contest.methods, "blocks": contest.tested_errors()[0].size, "pairs": pairs}
+    return {
+        "methods": contest.methods,
+        "blocks": contest.tested_errors()[0].size,
+        "pairs": pairs,
+    }

@@ -22,7 +22,15 @@ if TYPE_CHECKING:
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (TRACKS, SEARCHES)}
 # what a method chooses; all else but the seed makes an instance
-_METHOD_FIELDS = ("method", "name", "settings", "evaluations", "hypotheses", "infeasible", "version")
+_METHOD_FIELDS = (
+    "method",
+    "name",
+    "settings",
+    "evaluations",
+    "hypotheses",
+    "infeasible",
+    "version",
+)
 
 
 class _Distinct:
@@ -55,9 +63,12 @@ class _Rows:
     Raises InputError where there is no row, finished or quarantined, and where there are both tracks and searches.
     """
 
-    def __init__(self, ledger: "Ledger", quarantined: Sequence[Mapping[str, Any]]) -> None:
+    def __init__(
+        self, ledger: "Ledger", quarantined: Sequence[Mapping[str, Any]]
+    ) -> None:
         self.methods, self.places, self.heads = _Distinct(), _Distinct(), _Distinct()
-        self.numbers: list[tuple[int, int, int]] = []  # of instance, method and head of each row
+        # of instance, method and head of each row
+        self.numbers: list[tuple[int, int, int]] = []
         self.seeds: list[int] = []  # of any size
         self.keys: list[str] = []
         self.warnings: list[tuple[str, ...]] = []
@@ -73,13 +84,18 @@ class _Rows:
             if row["status"] == "done":
                 self._add(row, shared)
         if not kinds:
-            raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+            raise InputError(
+                f"{ledger.path}: expected a ledger with finished rows, got one with none"
+            )
         (self.kind,) = map(KINDS.__getitem__, kinds)
 
     def _add(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> None:
         spec = row["spec"]
-        place, method = self.places.number(_place(spec)), self.methods.number(_variant(spec))
-        head = self.heads.number({name: value for name, value in spec.items() if name not in LAST_FIELDS})
+        place = self.places.number(_place(spec))
+        method = self.methods.number(_variant(spec))
+        head = self.heads.number(
+            {name: value for name, value in spec.items() if name not in LAST_FIELDS}
+        )
         self.numbers.append((place, method, head))
         self.seeds.append(spec["seed"])
         self.keys.append(row["key"])
@@ -95,30 +111,50 @@ def runs_of(ledger: "Ledger") -> Runs:
     """
     quarantined = ledger.quarantined()
     rows = _Rows(ledger, quarantined)
-    kind, methods, places = rows.kind, rows.methods, rows.places
-    figures = np.array([values for values, _ in rows.measured], dtype=float).reshape(-1, len(kind.columns))
+    kind = rows.kind
+    methods = rows.methods
+    places = rows.places
+    figures = np.array([values for values, _ in rows.measured], dtype=float).reshape(
+        -1, len(kind.columns)
+    )
     instance, method, head_number = np.array(rows.numbers, dtype=int).reshape(-1, 3).T
 
     errors = np.nan_to_num(figures[:, list(kind.columns).index("error")], nan=np.inf)
     count = len(methods.values)  # those that only failed come after them
     failed = Counter(methods.number(_variant(cell["spec"])) for cell in quarantined)
-    means = [errors[method == m].mean() if m < count else np.inf for m in range(len(methods.values))]
-    best_first = _order([(m >= count, means[m], _text(variant)) for m, variant in enumerate(methods.values)])
+    means = [
+        errors[method == m].mean() if m < count else np.inf
+        for m in range(len(methods.values))
+    ]
+    best_first = _order(
+        [
+            (m >= count, means[m], _text(variant))
+            for m, variant in enumerate(methods.values)
+        ]
+    )
     variants = [methods.values[m] for m in best_first]
-    labels = distinct([fields["name"] or fields["method"] for fields in variants], map(_variation, variants))
+    labels = distinct(
+        [fields["name"] or fields["method"] for fields in variants],
+        map(_variation, variants),
+    )
     label_of = dict(zip(best_first, labels, strict=True))
 
     place_order = _order([(kind.rank(place), _text(place)) for place in places.values])
     sorted_places = [places.values[i] for i in place_order]
     details = [
-        {name: _text(value).strip('"') for name, value in place.items() if name not in kind.named}
+        {
+            name: _text(value).strip('"')
+            for name, value in place.items()
+            if name not in kind.named
+        }
         for place in sorted_places
     ]
     commands = [command_head(spec) for spec in rows.heads.values]
     rising = sorted(set(rows.seeds))
     rank = {seed: k for k, seed in enumerate(rising)}
     seed = np.array([rank[seed] for seed in rows.seeds], dtype=int)
-    instance, method = np.argsort(place_order)[instance], np.argsort(best_first)[method]
+    instance = np.argsort(place_order)[instance]
+    method = np.argsort(best_first)[method]
     head_number = np.argsort(_order(commands))[head_number]
     order = np.lexsort((seed, method, instance))
     data = zip(*(rows.measured[k][1] for k in order), strict=True)
@@ -126,8 +162,13 @@ def runs_of(ledger: "Ledger") -> Runs:
         kind=kind,
         version=ledger.version,
         methods=labels[:count],
-        variants=tuple({**v, "settings": printable(", ".join(settings_text(v["settings"])))} for v in variants[:count]),
-        instances=distinct([kind.place_name(place) for place in sorted_places], details),
+        variants=tuple(
+            {**v, "settings": printable(", ".join(settings_text(v["settings"])))}
+            for v in variants[:count]
+        ),
+        instances=distinct(
+            [kind.place_name(place) for place in sorted_places], details
+        ),
         places=tuple(sorted_places),
         method=method[order],
         instance=instance[order],
@@ -139,8 +180,15 @@ def runs_of(ledger: "Ledger") -> Runs:
             name: np.array(values) if isinstance(values[0], np.ndarray) else values
             for name, values in zip(kind.data, data, strict=False)  # none without rows
         },
-        warnings={k: tuple(map(printable, rows.warnings[row])) for k, row in enumerate(order) if rows.warnings[row]},
-        failures=tuple(_failure(cell, label_of[methods.number(_variant(cell["spec"]))]) for cell in quarantined),
+        warnings={
+            k: tuple(map(printable, rows.warnings[row]))
+            for k, row in enumerate(order)
+            if rows.warnings[row]
+        },
+        failures=tuple(
+            _failure(cell, label_of[methods.number(_variant(cell["spec"]))])
+            for cell in quarantined
+        ),
         failed=tuple(failed[m] for m in best_first[:count]),
         unfinished=labels[count:],
         heads=tuple(sorted(commands)),
@@ -176,16 +224,30 @@ def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
     chosen = {name: setting_text(value) for name, value in variant["settings"].items()}
     for name in ("method", "evaluations", "budget", "hypotheses", "infeasible"):
         if name in variant:
-            chosen[name] = variant[name] if isinstance(variant[name], str) else f"{variant[name]:.12g}"
+            chosen[name] = (
+                variant[name]
+                if isinstance(variant[name], str)
+                else f"{variant[name]:.12g}"
+            )
     posefit, *plugins = variant["version"].split(", ")
-    return {**chosen, "posefit": posefit, **{name: version for name, _, version in (p.partition(" ") for p in plugins)}}
+    return {
+        **chosen,
+        "posefit": posefit,
+        **{name: version for name, _, version in (p.partition(" ") for p in plugins)},
+    }
 
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in spec.items() if name not in (*_METHOD_FIELDS, "kind", "seed")}
+    return {
+        name: value
+        for name, value in spec.items()
+        if name not in (*_METHOD_FIELDS, "kind", "seed")
+    }
 
 
-def distinct(names: Sequence[str], details: Iterable[Mapping[str, str]]) -> tuple[str, ...]:
+def distinct(
+    names: Sequence[str], details: Iterable[Mapping[str, str]]
+) -> tuple[str, ...]:
     """Return distinct names; those that occur twice have in brackets what differs: `sapso@pca (cooling 0.9)`.
 
     A setting stands without its plugin, `sapso.cooling`, where no other that differs has the same name; a number tells
@@ -197,7 +259,11 @@ def distinct(names: Sequence[str], details: Iterable[Mapping[str, str]]) -> tupl
     differing = {name: _differing(several) for name, several in by_name.items()}
     longer: dict[str, None] = {}
     for name, values in zip(names, details, strict=True):
-        words = [f"{short} {values[field]}" for field, short in differing[name].items() if field in values]
+        words = [
+            f"{short} {values[field]}"
+            for field, short in differing[name].items()
+            if field in values
+        ]
         plain = unique = printable(f"{name} ({', '.join(words)})" if words else name)
         number = 1
         while unique in longer:
@@ -209,10 +275,17 @@ def distinct(names: Sequence[str], details: Iterable[Mapping[str, str]]) -> tupl
 
 def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
     """Return the fields whose values are not the same in all mappings, with the short names of these fields."""
-    fields = dict.fromkeys(field for values in sorted(several, key=len, reverse=True) for field in values)
-    differ = [field for field in fields if len({values.get(field) for values in several}) > 1]
+    fields = dict.fromkeys(
+        field for values in sorted(several, key=len, reverse=True) for field in values
+    )
+    differ = [
+        field for field in fields if len({values.get(field) for values in several}) > 1
+    ]
     plain = [field.rpartition(".")[2] for field in differ]
-    return {field: short if plain.count(short) == 1 else field for field, short in zip(differ, plain, strict=True)}
+    return {
+        field: short if plain.count(short) == 1 else field
+        for field, short in zip(differ, plain, strict=True)
+    }
 
 
 def _text(value: Any) -> str:

@@ -50,7 +50,10 @@ def _read(row: Mapping[str, Any], _: dict[bytes, Any]) -> tuple[Array, tuple[Any
     run = search_run(row)
     evaluations = hits((run.evaluations, run.costs), run.targets)
     reached = 100.0 * float(np.isfinite(evaluations).mean())
-    return np.array([reached, run.cost - run.truth_cost, 100.0 - reached]), (run, evaluations)
+    return np.array([reached, run.cost - run.truth_cost, 100.0 - reached]), (
+        run,
+        evaluations,
+    )
 
 
 def _rank(place: Place) -> tuple[Any, ...]:
@@ -58,7 +61,9 @@ def _rank(place: Place) -> tuple[Any, ...]:
 
 
 def _place_name(place: Place) -> str:
-    return f"f{place['function']} in {place['dimension']}D, instance {place['instance']}"
+    return (
+        f"f{place['function']} in {place['dimension']}D, instance {place['instance']}"
+    )
 
 
 def _tested_errors(contest: Contest) -> Array:
@@ -66,39 +71,65 @@ def _tested_errors(contest: Contest) -> Array:
 
     A block is an instance of a function, the same pose in every dimension: the mean over seeds and dimensions.
     """
-    poses = [(place["function"], place["instance"], place["suite"]) for place in contest.places()]
+    poses = [
+        (place["function"], place["instance"], place["suite"])
+        for place in contest.places()
+    ]
     index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
     block = np.array([index[pose] for pose in poses])
-    sums = np.array([np.bincount(block, row) for row in contest.of("error").mean(axis=2)])
+    sums = np.array(
+        [np.bincount(block, row) for row in contest.of("error").mean(axis=2)]
+    )
     return np.asarray((sums / np.bincount(block))[:, :, None])
 
 
 def _board(contest: Contest) -> dict[int, dict[str, Any]]:
     """Return each method's mean share of targets, with the interval of other instances."""
-    strata, clusters = ([place[name] for place in contest.places()] for name in ("function", "instance"))
+    strata, clusters = (
+        [place[name] for place in contest.places()] for name in ("function", "instance")
+    )
     variants = contest.runs.variants
     board: dict[int, dict[str, Any]] = {
-        m: {"low": None, "high": None, "is_random": v["method"] == RANDOM} for m, v in enumerate(variants)
+        m: {"low": None, "high": None, "is_random": v["method"] == RANDOM}
+        for m, v in enumerate(variants)
     }
-    for m, shares in zip(contest.methods, contest.of("reached").mean(axis=2), strict=True):
+    for m, shares in zip(
+        contest.methods, contest.of("reached").mean(axis=2), strict=True
+    ):
         share = mean_interval(shares, strata, clusters)
-        board[m] |= {"reached": share.value, "low": max(share.low, 0.0), "high": min(share.high, 100.0)}
+        board[m] |= {
+            "reached": share.value,
+            "low": max(share.low, 0.0),
+            "high": min(share.high, 100.0),
+        }
     return board
 
 
 def _baseline_rows(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for random search, the best of its variants that take part; none if there is none."""
-    random = [k for k, m in enumerate(contest.methods) if contest.runs.variants[m]["method"] == RANDOM]
-    shares = [float(shares_of_runs.mean()) for shares_of_runs in contest.of("reached")[random]]
+    random = [
+        k
+        for k, m in enumerate(contest.methods)
+        if contest.runs.variants[m]["method"] == RANDOM
+    ]
+    shares = [
+        float(shares_of_runs.mean()) for shares_of_runs in contest.of("reached")[random]
+    ]
     return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
 
 
 def _place_words(contest: Contest) -> str:
     places = contest.places()
-    functions, dimensions = (sorted({place[name] for place in places}) for name in ("function", "dimension"))
-    instances = counted(len({(place["function"], place["instance"]) for place in places}), "instance")
+    functions, dimensions = (
+        sorted({place[name] for place in places}) for name in ("function", "dimension")
+    )
+    instances = counted(
+        len({(place["function"], place["instance"]) for place in places}), "instance"
+    )
     noun = "function" if len(functions) == 1 else "functions"
-    numbers = f"{listed(functions, len(functions))} in {listed(dimensions, len(dimensions))}"
+    numbers = (
+        f"{listed(functions, len(functions))} in {listed(dimensions, len(dimensions))}"
+    )
     return f"{noun} {numbers} dimensions, {instances} in all"
 
 
@@ -115,7 +146,9 @@ def _facts(runs: Runs) -> dict[str, Any]:
         "functions": [_function(number) for number in runs.values("function")],
         "dimensions": runs.values("dimension"),
         "seeds": f"{len(runs.seeds):,}",
-        "evaluations for each dimension": [f"{budget:g}" for budget in runs.values("budget")],
+        "evaluations for each dimension": [
+            f"{budget:g}" for budget in runs.values("budget")
+        ],
         "infeasible proposals": runs.values("infeasible"),
         "targets of a problem": f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} above the true pose's",
     }
@@ -127,28 +160,55 @@ def search_charts(contest: Contest) -> list[Chart]:
     Intervals are those that other instances would give.
     """
     functions, dimensions, instances = (
-        np.array([place[name] for place in contest.places()]) for name in ("function", "dimension", "instance")
+        np.array([place[name] for place in contest.places()])
+        for name in ("function", "dimension", "instance")
     )
     runs = [contest.runs.data["runs"][k] for k in map(int, contest.rows.ravel())]
     most = max(float(run.evaluations[-1]) / run.dimension for run in runs)
     evaluations = np.unique(np.geomspace(1.0, max(most, 1.0), POINTS))
-    used = contest.runs.data["hits"][contest.rows] / dimensions.astype(np.float64)[None, :, None, None]
+    used = (
+        contest.runs.data["hits"][contest.rows]
+        / dimensions.astype(np.float64)[None, :, None, None]
+    )
     numbers = np.unique(functions).tolist()
     parts = {"All functions": functions > 0}
-    parts |= {_function(number): functions == number for number in numbers if len(numbers) > 1}
+    parts |= {
+        _function(number): functions == number for number in numbers if len(numbers) > 1
+    }
     charts: list[Chart] = []
     for title, part in parts.items():
         lines = []
         for hits_of_method in used[:, part]:
-            shares = np.array([attained(hits_of_instance, evaluations) for hits_of_instance in hits_of_method]).T
+            shares = np.array(
+                [
+                    attained(hits_of_instance, evaluations)
+                    for hits_of_instance in hits_of_method
+                ]
+            ).T
             interval = mean_intervals(shares, functions[part], instances[part])
-            lines.append(Line(evaluations, interval.values, interval.low, interval.high))
-        x, y = "evaluations for each dimension", "share of targets reached"
+            lines.append(
+                Line(evaluations, interval.values, interval.low, interval.high)
+            )
+        x = "evaluations for each dimension"
+        y = "share of targets reached"
         chart = Chart(
-            name=f"chart-{len(charts)}", title=title, x_label=x, y_label=y, lines=lines, log=True, stepped=True
+            name=f"chart-{len(charts)}",
+            title=title,
+            x_label=x,
+            y_label=y,
+            lines=lines,
+            log=True,
+            stepped=True,
         )
         charts.append(chart)
-    end = min(1.0, 1.1 * max(0.05, *(float(line.y[-1]) for chart in charts for line in chart.lines if line)))
+    end = min(
+        1.0,
+        1.1
+        * max(
+            0.05,
+            *(float(line.y[-1]) for chart in charts for line in chart.lines if line),
+        ),
+    )
     return [replace(chart, most=end) for chart in charts]
 
 

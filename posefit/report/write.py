@@ -43,7 +43,9 @@ def write_report(
     ledger = Ledger(*paths)
     runs = runs_of(ledger)
     if runs.kind.name == "search" and figures is not None:
-        raise InputError("--figures must be given with a sweep of tracks, got one of single searches")
+        raise InputError(
+            "--figures must be given with a sweep of tracks, got one of single searches"
+        )
     data = data_of(ledger, runs)
     if out is not None:
         with replaced_file(out, MARK.encode()) as building:
@@ -65,7 +67,11 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     for text, details in report["header"]["problems"]:
         lines += [text, *(f"  {detail}" for detail in details)]
     lines += _board_lines(report) if "leaderboard" in report else []
-    return lines if report["out"] is None else [*lines, f"written to {report['out']}: open it in any browser"]
+    return (
+        lines
+        if report["out"] is None
+        else [*lines, f"written to {report['out']}: open it in any browser"]
+    )
 
 
 def _board_lines(report: dict[str, Any]) -> list[str]:
@@ -79,9 +85,16 @@ def _board_lines(report: dict[str, Any]) -> list[str]:
 
     def cells(row: dict[str, Any]) -> dict[str, str]:
         """Return what stands below each title."""
-        ends = "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
+        ends = (
+            ""
+            if row["low"] is None
+            else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
+        )
         shown = {title: number(row[score], digits), "  95 % interval": ends}
-        shown |= {"  behind": number(row["behind"], digits), "      p": number(row["p"], 3)}
+        shown |= {
+            "  behind": number(row["behind"], digits),
+            "      p": number(row["p"], 3),
+        }
         if score == "reached":
             return {**shown, "   above": number(row["above"], 2)}
         lost = "-" if row["lost"] is None else number(100.0 * row["lost"], 1)
@@ -90,20 +103,34 @@ def _board_lines(report: dict[str, Any]) -> list[str]:
 
     width = max(len(BASELINES[SKILL_OF]), *(len(row["name"]) for row in board))
     lines = [f"{'':{width}} {' '.join(cells(board[0]))}"]
-    lines += [f"{row['name']:{width}} " + " ".join(f"{v:>{len(k)}}" for k, v in cells(row).items()) for row in board]
-    compared = [row for row in report["baselines"] if row["baseline"] == SKILL_OF and row["error"] is not None]
-    return lines + [f"{BASELINES[SKILL_OF]:{width}} {row['error']:9.2f}" for row in compared]
+    lines += [
+        f"{row['name']:{width}} "
+        + " ".join(f"{v:>{len(k)}}" for k, v in cells(row).items())
+        for row in board
+    ]
+    compared = [
+        row
+        for row in report["baselines"]
+        if row["baseline"] == SKILL_OF and row["error"] is not None
+    ]
+    return lines + [
+        f"{BASELINES[SKILL_OF]:{width}} {row['error']:9.2f}" for row in compared
+    ]
 
 
 def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:
     if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
     if out is not None and not replaceable(Path(out), MARK.encode()):
-        raise InputError(f"{out}: expected a new name or an earlier report, got something else")
+        raise InputError(
+            f"{out}: expected a new name or an earlier report, got something else"
+        )
     places = [place for place in (out, *others) if place is not None]
     for place in places:
         if Path(place).resolve() == ledger.resolve() or places.count(place) > 1:
-            raise InputError(f"{place}: expected a place of its own for each of what is written, got it twice")
+            raise InputError(
+                f"{place}: expected a place of its own for each of what is written, got it twice"
+            )
         if place != out:
             check_new(place)
     for place in places:

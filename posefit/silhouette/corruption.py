@@ -10,7 +10,9 @@ import numpy as np
 
 from posefit.silhouette.mask import Mask, box_of
 
-HOLES, BLOBS = 12, 8  # how many at strength 1
+# how many at strength 1
+HOLES = 12
+BLOBS = 8
 SHADOW = 0.25  # how tall a shadow is at strength 1, as a share of the person
 EDGE = 0.02  # of the person's height: how far the edge wanders at strength 1
 
@@ -25,7 +27,9 @@ def corrupted(mask: Mask, noise: Mapping[str, float], rng: np.random.Generator) 
     return spoilt if spoilt.any() else mask
 
 
-def _discs(mask: Mask, count: int, radius: float, rng: np.random.Generator, inside: bool) -> Mask:
+def _discs(
+    mask: Mask, count: int, radius: float, rng: np.random.Generator, inside: bool
+) -> Mask:
     """Return round spots in or around the person, whose radii are about a share of the person's height."""
     left, top, right, bottom = box_of(mask)
     drawn = np.zeros(mask.shape, dtype=np.uint8)
@@ -36,18 +40,28 @@ def _discs(mask: Mask, count: int, radius: float, rng: np.random.Generator, insi
         else:
             x = rng.uniform(left - 0.3 * (bottom - top), right + 0.3 * (bottom - top))
             y = rng.uniform(top, bottom)
-        cv2.circle(drawn, (int(x), int(y)), max(1, round(radius * (bottom - top) * rng.uniform(0.5, 1.5))), 1, -1)
+        cv2.circle(
+            drawn,
+            (int(x), int(y)),
+            max(1, round(radius * (bottom - top) * rng.uniform(0.5, 1.5))),
+            1,
+            -1,
+        )
     return drawn.astype(bool)
 
 
 def holes(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round holes, as where clothes look like the background."""
-    return np.asarray(mask & ~_discs(mask, round(HOLES * strength), 0.03, rng, inside=True))
+    return np.asarray(
+        mask & ~_discs(mask, round(HOLES * strength), 0.03, rng, inside=True)
+    )
 
 
 def blobs(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round blobs around the person, as where something else moves."""
-    return np.asarray(mask | _discs(mask, round(BLOBS * strength), 0.04, rng, inside=False))
+    return np.asarray(
+        mask | _discs(mask, round(BLOBS * strength), 0.04, rng, inside=False)
+    )
 
 
 def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
@@ -57,7 +71,9 @@ def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     flat = SHADOW * strength
     matrix = np.array([[1.0, -lean, lean * bottom], [0.0, flat, (1.0 - flat) * bottom]])
     height, width = mask.shape
-    cast = cv2.warpAffine(mask.astype(np.uint8), matrix, (width, height), flags=cv2.INTER_NEAREST)
+    cast = cv2.warpAffine(
+        mask.astype(np.uint8), matrix, (width, height), flags=cv2.INTER_NEAREST
+    )
     return np.asarray(mask | cast.astype(bool))
 
 
@@ -78,7 +94,9 @@ def jitter(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     return wandering(mask, 0.0, 2.0 * reach, max(1.0, reach), rng)
 
 
-def wandering(mask: Mask, rim: float, reach: float, length: float, rng: np.random.Generator) -> Mask:
+def wandering(
+    mask: Mask, rim: float, reach: float, length: float, rng: np.random.Generator
+) -> Mask:
     """Return a mask (height, width) whose border is `rim` pixels outside of where it was, and wanders around that.
 
     `reach` is the standard deviation of how many pixels it wanders, and `length` the pixels over which it does.
@@ -86,7 +104,9 @@ def wandering(mask: Mask, rim: float, reach: float, length: float, rng: np.rando
     inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
     outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
     smooth = cv2.GaussianBlur(rng.standard_normal(mask.shape), (0, 0), length)
-    return np.asarray(inside - outside + rim + reach * smooth / max(float(smooth.std()), 1e-9) > 0.0)
+    return np.asarray(
+        inside - outside + rim + reach * smooth / max(float(smooth.std()), 1e-9) > 0.0
+    )
 
 
 CORRUPTIONS: dict[str, Callable[[Mask, float, np.random.Generator], Mask]] = {

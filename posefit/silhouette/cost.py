@@ -20,22 +20,39 @@ SCALE = 100.0  # S
 BETA = 0.5  # beta
 
 Areas = NDArray[np.int64]  # (..., 3): R, B, Y
-_NO_IMAGES: Bits = np.empty((0, 0, 0), dtype=np.uint64)  # where only the areas are wanted
+# where only the areas are wanted
+_NO_IMAGES: Bits = np.empty((0, 0, 0), dtype=np.uint64)
 T = TypeVar("T")
 
 
 def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
     """Return the arguments of `kernels.count_areas` before the poses. Made once, they hold for any number of calls."""
-    return _drawing(body, camera, kernels.Observed(*silhouette.bits, silhouette.pixels), _NO_IMAGES)
+    return _drawing(
+        body, camera, kernels.Observed(*silhouette.bits, silhouette.pixels), _NO_IMAGES
+    )
 
 
-def _drawing(body: Body, camera: Camera, observed: kernels.Observed, images: Bits) -> tuple[Any, ...]:
-    view = View(camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height)
+def _drawing(
+    body: Body, camera: Camera, observed: kernels.Observed, images: Bits
+) -> tuple[Any, ...]:
+    view = View(
+        camera.rotation,
+        camera.translation,
+        camera.focal,
+        camera.centre,
+        camera.width,
+        camera.height,
+    )
     return body.skeleton.chain, body.radii, view, observed, images
 
 
 def areas(
-    body: Body, camera: Camera, silhouette: Silhouette, poses: Array, translations: Array, threads: int = 1
+    body: Body,
+    camera: Camera,
+    silhouette: Silhouette,
+    poses: Array,
+    translations: Array,
+    threads: int = 1,
 ) -> Areas:
     """Return R, B, Y (n, 3) in pixels of poses (n, 66) with their root at translations (n, 3). SAPSO (3).
 
@@ -44,16 +61,21 @@ def areas(
     the silhouette's device. Raises InputError where shapes do not fit or poses are not finite.
     """
     # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
-    poses, translations = writeable(poses), writeable(translations)
+    poses = writeable(poses)
+    translations = writeable(translations)
     n = len(poses)
     if poses.ndim != 2 or poses.shape[1] != ANGLES:
         raise InputError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
     if translations.shape != (n, 3):
-        raise InputError(f"translations must have shape {(n, 3)}, got {translations.shape}")
+        raise InputError(
+            f"translations must have shape {(n, 3)}, got {translations.shape}"
+        )
     _check_finite("poses", poses)
     _check_finite("translations", translations)
     if silhouette.mask.shape != (camera.height, camera.width):
-        raise InputError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
+        raise InputError(
+            f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}"
+        )
     drawn.count_poses(n, silhouette)
     if silhouette.device == "cuda":
         from posefit.silhouette.cuda.areas import areas_on_device
@@ -71,7 +93,9 @@ def areas(
 
 def _check_finite(name: str, values: Array) -> None:
     if not np.isfinite(values).all():
-        raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(values))} numbers that are not")
+        raise InputError(
+            f"{name} must be finite, got {np.count_nonzero(~np.isfinite(values))} numbers that are not"
+        )
 
 
 def pose_costs(
@@ -90,7 +114,9 @@ def pose_costs(
     views = zip(cameras, silhouettes, strict=True)
     counts = [areas(body, *view, poses, translations, threads) for view in views]
     costs = [mismatch(view, beta) for view in known_views(counts, silhouettes)]
-    return mean_over_views(costs), counts[0][None] if len(counts) == 1 else np.stack(counts)
+    return mean_over_views(costs), counts[0][None] if len(counts) == 1 else np.stack(
+        counts
+    )
 
 
 def mean_over_views(costs: Sequence[Array]) -> Array:
@@ -100,17 +126,27 @@ def mean_over_views(costs: Sequence[Array]) -> Array:
 
 def known_views(views: Sequence[T], silhouettes: Sequence[Silhouette]) -> Sequence[T]:
     """Return those views of which something is known; all of them where nothing is."""
-    return [view for view, silhouette in zip(views, silhouettes, strict=True) if silhouette.known] or views
+    return [
+        view
+        for view, silhouette in zip(views, silhouettes, strict=True)
+        if silhouette.known
+    ] or views
 
 
-def only_camera(cameras: Sequence[Camera], silhouettes: Sequence[Silhouette]) -> Camera | None:
+def only_camera(
+    cameras: Sequence[Camera], silhouettes: Sequence[Silhouette]
+) -> Camera | None:
     """Return the camera that alone sees the person, and so cannot see how far away they are; None where several do."""
     seeing = known_views(cameras, silhouettes)
     return seeing[0] if len(seeing) == 1 else None
 
 
 def costs_in(
-    drawing: tuple[Any, ...], silhouette: Silhouette, poses: Array, translations: Array, beta: float = BETA
+    drawing: tuple[Any, ...],
+    silhouette: Silhouette,
+    poses: Array,
+    translations: Array,
+    beta: float = BETA,
 ) -> Array:
     """Return the cost (n,) of poses (n, 66) at translations (n, 3), with what `drawing_of` says of the silhouette.
 
@@ -124,9 +160,13 @@ def costs_in(
 
 def compile_kernels() -> None:
     """Compile what every cost needs, before processes are started each of which would compile it."""
-    point = Body(Skeleton("point", np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1)), ()), np.zeros((26, 2)))
+    point = Body(
+        Skeleton("point", np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1)), ()),
+        np.zeros((26, 2)),
+    )
     camera = Camera.around(np.zeros(3), 0.0, 1.0, (8, 8))
-    place, pose = np.zeros((1, 3)), np.zeros((1, ANGLES))
+    place = np.zeros((1, 3))
+    pose = np.zeros((1, ANGLES))
     point.skeleton.joints(pose, place)
     pose_costs(point, [camera], [Silhouette.of(np.ones((8, 8)))], pose, place)
 
@@ -138,7 +178,9 @@ def mismatch(areas: Areas, beta: float = BETA) -> Array:
     """
     counts = np.asarray(areas)
     if counts.ndim != 2 or counts.shape[1] != 3 or counts.dtype.kind not in "iuf":
-        raise InputError(f"areas must be numbers of shape (n, 3), got {counts.dtype} of shape {counts.shape}")
+        raise InputError(
+            f"areas must be numbers of shape (n, 3), got {counts.dtype} of shape {counts.shape}"
+        )
     costs = np.zeros(len(counts))
     kernels.add_mismatch(counts, SCALE, beta, costs)
     return costs
@@ -148,8 +190,12 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     """Return the mask (height, width) of one body, pose (66,), root at translation (3,)."""
     if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
         came = f"{np.shape(pose)} and {np.shape(translation)}"
-        raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
-    return np.asarray(masks_of(body, camera, np.asarray(pose)[None], np.asarray(translation)[None])[0])
+        raise InputError(
+            f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}"
+        )
+    return np.asarray(
+        masks_of(body, camera, np.asarray(pose)[None], np.asarray(translation)[None])[0]
+    )
 
 
 def masks_of(body: Body, camera: Camera, poses: Array, translations: Array) -> Mask:

@@ -27,7 +27,8 @@ class PoseCount:
     @contextmanager
     def counting(self) -> Iterator[None]:
         """Count what is drawn in the body; an outer count gets it as well."""
-        outer, before = _current.get(), self.poses
+        outer = _current.get()
+        before = self.poses
         token = _current.set(self)
         try:
             yield

@@ -23,14 +23,19 @@ TINT = 14.0  # and its colour, to within so many grey levels after scaling
 NOISE = 3  # pixels to a side, of which the majority decides
 SPECK = 0.004  # of the image's height: what an opening takes away
 GAP = 0.012  # of the image's height: what a closing joins
-PIECE_REACH = 0.06  # of the largest piece's height: pieces as near as that belong to the person
+# of the largest piece's height: pieces as near as that belong to the person
+PIECE_REACH = 0.06
 MIN_PIECE_AREA = 0.05  # of the largest piece's area: smaller pieces are noise
 RIVAL_AREA = 0.25  # of the largest person's area: a smaller one is none
-BRIDGE = 0.15  # of the person's height: shadow between parts of the person that are no farther apart is clothing
+# of the person's height: shadow between parts of the person that are no farther apart
+# is clothing
+BRIDGE = 0.15
 MAX_HOLE_AREA = 0.02  # of the person's area: a hole that is smaller is filled
 SAMPLES = 40  # frames that a median background looks at
 HISTORY = 500  # frames that a mixture remembers
-THRESHOLD = 25.0  # squared standard deviations from its nearest Gaussian, from which on a pixel is foreground
+# squared standard deviations from its nearest Gaussian, from which on a pixel is
+# foreground
+THRESHOLD = 25.0
 
 
 class Film(Protocol):
@@ -40,7 +45,9 @@ class Film(Protocol):
         """How many frames the video has."""
         ...
 
-    def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Image]:
+    def frames(
+        self, start: int = 0, stop: int | None = None, step: int = 1
+    ) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop."""
         ...
 
@@ -63,7 +70,8 @@ class Segmenter(Protocol):
         ...
 
 
-SegmenterFactory = Callable[..., Segmenter]  # called with a `Film`, and settings as keywords
+# called with a `Film`, and settings as keywords
+SegmenterFactory = Callable[..., Segmenter]
 
 
 @dataclass(frozen=True)
@@ -82,8 +90,12 @@ class Still:
         """Return where an image differs from the background, and where it is only darker."""
         away = cv2.absdiff(image, self.background)
         difference = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2])
-        changed = np.asarray(difference > np.maximum(MIN_DIFFERENCE_LEVELS, SPREADS * self.spread))
-        before, now = self.middle[changed], image[changed].astype(np.float32)  # the rest need not be looked at
+        changed = np.asarray(
+            difference > np.maximum(MIN_DIFFERENCE_LEVELS, SPREADS * self.spread)
+        )
+        # the rest need not be looked at
+        before = self.middle[changed]
+        now = image[changed].astype(np.float32)
         share = (now.mean(axis=1) + 1.0) / (before.mean(axis=1) + 1.0)
         tint = np.abs(now - before * share[:, None]).max(axis=1)
         shadow = np.zeros_like(changed)
@@ -93,10 +105,14 @@ class Still:
 
 def mean_background(images: Iterable[Image]) -> Still:
     """Return the background that is the mean of images without a person. Raises InputError where there is none."""
-    count, total, squares = 0, np.zeros(()), np.zeros(())
+    count = 0
+    total = np.zeros(())
+    squares = np.zeros(())
     for image in images:
         values = image.astype(np.float64)
-        count, total, squares = count + 1, total + values, squares + values**2
+        count = count + 1
+        total = total + values
+        squares = squares + values**2
     if not count:
         raise InputError("background must hold at least one frame, got none")
     middle = total / count
@@ -120,7 +136,12 @@ def median_background(images: Iterable[Image]) -> Still:
 class Mixture:
     """OpenCV's adaptive mixture of Gaussians, learned from all frames first, as in the SAPSO paper."""
 
-    def __init__(self, images: Iterable[Image], history: int = HISTORY, threshold: float = THRESHOLD) -> None:
+    def __init__(
+        self,
+        images: Iterable[Image],
+        history: int = HISTORY,
+        threshold: float = THRESHOLD,
+    ) -> None:
         self._model: Any = cv2.createBackgroundSubtractorMOG2(history, threshold, True)
         count = 0
         for image in images:
@@ -154,14 +175,23 @@ class Person:
     """One frame's mask, and how good it is."""
 
     mask: Mask = field(repr=False)
-    valid: Mask = field(repr=False)  # False where nothing is known: shadow, and what is ignored
+    # False where nothing is known: shadow, and what is ignored
+    valid: Mask = field(repr=False)
     area: int  # pixels
-    pieces: int  # how many the foreground had that are large enough to be a part of a person
-    rival: float  # the area of the largest piece that is not this person's, as a share of the person's
+    # how many the foreground had that are large enough to be a part of a person
+    pieces: int
+    # the area of the largest piece that is not this person's, as a share of the
+    # person's
+    rival: float
     touches_border: bool
 
 
-def people(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> list[Person]:
+def people(
+    foreground: Mask,
+    shadow: Mask,
+    roi: tuple[int, int, int, int] | None,
+    ignore: Mask | None,
+) -> list[Person]:
     """Return the people (height, width) of a foreground, the largest first, within `roi` x, y, width, height.
 
     There is always a first one, which is empty where no person is; others are at least a quarter as large.
@@ -178,13 +208,18 @@ def people(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None
     if ignore is not None:
         inside &= ~ignore
     known = ~shadow if ignore is None else ~shadow & ~ignore
-    changed = np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
+    changed = (
+        np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
+    )
     mask, pieces, _ = _largest(_cleaned(changed, height) & inside)
     if not pieces:
         return [Person(mask, known, 0, 0, 0.0, False)]
     size = int(np.ptp(np.flatnonzero(mask.any(axis=1)))) + 1
-    dark = _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
-    rest, result = _cleaned(changed | dark, height) & inside, list[Person]()
+    dark = (
+        _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
+    )
+    rest = _cleaned(changed | dark, height) & inside
+    result = list[Person]()
     while True:
         mask, pieces, rival = _largest(rest)
         rest &= ~mask
@@ -192,27 +227,41 @@ def people(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None
         area = int(mask.sum())
         if result and area < RIVAL_AREA * result[0].area:
             return result
-        result.append(Person(mask, known | mask, area, pieces, rival, touches_border(mask)))
+        result.append(
+            Person(mask, known | mask, area, pieces, rival, touches_border(mask))
+        )
         if rival * area < RIVAL_AREA * result[0].area:
             return result
 
 
 def _cleaned(mask: Mask, height: int) -> Mask:
-    return _morphed(_morphed(mask, cv2.MORPH_CLOSE, GAP * height), cv2.MORPH_OPEN, SPECK * height)
+    return _morphed(
+        _morphed(mask, cv2.MORPH_CLOSE, GAP * height), cv2.MORPH_OPEN, SPECK * height
+    )
 
 
 def _largest(mask: Mask) -> tuple[Mask, int, float]:
     """Return the largest piece with those near it, how many pieces count, and the share of the largest other."""
-    box, person = padded_box(mask, 0), np.zeros_like(mask)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask[box].astype(np.uint8), connectivity=8)
+    box = padded_box(mask, 0)
+    person = np.zeros_like(mask)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        mask[box].astype(np.uint8), connectivity=8
+    )
     if count < 2:
         return person, 0, 0.0
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest = 1 + int(areas.argmax())
-    reach = _morphed(labels == largest, cv2.MORPH_DILATE, 2.0 * PIECE_REACH * stats[largest, cv2.CC_STAT_HEIGHT])
+    reach = _morphed(
+        labels == largest,
+        cv2.MORPH_DILATE,
+        2.0 * PIECE_REACH * stats[largest, cv2.CC_STAT_HEIGHT],
+    )
     belongs_to_person = np.zeros(count, dtype=bool)
     belongs_to_person[labels[reach & mask[box]]] = True
-    rival = float(areas[~belongs_to_person[1:]].max(initial=0) / areas[belongs_to_person[1:]].sum())
+    rival = float(
+        areas[~belongs_to_person[1:]].max(initial=0)
+        / areas[belongs_to_person[1:]].sum()
+    )
     person[box] = belongs_to_person[labels]
     return person, int(np.count_nonzero(areas > MIN_PIECE_AREA * areas.max())), rival
 
@@ -220,18 +269,24 @@ def _largest(mask: Mask) -> tuple[Mask, int, float]:
 def _morphed(mask: Mask, operation: int, size: float) -> Mask:
     side = 2 * max(1, round(0.5 * size)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    box, morphed = padded_box(mask, side), np.zeros_like(mask)
+    box = padded_box(mask, side)
+    morphed = np.zeros_like(mask)
     morphed[box] = cv2.morphologyEx(mask[box].astype(np.uint8), operation, kernel) > 0
     return morphed
 
 
 def without_holes(mask: Mask, most: float = MAX_HOLE_AREA) -> Mask:
     """Return a mask whose holes are filled that have at most this share of its area."""
-    box, filled = padded_box(mask, 1), mask.copy()
-    count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask[box]).astype(np.uint8), connectivity=4)
+    box = padded_box(mask, 1)
+    filled = mask.copy()
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        (~mask[box]).astype(np.uint8), connectivity=4
+    )
     height, width = labels.shape
     lefts, tops, widths, heights, areas = stats[:count].T
-    enclosed = (lefts > 0) & (tops > 0) & (lefts + widths < width) & (tops + heights < height)
+    enclosed = (
+        (lefts > 0) & (tops > 0) & (lefts + widths < width) & (tops + heights < height)
+    )
     fills = enclosed & (areas <= most * mask.sum())
     fills[0] = False  # the person
     filled[box] |= fills[labels]

@@ -9,7 +9,13 @@ import numpy as np
 
 from posefit.arrays import Bits, inlined, jit
 from posefit.geometry.kernels import LANES, set_rows
-from posefit.silhouette.rasteriser import NONE, fill_pose, outline_poses, scratch, set_scene
+from posefit.silhouette.rasteriser import (
+    NONE,
+    fill_pose,
+    outline_poses,
+    scratch,
+    set_scene,
+)
 from posefit.silhouette.spans import STRIP_PIXELS, popcount
 
 
@@ -24,7 +30,8 @@ class Observed(NamedTuple):
 @inlined
 def count(image, observed, valid, box):
     """Return the pixels of the body and of its overlap with the observed silhouette, and clear the image."""
-    body, overlap = NONE, NONE
+    body = NONE
+    overlap = NONE
     for strip in range(box[2], box[3] + 1):
         words = image[strip][box[0] : box[1]]
         person = observed[strip][box[0] : box[1]]
@@ -44,7 +51,9 @@ def paint_bits(image, box, value, pixels):
     Bits past the image's right border may be set and count for nothing: no pixel stands for them.
     """
     height, width = pixels.shape
-    words = image.reshape(-1).view(np.uint32).reshape(image.shape[0], 2 * image.shape[1])
+    words = (
+        image.reshape(-1).view(np.uint32).reshape(image.shape[0], 2 * image.shape[1])
+    )
     for y in range(2 * box[0], min(2 * box[1], height)):
         for w in range(box[2], box[3] + 1):
             x = STRIP_PIXELS * w
@@ -62,8 +71,11 @@ def count_areas(chain, radii, view, observed, images, poses, translations, areas
 
     The bit images of the bodies are written to `images` (n, strips, words), where it is not empty.
     """
-    n, silhouette = poses.shape[0], np.uint64(observed.pixels)
-    person, valid, rows = observed.person, observed.valid, np.empty(LANES, np.int64)
+    n = poses.shape[0]
+    silhouette = np.uint64(observed.pixels)
+    person = observed.person
+    valid = observed.valid
+    rows = np.empty(LANES, np.int64)
     work = scratch(person.shape[0], person.shape[1])
     set_scene(work, 0, LANES, chain.offsets, radii, view)
     for first in range(0, n, LANES):
@@ -86,7 +98,9 @@ def count_areas(chain, radii, view, observed, images, poses, translations, areas
 def add_mismatch(areas, scale, beta, costs):
     """Add the mismatch of areas (n, 3) to costs (n,). SAPSO (4)."""
     for i in range(areas.shape[0]):
-        r, b, y = float(areas[i, 0]), float(areas[i, 1]), float(areas[i, 2])
+        r = float(areas[i, 0])
+        b = float(areas[i, 1])
+        y = float(areas[i, 2])
         # Interpretation S2: an empty denominator makes its term 1.
         spilled = b / (b + y) if b + y > 0.0 else 1.0
         missed = r / (r + y) if r + y > 0.0 else 1.0

@@ -16,7 +16,8 @@ from posefit.silhouette.spans import STRIP_PIXELS
 
 Mask = NDArray[np.bool_]  # (height, width)
 
-MIN_PIECE_PIXELS = 0.06  # of the largest piece's pixels, ours: a smaller one is left out of the person's borders
+# of the largest piece's pixels, ours: a smaller one is left out of the person's borders
+MIN_PIECE_PIXELS = 0.06
 
 
 def pack(mask: Mask) -> Bits:
@@ -38,7 +39,8 @@ def unpack(bits: Bits, width: int, height: int) -> Mask:
 
 def box_of(mask: Mask) -> tuple[int, int, int, int]:
     """Return left, top, right and bottom of a mask with pixels; the last two are the first outside."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows = np.flatnonzero(mask.any(axis=1))
+    columns = np.flatnonzero(mask.any(axis=0))
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
@@ -52,16 +54,21 @@ def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
     left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))
     if not wide:
         return slice(1), slice(1)
-    return slice(max(top - margin, 0), top + tall + margin), slice(max(left - margin, 0), left + wide + margin)
+    return slice(max(top - margin, 0), top + tall + margin), slice(
+        max(left - margin, 0), left + wide + margin
+    )
 
 
 def without_small_pieces(mask: Mask) -> Mask:
     """Return a mask without its small pieces, which are not the person."""
     box = padded_box(mask, 0)  # in less time than in the whole mask
-    count, numbers, pieces, _ = cv2.connectedComponentsWithStats(mask[box].astype(np.uint8), connectivity=8)
+    count, numbers, pieces, _ = cv2.connectedComponentsWithStats(
+        mask[box].astype(np.uint8), connectivity=8
+    )
     if count <= 2:
         return mask
-    sizes, cleaned = pieces[:, cv2.CC_STAT_AREA], np.zeros_like(mask)
+    sizes = pieces[:, cv2.CC_STAT_AREA]
+    cleaned = np.zeros_like(mask)
     large = sizes >= MIN_PIECE_PIXELS * sizes[1:].max()
     large[0] = False  # the background
     cleaned[box] = large[numbers]
@@ -74,12 +81,16 @@ class Silhouette:
 
     mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
     valid: Mask = field(repr=False)  # (height, width)
-    scale: int = 1  # every so many pixels of every so many rows of the full-size silhouette
+    # every so many pixels of every so many rows of the full-size silhouette
+    scale: int = 1
     device: str = "cpu"  # where poses are drawn to be compared with it
-    full_extent: tuple[float, ...] = field(default=(), repr=False)  # at full size, in these pixels; () where it is
+    # at full size, in these pixels; () where it is
+    full_extent: tuple[float, ...] = field(default=(), repr=False)
 
     @classmethod
-    def of(cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None) -> "Silhouette":
+    def of(
+        cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None
+    ) -> "Silhouette":
         """Return the silhouette of a mask (height, width), any value but 0 being the person.
 
         Pixels where `valid` is 0 are unknown and count for nothing. Both arrays are read-only: what a method writes
@@ -87,10 +98,18 @@ class Silhouette:
         """
         values = np.asarray(mask)
         if values.ndim != 2 or 0 in values.shape:
-            raise InputError(f"mask must have shape (height, width), got {values.shape}")
-        known = np.ones(values.shape, dtype=bool) if valid is None else np.array(valid, dtype=bool)
+            raise InputError(
+                f"mask must have shape (height, width), got {values.shape}"
+            )
+        known = (
+            np.ones(values.shape, dtype=bool)
+            if valid is None
+            else np.array(valid, dtype=bool)
+        )
         if known.shape != values.shape:
-            raise InputError(f"valid must have the mask's shape {values.shape}, got {known.shape}")
+            raise InputError(
+                f"valid must have the mask's shape {values.shape}, got {known.shape}"
+            )
         person = values.astype(bool, copy=False) & known
         for plane in (person, known):
             plane.flags.writeable = False
@@ -144,9 +163,13 @@ def coarser_camera(camera: Camera, factor: int) -> Camera:
     number `factor // 2`. Raises InputError where that is no pixel.
     """
     first = _first(factor, (camera.width, camera.height))
-    width, height = (len(range(first, side, factor)) for side in (camera.width, camera.height))
+    width, height = (
+        len(range(first, side, factor)) for side in (camera.width, camera.height)
+    )
     centre = (camera.centre - first - 0.5) / factor + 0.5
-    return replace(camera, width=width, height=height, focal=camera.focal / factor, centre=centre)
+    return replace(
+        camera, width=width, height=height, focal=camera.focal / factor, centre=centre
+    )
 
 
 def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
@@ -156,14 +179,26 @@ def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
     majority of each block, the other way to make a mask smaller, is no picture that such a camera takes of a body.
     """
     first = _first(factor, silhouette.size)
-    mask, valid = (pixels[first::factor, first::factor] for pixels in (silhouette.mask, silhouette.valid))
+    mask, valid = (
+        pixels[first::factor, first::factor]
+        for pixels in (silhouette.mask, silhouette.valid)
+    )
     # the full-size borders, so that poses aligned to them stand where they stand at full size
     extent = tuple((np.array(silhouette.extent) - first - 0.5) / factor + 0.5)
-    scale, device = silhouette.scale * factor, silhouette.device
-    return replace(Silhouette.of(mask, valid), scale=scale, device=device, full_extent=extent)
+    scale = silhouette.scale * factor
+    device = silhouette.device
+    return replace(
+        Silhouette.of(mask, valid), scale=scale, device=device, full_extent=extent
+    )
 
 
 def _first(factor: int, size: tuple[int, int]) -> int:
-    if isinstance(factor, bool) or not isinstance(factor, int | np.integer) or not 1 <= factor <= min(size):
-        raise InputError(f"factor must be a whole number from 1 to the smaller side {min(size)}, got {quoted(factor)}")
+    if (
+        isinstance(factor, bool)
+        or not isinstance(factor, int | np.integer)
+        or not 1 <= factor <= min(size)
+    ):
+        raise InputError(
+            f"factor must be a whole number from 1 to the smaller side {min(size)}, got {quoted(factor)}"
+        )
     return int(factor) // 2

@@ -14,20 +14,38 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array, inlined, jit
-from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, place_lanes, set_offsets, set_view
+from posefit.geometry.kernels import (
+    LANES,
+    NATURAL,
+    X,
+    Y,
+    Z,
+    empty_lanes,
+    place_lanes,
+    set_offsets,
+    set_view,
+)
 from posefit.silhouette.spans import BLOCK, STRIP_PIXELS, set_spans
 
-NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
+# metres; a bone with an end outside of this depth is not drawn
+NEAR = 0.05
+FAR = 1e6
 NONE = np.uint64(0)
 _NOWHERE = 1 << 20  # a block or strip beyond every image
 FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
-ZERO, ONE, WINDOW = np.float32(0), np.float32(1), np.float32(2 * STRIP_PIXELS)
-HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
+ZERO = np.float32(0)
+ONE = np.float32(1)
+WINDOW = np.float32(2 * STRIP_PIXELS)
+HUGE = np.float32(1e9)
+_NAN = np.float32(np.nan)
 
 # Scratch rows of LANES poses, each with ROOM for what there is of them, in one flat array as in `geometry.kernels`.
-ROOM, CONES = 32 * LANES, 26 * LANES
-_U0, _V0, _D0, _U, _V, _D = (row * ROOM for row in range(6))  # where bones start, and joints: pixels, and 1 / depth
-_SCALED = 6 * ROOM  # radii in pixels, where the depth is 1, at the start of bones and at their end
+ROOM = 32 * LANES
+CONES = 26 * LANES
+# where bones start, and joints: pixels, and 1 / depth
+_U0, _V0, _D0, _U, _V, _D = (row * ROOM for row in range(6))
+# radii in pixels, where the depth is 1, at the start of bones and at their end
+_SCALED = 6 * ROOM
 _BLOCK, _STOP_BLOCK, _FIRST, _LAST, _ROW = (row * ROOM for row in range(5))
 _X0, _Y0, _S0, _X1, _Y1, _S1 = (row * ROOM for row in range(6))
 _XP, _MP, _PA, _PB, _XQ, _MQ, _QA, _QB = (row * ROOM for row in range(6, 14))
@@ -51,7 +69,9 @@ class View(NamedTuple):
 
 def strips_and_words(width: int, height: int) -> tuple[int, int]:
     """Return the shape of an image's bit image."""
-    return 2 * ((width + 2 * STRIP_PIXELS - 1) // (2 * STRIP_PIXELS)), (height + BLOCK - 1) // BLOCK * (BLOCK // 2)
+    return 2 * ((width + 2 * STRIP_PIXELS - 1) // (2 * STRIP_PIXELS)), (
+        height + BLOCK - 1
+    ) // BLOCK * (BLOCK // 2)
 
 
 @inlined
@@ -61,15 +81,24 @@ def project(parents, lanes, ends):
         z = lanes[Z + k]
         inside = (z >= NEAR) & (z <= FAR)  # false for nan as well
         depth = 1.0 / (z if inside else 1.0)
-        u, v = lanes[X + k] * depth if inside else 0.0, lanes[Y + k] * depth if inside else 0.0
+        u = lanes[X + k] * depth if inside else 0.0
+        v = lanes[Y + k] * depth if inside else 0.0
         ends[_U + k], ends[_V + k], ends[_D + k] = u, v, depth if inside else 0.0
     for k in range(CONES):  # most bones start where the one before ends
-        ends[_U0 + k], ends[_V0 + k], ends[_D0 + k] = ends[_U + k], ends[_V + k], ends[_D + k]
+        ends[_U0 + k], ends[_V0 + k], ends[_D0 + k] = (
+            ends[_U + k],
+            ends[_V + k],
+            ends[_D + k],
+        )
     for b in range(parents.size):
         if parents[b] != b:
-            at, start = LANES * b, LANES * (parents[b] & NATURAL)
+            at = LANES * b
+            start = LANES * (parents[b] & NATURAL)
             for k in range(LANES):
-                ends[_U0 + at + k], ends[_V0 + at + k] = ends[_U + start + k], ends[_V + start + k]
+                ends[_U0 + at + k], ends[_V0 + at + k] = (
+                    ends[_U + start + k],
+                    ends[_V + start + k],
+                )
                 ends[_D0 + at + k] = ends[_D + start + k]
 
 
@@ -82,8 +111,12 @@ def outline(ends, lines, bounds, strips, width, height):
     or none in common, and a processor that has just written one can read it again at once.
     """
     for k in range(CONES):
-        u0, v0, r0 = ends[_U0 + k], ends[_V0 + k], ends[_D0 + k] * ends[_SCALED + k]
-        u1, v1, r1 = ends[_U + LANES + k], ends[_V + LANES + k], ends[_D + LANES + k] * ends[_SCALED + ROOM + k]
+        u0 = ends[_U0 + k]
+        v0 = ends[_V0 + k]
+        r0 = ends[_D0 + k] * ends[_SCALED + k]
+        u1 = ends[_U + LANES + k]
+        v1 = ends[_V + LANES + k]
+        r1 = ends[_D + LANES + k] * ends[_SCALED + ROOM + k]
         dx = u1 - u0
         dy = v1 - v0
         dr = r0 - r1
@@ -97,11 +130,20 @@ def outline(ends, lines, bounds, strips, width, height):
         bottom = max(min(np.floor(max(v0 + r0, v1 + r1)) + 1.0, height), 0.0)
         left = min(max(np.ceil(min(u0 - r0, u1 - r1)), 0.0), width)
         right = max(min(np.floor(max(u0 + r0, u1 + r1)) + 1.0, width), 0.0)
-        drawn = (top < bottom) & (left < right) & (ends[_D0 + k] > 0.0) & (ends[_D + LANES + k] > 0.0)
+        drawn = (
+            (top < bottom)
+            & (left < right)
+            & (ends[_D0 + k] > 0.0)
+            & (ends[_D + LANES + k] > 0.0)
+        )
         first = np.int32(top) // BLOCK
         bounds[_BLOCK + k] = first if drawn else _NOWHERE
-        bounds[_STOP_BLOCK + k] = (np.int32(bottom) + (BLOCK - 1)) // BLOCK if drawn else 0
-        bounds[_FIRST + k] = min(np.int32(left) // STRIP_PIXELS, strips - 2) if drawn else _NOWHERE
+        bounds[_STOP_BLOCK + k] = (
+            (np.int32(bottom) + (BLOCK - 1)) // BLOCK if drawn else 0
+        )
+        bounds[_FIRST + k] = (
+            min(np.int32(left) // STRIP_PIXELS, strips - 2) if drawn else _NOWHERE
+        )
         bounds[_LAST + k] = (np.int32(right) - 1) // STRIP_PIXELS if drawn else -1
         bounds[_ROW + k] = BLOCK * (first + 1) - np.int32(top)
         lines[_X0 + k] = u0
@@ -131,7 +173,11 @@ def bounding_box(lane, bounds, box):
 
     Returns how many windows of two strips its widest cone has.
     """
-    top, bottom, left, right, most = _NOWHERE, 0, _NOWHERE, -1, 0
+    top = _NOWHERE
+    bottom = 0
+    left = _NOWHERE
+    right = -1
+    most = 0
     for b in range(CONES // LANES):
         k = (LANES * b + lane) & NATURAL
         top = min(top, int(bounds[_BLOCK + k]))
@@ -139,7 +185,12 @@ def bounding_box(lane, bounds, box):
         left = min(left, int(bounds[_FIRST + k]))
         right = max(right, int(bounds[_LAST + k]))
         most = max(most, int(bounds[_LAST + k]) - int(bounds[_FIRST + k]))
-    box[0], box[1], box[2], box[3] = top * (BLOCK // 2), bottom * (BLOCK // 2), left, right
+    box[0], box[1], box[2], box[3] = (
+        top * (BLOCK // 2),
+        bottom * (BLOCK // 2),
+        left,
+        right,
+    )
     return most // 2 + 1
 
 
@@ -154,7 +205,9 @@ def window(step, k, bounds, lines, keys, strips, stride):
     keys[k] = (np.int64(place) << 32) + np.int64(bounds[_ROW + k] * ROOM + k)
     column = np.float32(np.int32(STRIP_PIXELS * strip))
     lines[_COLUMN + k] = column
-    lines[_STOP + k] = min(np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, WINDOW)
+    lines[_STOP + k] = min(
+        np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, WINDOW
+    )
 
 
 @inlined
@@ -164,7 +217,8 @@ def list_blocks(step, lane, bounds, lines, keys, steps, strips, stride):
     `steps` are _NEXT all through: only where a cone begins is another one written. A loop over the blocks of each cone
     would end for every cone at another number, and a mispredicted branch costs as much as a block.
     """
-    end, after = 0, 0
+    end = 0
+    after = 0
     for b in range(CONES // LANES):
         k = (LANES * b + lane) & NATURAL
         if step == 0 or bounds[_FIRST + k] + 2 * step <= bounds[_LAST + k]:
@@ -186,11 +240,22 @@ def columns(spans, lines, j, row):
     `row` is the first of them. Columns are counted from the first pixel of the cone's window. Rows above and below the
     cone are empty: what a row does not cross is nan, which min and max pass over.
     """
-    column, stop = lines[_COLUMN + j], lines[_STOP + j]
-    x0, y0, s0 = lines[_X0 + j], lines[_Y0 + j], lines[_S0 + j]
-    x1, y1, s1 = lines[_X1 + j], lines[_Y1 + j], lines[_S1 + j]
-    xp, mp, pa, pb = lines[_XP + j], lines[_MP + j], lines[_PA + j], lines[_PB + j]
-    xq, mq, qa, qb = lines[_XQ + j], lines[_MQ + j], lines[_QA + j], lines[_QB + j]
+    column = lines[_COLUMN + j]
+    stop = lines[_STOP + j]
+    x0 = lines[_X0 + j]
+    y0 = lines[_Y0 + j]
+    s0 = lines[_S0 + j]
+    x1 = lines[_X1 + j]
+    y1 = lines[_Y1 + j]
+    s1 = lines[_S1 + j]
+    xp = lines[_XP + j]
+    mp = lines[_MP + j]
+    pa = lines[_PA + j]
+    pb = lines[_PB + j]
+    xq = lines[_XQ + j]
+    mq = lines[_MQ + j]
+    qa = lines[_QA + j]
+    qb = lines[_QB + j]
     for k in range(BLOCK):
         y = row + np.float32(k - BLOCK)
         x = xp + mp * y
@@ -252,7 +317,8 @@ def outline_poses(chain, poses, places, rows, width, height, work):
     lanes, (ends, lines, bounds, _, keys, _, _), image = work
     place_lanes(chain, poses, places, rows, lanes)
     project(chain.parents, lanes, ends)
-    strips, stride = image.shape[0], 2 * image.shape[1]
+    strips = image.shape[0]
+    stride = 2 * image.shape[1]
     outline(ends, lines, bounds, strips, float(width), float(height))
     for k in range(CONES):
         window(0, k, bounds, lines, keys, strips, stride)
@@ -265,12 +331,20 @@ def fill_pose(lane, work):
     The lane's outline is used up.
     """
     _, (_, lines, bounds, spans, keys, steps, box), image = work
-    strips, stride = image.shape[0], 2 * image.shape[1]
+    strips = image.shape[0]
+    stride = 2 * image.shape[1]
     for step in range(bounding_box(lane, bounds, box)):
         block = -_NEXT
-        for i in range(list_blocks(step, lane, bounds, lines, keys, steps, strips, stride)):
+        for i in range(
+            list_blocks(step, lane, bounds, lines, keys, steps, strips, stride)
+        ):
             block += steps[i]
             steps[i] = _NEXT
-            columns(spans, lines, block & (ROOM - 1), np.float32((block & 0xFFFFFFFF) // ROOM))
+            columns(
+                spans,
+                lines,
+                block & (ROOM - 1),
+                np.float32((block & 0xFFFFFFFF) // ROOM),
+            )
             set_spans(image, block >> 32, stride, spans)
     return image, box

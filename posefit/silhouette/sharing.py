@@ -10,9 +10,11 @@ from threading import Lock
 from typing import Any
 
 PART = 384  # poses: what is decoded of them is 0.5 MB, and stays in the cache of a core
-SHARED_PART = 128  # where several threads take parts in turn: the last one to be done is waited for
+# where several threads take parts in turn: the last one to be done is waited for
+SHARED_PART = 128
 POOL = "posefit"  # the name of its threads, which end with the process
-LEAST_SHARE = 16  # poses; a smaller share of work is not worth handing to another thread
+# poses; a smaller share of work is not worth handing to another thread
+LEAST_SHARE = 16
 
 
 @lru_cache
@@ -23,11 +25,16 @@ def parts_of(n: int, threads: int) -> tuple[slice, ...]:
         return (slice(0, n),)
     longest = PART if shares == 1 else SHARED_PART
     count = shares * max(-(-n // (shares * longest)), 1)
-    return tuple(slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1)))
+    return tuple(
+        slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1))
+    )
 
 
 def work_through(
-    parts: Sequence[slice], threads: int, take: Callable[[slice], Sequence[Any]], work: Callable[..., None]
+    parts: Sequence[slice],
+    threads: int,
+    take: Callable[[slice], Sequence[Any]],
+    work: Callable[..., None],
 ) -> None:
     """Call `work(part, *take(part))` for every part.
 
@@ -37,7 +44,8 @@ def work_through(
         for part in parts:
             work(part, *take(part))
         return
-    waiting, turn = iter(parts), Lock()
+    waiting = iter(parts)
+    turn = Lock()
 
     def take_turns() -> None:
         while True:
@@ -49,7 +57,10 @@ def work_through(
             work(part, *taken)
 
     # in a copy of this thread's context, where it is known who counts the poses
-    others = [_pool(threads).submit(copy_context().run, take_turns) for _ in range(min(threads, len(parts)) - 1)]
+    others = [
+        _pool(threads).submit(copy_context().run, take_turns)
+        for _ in range(min(threads, len(parts)) - 1)
+    ]
     take_turns()
     for other in others:
         if not other.cancel():

@@ -21,7 +21,9 @@ def popcount(bits: Any) -> int:
 
 @intrinsic
 def _ctpop(typing_context: Any, bits: Any) -> Any:  # noqa: ARG001 - numba calls both functions by these names
-    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.ctpop(arguments[0])  # noqa: ARG005
+    return types.uint64(
+        types.uint64
+    ), lambda context, builder, signature, arguments: builder.ctpop(arguments[0])  # noqa: ARG005
 
 
 @overload(popcount)
@@ -37,14 +39,25 @@ def set_spans(image: Any, place: Any, stride: Any, spans: Any) -> None:
     """
     pixels = image.reshape(-1).view(np.uint32)
     for k in range(BLOCK):
-        first, stop = int(spans[k]), max(int(spans[k]), int(spans[BLOCK + k]))
-        bits = ((1 << stop) - (1 << first)) & 0xFFFFFFFFFFFFFFFF if first < 2 * STRIP_PIXELS else 0
+        first = int(spans[k])
+        stop = max(int(spans[k]), int(spans[BLOCK + k]))
+        bits = (
+            ((1 << stop) - (1 << first)) & 0xFFFFFFFFFFFFFFFF
+            if first < 2 * STRIP_PIXELS
+            else 0
+        )
         pixels[place + k] |= np.uint32(bits & 0xFFFFFFFF)
         pixels[place + stride + k] |= np.uint32(bits >> STRIP_PIXELS)
 
 
 @intrinsic
-def _set_spans(typing_context: Any, image: Any, place: Any, stride: Any, spans: Any) -> Any:  # noqa: ARG001
+def _set_spans(
+    typing_context: Any,  # noqa: ARG001
+    image: Any,
+    place: Any,  # noqa: ARG001
+    stride: Any,  # noqa: ARG001
+    spans: Any,
+) -> Any:
     return types.void(image, types.int64, types.int64, spans), _build_spans
 
 
@@ -68,17 +81,30 @@ def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> 
 
     def shifted(shift: Any, by: Any) -> Any:
         # a shift by 32 and more leaves nothing: one instruction on x86 with AVX2, without the choice
-        return builder.select(builder.icmp_unsigned("<", by, splat(STRIP_PIXELS)), shift(splat(-1), by), splat(0))
+        return builder.select(
+            builder.icmp_unsigned("<", by, splat(STRIP_PIXELS)),
+            shift(splat(-1), by),
+            splat(0),
+        )
 
     def add_bits(at: Any, bits: Any) -> None:
         words = lanes_at(signature.args[0], image, at)
         builder.store(builder.or_(builder.load(words, align=4), bits), words, align=4)
 
     first, stop = (
-        builder.load(lanes_at(signature.args[3], spans, ir.Constant(ir.IntType(64), at)), align=4) for at in (0, BLOCK)
+        builder.load(
+            lanes_at(signature.args[3], spans, ir.Constant(ir.IntType(64), at)), align=4
+        )
+        for at in (0, BLOCK)
     )
     stop = builder.select(builder.icmp_signed(">", stop, first), stop, first)
-    add_bits(place, builder.xor(shifted(builder.shl, first), shifted(builder.shl, stop)))  # bits from k on
+    # bits from k on
+    add_bits(
+        place, builder.xor(shifted(builder.shl, first), shifted(builder.shl, stop))
+    )
     first, stop = (builder.sub(splat(2 * STRIP_PIXELS), k) for k in (first, stop))
-    add_bits(builder.add(place, stride), builder.xor(shifted(builder.lshr, first), shifted(builder.lshr, stop)))
+    add_bits(
+        builder.add(place, stride),
+        builder.xor(shifted(builder.lshr, first), shifted(builder.lshr, stop)),
+    )
     return context.get_dummy_value()

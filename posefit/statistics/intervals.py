@@ -40,7 +40,9 @@ def iqm(errors: ArrayLike) -> Array:
     return np.asarray(trim_mean(array.reshape(len(array), -1), TRIMMED, axis=1))
 
 
-def iqm_intervals(errors: ArrayLike, rng: np.random.Generator, *, resamples: int = RESAMPLES) -> Intervals:
+def iqm_intervals(
+    errors: ArrayLike, rng: np.random.Generator, *, resamples: int = RESAMPLES
+) -> Intervals:
     """Return the interquartile mean of each method with its interval, of errors (methods, instances, seeds).
 
     The interval is for other seeds on these instances: seeds are resampled within each instance. It is
@@ -59,9 +61,12 @@ def iqm_intervals(errors: ArrayLike, rng: np.random.Generator, *, resamples: int
     array = finite("errors", errors, ("methods", "instances", "seeds"))
     if resamples < MIN_RESAMPLES:
         raise InputError(f"resamples must be at least {MIN_RESAMPLES}, got {resamples}")
-    values, seeds = iqm(array), array.shape[2]
+    values = iqm(array)
+    seeds = array.shape[2]
     if seeds == 1 or array[0].size < MIN_RUNS:
-        return Intervals(values, np.full(len(array), np.nan), np.full(len(array), np.nan))
+        return Intervals(
+            values, np.full(len(array), np.nan), np.full(len(array), np.nan)
+        )
     pivots = np.empty((len(array), resamples))
     strata = np.arange(array.shape[1])[:, None]
     step = max(1, _BLOCK // array[0].size)
@@ -70,16 +75,27 @@ def iqm_intervals(errors: ArrayLike, rng: np.random.Generator, *, resamples: int
         drawn = rng.integers(seeds, size=(count, array.shape[1], seeds), dtype=np.int32)
         for m, runs in enumerate(array):
             means, errors_of_means = _estimate(runs[strata, drawn])
-            with np.errstate(divide="ignore", invalid="ignore"):  # a resample may have no spread at all
+            # a resample may have no spread at all
+            with np.errstate(divide="ignore", invalid="ignore"):
                 pivots[m, start : start + count] = (means - values[m]) / errors_of_means
     pivots[np.isnan(pivots)] = 0.0
     # Pivots may be infinite, so an end is one of them and never a mean of two.
-    upper, lower = np.quantile(pivots, [0.5 + LEVEL / 2.0, 0.5 - LEVEL / 2.0], axis=1, method="inverted_cdf")
+    upper, lower = np.quantile(
+        pivots, [0.5 + LEVEL / 2.0, 0.5 - LEVEL / 2.0], axis=1, method="inverted_cdf"
+    )
     spread = _estimate(array)[1]
     with np.errstate(invalid="ignore"):
-        low, high = (np.where(spread > 0.0, values - pivot * spread, values) for pivot in (upper, lower))
-    least, most = array.min(axis=(1, 2)), array.max(axis=(1, 2))
-    return Intervals(values, np.minimum(np.maximum(low, least), values), np.maximum(np.minimum(high, most), values))
+        low, high = (
+            np.where(spread > 0.0, values - pivot * spread, values)
+            for pivot in (upper, lower)
+        )
+    least = array.min(axis=(1, 2))
+    most = array.max(axis=(1, 2))
+    return Intervals(
+        values,
+        np.minimum(np.maximum(low, least), values),
+        np.maximum(np.minimum(high, most), values),
+    )
 
 
 def _estimate(runs: Array) -> tuple[Array, Array]:
@@ -90,6 +106,8 @@ def _estimate(runs: Array) -> tuple[Array, Array]:
     ordered = np.partition(runs.reshape(n, count), (cut, count - cut - 1), axis=1)
     ends = ordered[:, [cut, count - cut - 1], None, None]
     winsorised = np.clip(runs, ends[:, 0], ends[:, 1])
-    variance = winsorised.var(axis=2, ddof=1).sum(axis=1) / (instances * instances * seeds)
+    variance = winsorised.var(axis=2, ddof=1).sum(axis=1) / (
+        instances * instances * seeds
+    )
     remaining = 1.0 - 2.0 * cut / count
     return ordered[:, cut : count - cut].mean(axis=1), np.sqrt(variance) / remaining

@@ -20,16 +20,22 @@ class Mean:
     high: float
 
 
-def mean_interval(values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *, level: float = LEVEL) -> Mean:
+def mean_interval(
+    values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *, level: float = LEVEL
+) -> Mean:
     """Return the mean of values (n,) with the interval that other clusters of the same strata would give.
 
     See `mean_intervals`, which does the same for several rows of values.
     """
-    means = mean_intervals(finite("values", values, ("n",))[None], strata, clusters, level=level)
+    means = mean_intervals(
+        finite("values", values, ("n",))[None], strata, clusters, level=level
+    )
     return Mean(float(means.values[0]), float(means.low[0]), float(means.high[0]))
 
 
-def mean_intervals(values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *, level: float = LEVEL) -> Intervals:
+def mean_intervals(
+    values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *, level: float = LEVEL
+) -> Intervals:
     """Return the means (rows,) of values (rows, n) with the intervals that other clusters of the strata would give.
 
     Each value belongs to a stratum (n,), such as a kind of problem, and in it to a cluster (n,), such as an instance
@@ -40,11 +46,15 @@ def mean_intervals(values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *,
     """
     array = finite("values", values, ("rows", "n"))
     rows, count = array.shape
-    kinds, drawn = np.asarray(strata), np.asarray(clusters)
+    kinds = np.asarray(strata)
+    drawn = np.asarray(clusters)
     if kinds.shape != (count,) or drawn.shape != (count,):
-        raise InputError(f"strata and clusters must have shape {(count,)}, got {kinds.shape} and {drawn.shape}")
+        raise InputError(
+            f"strata and clusters must have shape {(count,)}, got {kinds.shape} and {drawn.shape}"
+        )
     means = array.mean(axis=1)
-    variance, weighed = np.zeros(rows), np.zeros(rows)
+    variance = np.zeros(rows)
+    weighed = np.zeros(rows)
     for kind in np.unique(kinds):
         of_kind = array[:, kinds == kind]
         names, cluster = np.unique(drawn[kinds == kind], return_inverse=True)

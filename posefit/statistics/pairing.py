@@ -12,18 +12,31 @@ from numpy.typing import ArrayLike
 from posefit.arrays import Array
 from posefit.errors import InputError
 
-MIN_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
+# of the runs of all methods but one, that are shared with it; below, it does not take
+# part
+MIN_SHARE = 0.5
 
 
-def finite(name: str, values: ArrayLike, dimensions: tuple[str, ...], least: tuple[int, ...] | None = None) -> Array:
+def finite(
+    name: str,
+    values: ArrayLike,
+    dimensions: tuple[str, ...],
+    least: tuple[int, ...] | None = None,
+) -> Array:
     """Return finite numbers of that many dimensions, each at least 1 long or as `least` says, or raise ValueError."""
     array = np.asarray(values, dtype=np.float64)
     least = least or (1,) * len(dimensions)
-    if array.ndim != len(dimensions) or any(n < m for n, m in zip(array.shape, least, strict=True)):
+    if array.ndim != len(dimensions) or any(
+        n < m for n, m in zip(array.shape, least, strict=True)
+    ):
         needed = f", at least {least}" if max(least) > 1 else ""
-        raise InputError(f"{name} must have shape ({', '.join(dimensions)}){needed}, got {array.shape}")
+        raise InputError(
+            f"{name} must have shape ({', '.join(dimensions)}){needed}, got {array.shape}"
+        )
     if not np.isfinite(array).all():
-        raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not")
+        raise InputError(
+            f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not"
+        )
     return array
 
 
@@ -38,13 +51,17 @@ class Shared:
     methods: tuple[int, ...]  # that take part
     instances: tuple[int, ...]
     rows: Array  # (methods, instances, seeds) which row each is
-    blocks: Array  # (methods, blocks) the same of each block; these are more where instances differ in their seeds
+    # (methods, blocks) the same of each block; these are more where instances differ in
+    # their seeds
+    blocks: Array
     left_out: int  # runs of these methods that not all of them have
     # instances without a shared run, and the methods without any there
     missing: tuple[tuple[int, tuple[int, ...]], ...]
 
 
-def most_shared(method: Array, instance: Array, seed: Array, error: Array) -> Shared | None:
+def most_shared(
+    method: Array, instance: Array, seed: Array, error: Array
+) -> Shared | None:
     """Return the runs of as many methods as share enough; None where no run has an error.
 
     Of each run (n,) there are its method, instance and seed as indices, and its error, nan where it has none. A method
@@ -61,7 +78,9 @@ def most_shared(method: Array, instance: Array, seed: Array, error: Array) -> Sh
     accepted: list[int] = []
     for m in most_first:
         candidate = _shared(runs, [*accepted, m])
-        if candidate is not None and (best is None or candidate.rows[0].size >= MIN_SHARE * best.rows[0].size):
+        if candidate is not None and (
+            best is None or candidate.rows[0].size >= MIN_SHARE * best.rows[0].size
+        ):
             best = candidate
             accepted.append(m)
     return best
@@ -80,7 +99,9 @@ def _shared(runs: Array, methods: list[int]) -> Shared | None:
     if not everywhere.any():
         return None
     blocks = table.compress(everywhere, axis=1)
-    instances, first, counts = np.unique(names[everywhere] // seeds, return_index=True, return_counts=True)
+    instances, first, counts = np.unique(
+        names[everywhere] // seeds, return_index=True, return_counts=True
+    )
     all_instances, start = np.unique(names // seeds, return_index=True)
     absent = ~np.logical_or.reduceat(present, start, axis=1)
     missing = np.flatnonzero(~np.isin(all_instances, instances))
@@ -91,6 +112,7 @@ def _shared(runs: Array, methods: list[int]) -> Shared | None:
         blocks=blocks,
         left_out=len(row) - blocks.size,
         missing=tuple(
-            (int(all_instances[k]), tuple(np.array(methods)[absent[:, k]].tolist())) for k in missing.tolist()
+            (int(all_instances[k]), tuple(np.array(methods)[absent[:, k]].tolist()))
+            for k in missing.tolist()
         ),
     )

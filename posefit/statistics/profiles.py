@@ -25,9 +25,12 @@ def attained(hits: ArrayLike, evaluations: ArrayLike) -> Array:
 
     The empirical distribution of running times over runs and targets: Hansen et al., COCO, 2021.
     """
-    times, grid = np.sort(np.asarray(hits, dtype=np.float64), axis=None), finite("evaluations", evaluations, ("p",))
+    times = np.sort(np.asarray(hits, dtype=np.float64), axis=None)
+    grid = finite("evaluations", evaluations, ("p",))
     if not len(times) or np.isnan(times).any():
-        raise InputError(f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(times))} nan of {len(times)}")
+        raise InputError(
+            f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(times))} nan of {len(times)}"
+        )
     return np.searchsorted(times, grid, side="right") / len(times)
 
 
@@ -37,18 +40,27 @@ def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
     `hits` (runs, targets) as of `hits`, `evaluations` (runs,) what each run used in all. It is what all runs used up
     to their hit, or in all, over the number of runs that hit; inf where none did. Auger and Hansen, 2005.
     """
-    times, used = np.asarray(hits, dtype=np.float64), finite("evaluations", evaluations, ("runs",))
+    times = np.asarray(hits, dtype=np.float64)
+    used = finite("evaluations", evaluations, ("runs",))
     if times.ndim != 2 or len(times) != len(used):
-        raise InputError(f"hits must have shape ({len(used)}, targets), got {times.shape}")
+        raise InputError(
+            f"hits must have shape ({len(used)}, targets), got {times.shape}"
+        )
     late = np.isfinite(times) & (times > used[:, None])
     if np.isnan(times).any() or late.any():
         raise InputError(
-            "hits must be within a run's evaluations or inf, got " + ("a later one" if late.any() else "nan")
+            "hits must be within a run's evaluations or inf, got "
+            + ("a later one" if late.any() else "nan")
         )
     reached = np.isfinite(times)
     used_in_all = np.where(reached, times, used[:, None]).sum(axis=0)
     return np.asarray(
-        np.divide(used_in_all, reached.sum(axis=0), out=np.full(len(used_in_all), np.inf), where=reached.any(axis=0))
+        np.divide(
+            used_in_all,
+            reached.sum(axis=0),
+            out=np.full(len(used_in_all), np.inf),
+            where=reached.any(axis=0),
+        )
     )
 
 
@@ -57,6 +69,9 @@ def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
 
     `errors` (methods, instances, seeds), which mean the same on every instance: Agarwal et al., 2021.
     """
-    array, edges = finite("errors", errors, ("methods", "instances", "seeds")), finite("levels", levels, ("levels",))
+    array = finite("errors", errors, ("methods", "instances", "seeds"))
+    edges = finite("levels", levels, ("levels",))
     runs = np.sort(array.reshape(len(array), -1), axis=1)
-    return np.array([np.searchsorted(row, edges, side="right") / len(row) for row in runs])
+    return np.array(
+        [np.searchsorted(row, edges, side="right") / len(row) for row in runs]
+    )

@@ -17,7 +17,9 @@ from posefit.arrays import Array
 from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
-MAX_EXACT_TIES = 13  # blocks, for which scipy has exact p-values with ties, too, and goes through all signs one by one
+# blocks, for which scipy has exact p-values with ties, too, and goes through all signs
+# one by one
+MAX_EXACT_TIES = 13
 _SHAPE = ("methods", "instances", "seeds")
 
 
@@ -47,14 +49,27 @@ def wilcoxon(errors: ArrayLike) -> list[PairedTest]:
     differences = [(array[first] - array[second]).ravel() for first, second in pairs]
     p_values = [_signed_rank(values) for values in differences]
     return [
-        PairedTest(*pair, float(np.median(values)), *_median_interval(values), p_value, adjusted)
-        for pair, values, p_value, adjusted in zip(pairs, differences, p_values, holm(p_values).tolist(), strict=True)
+        PairedTest(
+            *pair,
+            float(np.median(values)),
+            *_median_interval(values),
+            p_value,
+            adjusted,
+        )
+        for pair, values, p_value, adjusted in zip(
+            pairs, differences, p_values, holm(p_values).tolist(), strict=True
+        )
     ]
 
 
 def _median_interval(values: Array) -> tuple[float, float]:
-    outside = int(stats.binom.ppf(LEVEL / 2.0, len(values), 0.5))  # values below, and as many above
-    ends = np.sort(values)[[outside - 1, len(values) - outside]] if outside else (math.nan, math.nan)
+    # values below, and as many above
+    outside = int(stats.binom.ppf(LEVEL / 2.0, len(values), 0.5))
+    ends = (
+        np.sort(values)[[outside - 1, len(values) - outside]]
+        if outside
+        else (math.nan, math.nan)
+    )
     return float(ends[0]), float(ends[1])
 
 
@@ -63,7 +78,8 @@ def _signed_rank(differences: Array) -> float:
         return 1.0
     if len(differences) > MAX_EXACT_TIES:
         return float(stats.wilcoxon(differences, zero_method="pratt").pvalue)
-    ranks = np.rint(2.0 * stats.rankdata(np.abs(differences))).astype(np.int64)  # whole numbers, though ties share one
+    # whole numbers, though ties share one
+    ranks = np.rint(2.0 * stats.rankdata(np.abs(differences))).astype(np.int64)
     positive = int(ranks[differences > 0.0].sum())
     counts = np.ones(1)  # of signs whose positive ranks have the sum 0, 1, 2, ...
     for rank in ranks[differences != 0.0]:

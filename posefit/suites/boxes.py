@@ -21,11 +21,15 @@ from posefit.fitting.prior import Components
 HELD_OUT_PEOPLE = ("16", "49", "135")
 TRAINING_PEOPLE = ("02", "05", "09", "14", "17", "29", "127")
 STEP = 1e-4  # radians, and what a stored component is a whole multiple of
-SIZES = (6, 7, 13, 17, 21, 37)  # components of the boxes of 9, 10, 16, 20, 24 and 40 dimensions
-SHOW_NOTHING = (49, 61)  # joint angles that turn a hand about its forearm, unless fingers move as well
+# components of the boxes of 9, 10, 16, 20, 24 and 40 dimensions
+SIZES = (6, 7, 13, 17, 21, 37)
+# joint angles that turn a hand about its forearm, unless fingers move as well
+SHOW_NOTHING = (49, 61)
 FRAMES = 8  # of a sequence
-VALUES = (2, 4, 8, 16)  # how many each of four mixed latents may have; each fifth one has any
-CONSTANT = math.radians(10.0)  # to either side: the range of joint angles that are constant in the data
+# how many each of four mixed latents may have; each fifth one has any
+VALUES = (2, 4, 8, 16)
+# to either side: the range of joint angles that are constant in the data
+CONSTANT = math.radians(10.0)
 HELD_OUT_GROUP = "held out"  # the name of the box learned from all people for training
 
 
@@ -45,11 +49,19 @@ class Learned:
 
 @lru_cache(maxsize=1)
 def _stored() -> dict[str, Learned]:
-    with (files("posefit.suites") / "boxes.npz").open("rb") as file, np.load(file) as stored:
+    with (
+        (files("posefit.suites") / "boxes.npz").open("rb") as file,
+        np.load(file) as stored,
+    ):
         names = stored["names"].tolist()
         arrays = {name: stored[name] for name in Learned.__dataclass_fields__}
     return {
-        name: Learned(**{key: value[k] if key == "order" else STEP * value[k] for key, value in arrays.items()})
+        name: Learned(
+            **{
+                key: value[k] if key == "order" else STEP * value[k]
+                for key, value in arrays.items()
+            }
+        )
         for k, name in enumerate(names)
     }
 
@@ -69,15 +81,25 @@ class ComponentBox(Components):
     def __init__(self, learned: Learned, count: int, mixed: bool = False) -> None:
         half = learned.half[:count]
         super().__init__(learned.mean, learned.components[:count], -half, half)
-        self._spread, self._reach = learned.spread[:count], float(learned.reach[SIZES.index(count)])
-        self._stepped = np.flatnonzero(np.arange(count) % 5 < 4) if mixed else np.arange(0)
-        self._parts = 0.5 * np.resize(VALUES, len(self._stepped))  # to either side of the middle
+        self._spread, self._reach = (
+            learned.spread[:count],
+            float(learned.reach[SIZES.index(count)]),
+        )
+        self._stepped = (
+            np.flatnonzero(np.arange(count) % 5 < 4) if mixed else np.arange(0)
+        )
+        # to either side of the middle
+        self._parts = 0.5 * np.resize(VALUES, len(self._stepped))
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
         if len(self._stepped):
-            latents, half, parts = latents.copy(), self.high[self._stepped], self._parts
-            part = np.minimum(np.floor(latents[:, self._stepped] / half * parts), parts - 1.0)
+            latents = latents.copy()
+            half = self.high[self._stepped]
+            parts = self._parts
+            part = np.minimum(
+                np.floor(latents[:, self._stepped] / half * parts), parts - 1.0
+            )
             latents[:, self._stepped] = (part + 0.5) / parts * half
         return super().inverse_transform(latents)
 
@@ -105,24 +127,35 @@ class AngleBox(Components):
     With `rng` they are rotated at random, and each moves all of these joint angles.
     """
 
-    def __init__(self, learned: Learned, count: int, rng: np.random.Generator | None = None) -> None:
-        order = learned.order if count == len(learned.order) else learned.order[~np.isin(learned.order, SHOW_NOTHING)]
+    def __init__(
+        self, learned: Learned, count: int, rng: np.random.Generator | None = None
+    ) -> None:
+        order = (
+            learned.order
+            if count == len(learned.order)
+            else learned.order[~np.isin(learned.order, SHOW_NOTHING)]
+        )
         self.angles = np.sort(order[:count])
-        low, high = learned.low[self.angles], learned.high[self.angles]
+        low = learned.low[self.angles]
+        high = learned.high[self.angles]
         self.reach = 0.5 * (high - low)
-        self.constant = self.angles[np.abs(self.reach - CONSTANT) < 10.0 * STEP]  # of the data
+        # of the data
+        self.constant = self.angles[np.abs(self.reach - CONSTANT) < 10.0 * STEP]
         self._rotation = np.eye(count)
         if rng is not None:
             rotation, signs = np.linalg.qr(rng.standard_normal((count, count)))
             self._rotation = np.round(rotation * np.sign(np.diag(signs)) / STEP) * STEP
-        mean, components = learned.mean.copy(), np.zeros((count, len(learned.mean)))
+        mean = learned.mean.copy()
+        components = np.zeros((count, len(learned.mean)))
         mean[self.angles] = 0.5 * (low + high)
         components[:, self.angles] = self._rotation * self.reach
         super().__init__(mean, components, -np.ones(count), np.ones(count))
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63)."""
-        return np.asarray((angles - self.mean)[:, self.angles] / self.reach @ self._rotation.T)
+        return np.asarray(
+            (angles - self.mean)[:, self.angles] / self.reach @ self._rotation.T
+        )
 
 
 @final
@@ -134,10 +167,15 @@ class SequenceBox(Components):
     """
 
     def __init__(self, learned: Learned, count: int) -> None:
-        order = sorted(np.ndindex(count, FRAMES), key=lambda term: ((term[0] + 1) * (term[1] + 1), term))
-        components, halves = np.array(order[:count]).T  # how many half waves a cosine has in the motion
+        order = sorted(
+            np.ndindex(count, FRAMES),
+            key=lambda term: ((term[0] + 1) * (term[1] + 1), term),
+        )
+        # how many half waves a cosine has in the motion
+        components, halves = np.array(order[:count]).T
         times = (np.arange(FRAMES)[:, None] + 0.5) / FRAMES
-        self._waves = np.round(np.cos(np.pi * halves * times) / STEP) * STEP  # (frames, m)
+        # (frames, m)
+        self._waves = np.round(np.cos(np.pi * halves * times) / STEP) * STEP
         self._directions = learned.components[components]
         half = learned.half[components] / ((halves + 1) * np.sqrt(halves + 1))
         rows = self._waves[:, :, None] * self._directions
@@ -147,7 +185,9 @@ class SequenceBox(Components):
     def transform(self, angles: Array) -> Array:
         """Return the latents (1, m) nearest to the joint angles (frames, 63) of a motion."""
         latents = (angles - self.mean) @ self._directions.T
-        return np.asarray((self._waves * latents).sum(axis=0) / (self._waves**2).sum(axis=0))[None]
+        return np.asarray(
+            (self._waves * latents).sum(axis=0) / (self._waves**2).sum(axis=0)
+        )[None]
 
 
 SuiteBox = ComponentBox | AngleBox | SequenceBox
@@ -155,7 +195,8 @@ SuiteBox = ComponentBox | AngleBox | SequenceBox
 
 def is_upright(pose: Array) -> bool:
     """Return whether a wrapped pose (66,) is one that boxes are learned from: upright, no joint turned right round."""
-    tilts, joints = np.abs(pose[1:3]), np.abs(pose[3:])
+    tilts = np.abs(pose[1:3])
+    joints = np.abs(pose[3:])
     return bool(tilts.max() < math.radians(20.0) and joints.max() < 2.6)
 
 

@@ -11,7 +11,8 @@ SUITES = (SUITE,)
 TRAINING = range(10_000)  # instances to learn from and to tune on
 HELD_OUT = range(10_000, 20_000)  # instances of other people
 INSTANCES = range(20_000)
-ANGLES = (20, 24, 40, 66)  # dimensions of the functions that search joint angles themselves
+# dimensions of the functions that search joint angles themselves
+ANGLES = (20, 24, 40, 66)
 DIMENSIONS = (9, 10, 16, 20, 24, 40, 66)
 
 
@@ -22,22 +23,58 @@ class SuiteFunction:
     number: int
     name: str
     summary: str
-    exact: bool  # whether the box holds a proposal of cost 0, as the silhouette is of one of its poses
+    # whether the box holds a proposal of cost 0, as the silhouette is of one of its
+    # poses
+    exact: bool
     dimensions: tuple[int, ...] = (9, 10, 16, 20, 24, 40)
-    noisy: bool = False  # whether a proposal costs something else when it is evaluated again
+    # whether a proposal costs something else when it is evaluated again
+    noisy: bool = False
 
 
 FUNCTIONS = (
-    SuiteFunction(1, "single image", "one silhouette, the yaw known to within 20 degrees", True),
-    SuiteFunction(2, "next frame", "a fifth of a second after two poses of a track; starts at a prediction", True),
-    SuiteFunction(3, "two views", "as 1, seen by two cameras at right angles", True),
-    SuiteFunction(4, "noisy", "as 1, the silhouette damaged again at each evaluation", True, noisy=True),
-    SuiteFunction(5, "sequence", "eight frames of 1.4 seconds at once: components, each over time", True),
-    SuiteFunction(6, "mixed", "as 1, most components have 2, 4, 8 or 16 values", True),
-    SuiteFunction(7, "high-dimensional", "as 1, joint angles themselves instead of components", True, ANGLES),
-    SuiteFunction(8, "aligned translation", "as 1, the place unknown and taken from the silhouette's borders", False),
     SuiteFunction(
-        9, "rotated", "as 7, the box rotated at random: coordinates cannot be searched one by one", True, ANGLES
+        1, "single image", "one silhouette, the yaw known to within 20 degrees", True
+    ),
+    SuiteFunction(
+        2,
+        "next frame",
+        "a fifth of a second after two poses of a track; starts at a prediction",
+        True,
+    ),
+    SuiteFunction(3, "two views", "as 1, seen by two cameras at right angles", True),
+    SuiteFunction(
+        4,
+        "noisy",
+        "as 1, the silhouette damaged again at each evaluation",
+        True,
+        noisy=True,
+    ),
+    SuiteFunction(
+        5,
+        "sequence",
+        "eight frames of 1.4 seconds at once: components, each over time",
+        True,
+    ),
+    SuiteFunction(6, "mixed", "as 1, most components have 2, 4, 8 or 16 values", True),
+    SuiteFunction(
+        7,
+        "high-dimensional",
+        "as 1, joint angles themselves instead of components",
+        True,
+        ANGLES,
+    ),
+    SuiteFunction(
+        8,
+        "aligned translation",
+        "as 1, the place unknown and taken from the silhouette's borders",
+        False,
+    ),
+    SuiteFunction(
+        9,
+        "rotated",
+        "as 7, the box rotated at random: coordinates cannot be searched one by one",
+        True,
+        ANGLES,
     ),
 )
 
@@ -49,11 +86,17 @@ def suite_function(number: object) -> SuiteFunction:
     return known[chosen]
 
 
-def checked_address(name: object, function: object, instance: object, dimension: object) -> tuple[int, int, int]:
+def checked_address(
+    name: object, function: object, instance: object, dimension: object
+) -> tuple[int, int, int]:
     """Return function, instance and dimension as ints. Raises ValueError where a suite has no such problem."""
     one_of("suite", name, SUITES)
-    chosen, number, d = suite_function(function), whole("instance", instance, 0), whole("dimension", dimension, 1)
+    chosen = suite_function(function)
+    number = whole("instance", instance, 0)
+    d = whole("dimension", dimension, 1)
     if number not in INSTANCES:
-        raise InputError(f"instance must be at most {INSTANCES[-1]}, got {quoted(number)}")
+        raise InputError(
+            f"instance must be at most {INSTANCES[-1]}, got {quoted(number)}"
+        )
     one_of(f"dimension of function {chosen.number}", d, chosen.dimensions)
     return chosen.number, number, d

@@ -39,14 +39,20 @@ from posefit.suites.functions import TRAINING
 RNG_STREAM = 2026  # part of the seed of every instance
 SIZE = (120, 160)  # pixels
 PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and cameras aim
-AWAY, FIELD = 3.5, np.radians(40.0)  # metres to a camera; radians it sees across the larger side
+# metres to a camera; radians it sees across the larger side
+AWAY = 3.5
+FIELD = np.radians(40.0)
 ROOT_RANGE = np.radians([45.0, 20.0, 20.0])  # radians to either side: yaw, pitch, roll
 YAW_OFF = np.radians(20.0)  # from the box's middle to the true yaw, at most
 STEP = 6  # frames, at 30 a second, from one pose of a track to the next
-SPREAD = 0.05  # of a start, beside how far the last two poses are apart: in half-sides of the box
-DAMAGES, STRENGTH = ("blobs", "holes"), 0.6  # of each silhouette of a noisy instance; how strong they are at most
+# of a start, beside how far the last two poses are apart: in half-sides of the box
+SPREAD = 0.05
+# of each silhouette of a noisy instance; how strong they are at most
+DAMAGES = ("blobs", "holes")
+STRENGTH = 0.6
 POOL = 32  # how many of these an instance has
-ORDER = np.random.default_rng(RNG_STREAM).integers(POOL, size=10_007)  # they come in, again and again; a prime
+# they come in, again and again; a prime
+ORDER = np.random.default_rng(RNG_STREAM).integers(POOL, size=10_007)
 ANCHOR_OFF = 0.3  # metres along each axis that the anchor of an alignment is off
 DIGITS = 4  # of a truth in the box, so that every machine has the same one
 
@@ -58,11 +64,14 @@ class SuiteInstance:
     function: int
     number: int
     subject: str
-    frames: Sequence[PoseProblem] = field(repr=False)  # one, or those of a sequence: they have a box in common
+    # one, or those of a sequence: they have a box in common
+    frames: Sequence[PoseProblem] = field(repr=False)
     box: SuiteBox = field(repr=False)
-    truth: Array = field(repr=False)  # (d,) the proposal of the true pose, for tests: a search that reads it cheats
+    # (d,) the proposal of the true pose, for tests: a search that reads it cheats
+    truth: Array = field(repr=False)
     truth_cost: float  # of that proposal; 0 where the function is exact
-    noisy: Sequence[PoseProblem] = field(default=(), repr=False)  # of function 4: each with a damaged silhouette
+    # of function 4: each with a damaged silhouette
+    noisy: Sequence[PoseProblem] = field(default=(), repr=False)
 
     @property
     def space(self) -> SearchSpace:
@@ -75,7 +84,8 @@ class SuiteInstance:
 
     def evaluate_noisy(self, proposals: Array, first: int) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) with noise: the evaluations from number `first` on."""
-        costs, drawn = np.empty(len(proposals)), ORDER[(first + np.arange(len(proposals))) % len(ORDER)]
+        costs = np.empty(len(proposals))
+        drawn = ORDER[(first + np.arange(len(proposals))) % len(ORDER)]
         for k in np.unique(drawn):
             costs[drawn == k] = self.noisy[k].evaluate(proposals[drawn == k])
         return costs
@@ -87,7 +97,11 @@ class SuiteInstance:
         inside = np.clip(proposals, -1.0, 1.0)
         if isinstance(self.box, ComponentBox):
             latents = space.centre[3:] + space.half[3:] * inside[:, 3:]
-            inside[:, 3:] = np.clip((self.box.within_reach(latents) - space.centre[3:]) / space.half[3:], -1.0, 1.0)
+            inside[:, 3:] = np.clip(
+                (self.box.within_reach(latents) - space.centre[3:]) / space.half[3:],
+                -1.0,
+                1.0,
+            )
         return np.where(allowed[:, None], proposals, inside)
 
 
@@ -97,12 +111,18 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     rng = np.random.default_rng([RNG_STREAM, function, number])
     people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
     subject = people[int(rng.integers(len(people)))]
-    learned, count = learned_without(subject), dimension - 3  # the root has three
+    # the root has three
+    learned = learned_without(subject)
+    count = dimension - 3
     box: SuiteBox
     if function == 5:
         box = SequenceBox(learned, count)
     elif function in (7, 9):
-        rotated = np.random.default_rng([RNG_STREAM, function, number, dimension]) if function == 9 else None
+        rotated = (
+            np.random.default_rng([RNG_STREAM, function, number, dimension])
+            if function == 9
+            else None
+        )
         box = AngleBox(learned, count, rotated)
     else:
         box = ComponentBox(learned, count, mixed=function == 6)
@@ -125,10 +145,15 @@ class _Draft:
         last = np.zeros(66)
         while True:
             clip = clips[int(self.rng.integers(len(clips)))]
-            first = int(self.rng.integers(max(int(clip.times[-1]) + 1 - STEP * (count - 1), 1)))
+            first = int(
+                self.rng.integers(max(int(clip.times[-1]) + 1 - STEP * (count - 1), 1))
+            )
             poses = wrapped(clip.at(first + STEP * np.arange(count, dtype=np.int64))[0])
             last = poses[-1]
-            if is_upright(last) and np.abs(np.diff(poses, axis=0)).max(initial=0.0) < 1.0:
+            if (
+                is_upright(last)
+                and np.abs(np.diff(poses, axis=0)).max(initial=0.0) < 1.0
+            ):
                 return np.asarray(poses)
 
     def space(self, yaw: float) -> SearchSpace:
@@ -140,9 +165,13 @@ class _Draft:
         latents = self.box.transform(poses[:, 3:])
         if isinstance(self.box, ComponentBox):
             latents = self.box.within_reach(latents)
-        proposals = np.round(space.proposals(np.column_stack([poses[: len(latents), :3], latents])), DIGITS)
+        proposals = np.round(
+            space.proposals(np.column_stack([poses[: len(latents), :3], latents])),
+            DIGITS,
+        )
         bad = ~space.feasible(proposals)
-        proposals[bad] = np.round(0.999 * proposals[bad], DIGITS)  # rounding moved it out of the ellipsoid
+        # rounding moved it out of the ellipsoid
+        proposals[bad] = np.round(0.999 * proposals[bad], DIGITS)
         return np.asarray(proposals)
 
     @cached_property
@@ -159,7 +188,9 @@ class _Draft:
     def made(self, truth: Array, *frames: PoseProblem) -> SuiteInstance:
         truth = truth.copy()
         truth.setflags(write=False)
-        made = SuiteInstance(self.function, self.number, self.subject, frames, self.box, truth, 0.0)
+        made = SuiteInstance(
+            self.function, self.number, self.subject, frames, self.box, truth, 0.0
+        )
         return replace(made, truth_cost=float(made.evaluate(truth[None])[0]))
 
 
@@ -170,7 +201,8 @@ def _body(skeleton: Skeleton) -> Body:
 
 def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
     """Return a pose of the box, seen from anywhere by one camera or more at right angles."""
-    pose, rng = draft.poses()[0], draft.rng
+    pose = draft.poses()[0]
+    rng = draft.rng
     space = draft.space(pose[0] + YAW_OFF * rng.uniform(-1.0, 1.0))
     azimuth = rng.uniform(-np.pi, np.pi)
     pose = _still(draft, pose)
@@ -183,7 +215,8 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
 
 def _still(draft: _Draft, pose: Array) -> Array:
     """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
-    moved, offs = pose.copy(), draft.rng.uniform(-0.5, 0.5, 66)
+    moved = pose.copy()
+    offs = draft.rng.uniform(-0.5, 0.5, 66)
     if isinstance(draft.box, AngleBox):
         moved[3 + draft.box.constant] += CONSTANT * offs[3 + draft.box.constant]
     return moved
@@ -191,34 +224,52 @@ def _still(draft: _Draft, pose: Array) -> Array:
 
 def _next_frame(draft: _Draft) -> SuiteInstance:
     """Return the third of three poses of a track, as the box holds them, with a start where the first two lead."""
-    poses, rng = draft.poses(3), draft.rng
+    poses = draft.poses(3)
+    rng = draft.rng
     space = draft.space(float(poses[1, 0]) + 0.25 * YAW_OFF * rng.uniform(-1.0, 1.0))
     camera = draft.camera(rng.uniform(-np.pi, np.pi))
     before, last, truth = draft.nearest(space, poses)
-    step, pose = last - before, space.decode(truth[None])[0][0]
-    mean = draft.nearest(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[0]
+    step = last - before
+    pose = space.decode(truth[None])[0][0]
+    mean = draft.nearest(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[
+        0
+    ]
     space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
-    return draft.made(truth, PoseProblem(draft.body, [camera], [draft.silhouette(camera, pose)], space))
+    return draft.made(
+        truth,
+        PoseProblem(draft.body, [camera], [draft.silhouette(camera, pose)], space),
+    )
 
 
 def _noisy(draft: _Draft) -> SuiteInstance:
     """Return a pose of the box whose silhouette is damaged again at each evaluation."""
-    made, rng = _single(draft), draft.rng
-    mask, noisy = made.frames[0].silhouettes[0].mask, []
+    made = _single(draft)
+    rng = draft.rng
+    mask = made.frames[0].silhouettes[0].mask
+    noisy = []
     for _ in range(POOL):
-        damaged = corrupted(mask, dict(zip(DAMAGES, rng.uniform(0.0, STRENGTH, len(DAMAGES)), strict=True)), rng)
+        damaged = corrupted(
+            mask,
+            dict(zip(DAMAGES, rng.uniform(0.0, STRENGTH, len(DAMAGES)), strict=True)),
+            rng,
+        )
         noisy.append(replace(made.frames[0], silhouettes=[Silhouette.of(damaged)]))
     return replace(made, noisy=noisy)
 
 
 def _sequence(draft: _Draft) -> SuiteInstance:
     """Return `FRAMES` poses of a motion as the box holds them, before one camera; the root turns in none of them."""
-    poses, rng, box = draft.poses(FRAMES), draft.rng, draft.box
+    poses = draft.poses(FRAMES)
+    rng = draft.rng
+    box = draft.box
     assert isinstance(box, SequenceBox)
     space = draft.space(float(poses[0, 0]) + YAW_OFF * rng.uniform(-1.0, 1.0))
-    camera, truth = draft.camera(rng.uniform(-np.pi, np.pi)), draft.nearest(space, poses)
+    camera = draft.camera(rng.uniform(-np.pi, np.pi))
+    truth = draft.nearest(space, poses)
     spaces = [replace(space, prior=frame) for frame in box.frames]
-    silhouettes = [draft.silhouette(camera, frame.decode(truth)[0][0]) for frame in spaces]
+    silhouettes = [
+        draft.silhouette(camera, frame.decode(truth)[0][0]) for frame in spaces
+    ]
     problems = [
         PoseProblem(draft.body, [camera], [silhouette], frame)
         for silhouette, frame in zip(silhouettes, spaces, strict=True)

@@ -36,8 +36,10 @@ from posefit.suites.instances import SuiteInstance, suite_instance
 Infeasible = Literal["repair", "reject", "penalise"]
 INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
 
-TARGETS = 2.0 ** np.arange(5.0, -2.25, -0.25)  # above the true pose's cost, 32 to 0.25: a pixel is about 0.03
-PENALTY = 100.0  # cost of a half-side of the box between a penalised proposal and its repair
+# above the true pose's cost, 32 to 0.25: a pixel is about 0.03
+TARGETS = 2.0 ** np.arange(5.0, -2.25, -0.25)
+# cost of a half-side of the box between a penalised proposal and its repair
+PENALTY = 100.0
 EVALUATIONS = 100  # of the usual budget, for each dimension
 
 
@@ -80,8 +82,11 @@ class Problem:
         one_of("infeasible", infeasible, INFEASIBLE)
         if budget is not None:
             whole("budget", budget, 1)
-        self.suite, self.function, self.made = suite, function, made
-        self.infeasible, self.budget = infeasible, budget
+        self.suite = suite
+        self.function = function
+        self.made = made
+        self.infeasible = infeasible
+        self.budget = budget
         self.index = 0  # in a `Suite`
         self.id_function = function.number
         self.instance = self.id_instance = made.number
@@ -90,19 +95,24 @@ class Problem:
         # without blanks, as in posefit-2026.3_f001_i00017_d09; and in words
         self.id = f"{suite}_f{function.number:03d}_i{made.number:05d}_d{d:02d}"
         self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"
-        self.space: Space = made.space  # as posefit's own optimisers take it: `factory(problem.space, rng)`
-        self.start = self.space.start  # the predicted start of the search, with its spread; None without a prediction
+        # as posefit's own optimisers take it: `factory(problem.space, rng)`
+        self.space: Space = made.space
+        # the predicted start of the search, with its spread; None without a prediction
+        self.start = self.space.start
         # the lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown
         self.optimum = 0.0 if function.exact else None
-        self.truth_cost = made.truth_cost  # of the true pose, which is in the box and feasible
-        self.looked = False  # whether `look` was called: then a run is one of a method that looks
+        # of the true pose, which is in the box and feasible
+        self.truth_cost = made.truth_cost
+        # whether `look` was called: then a run is one of a method that looks
+        self.looked = False
         self.reset()
 
     def reset(self) -> None:
         """Forget all evaluations: the count, the best and the trace."""
         self.evaluations = 0
         self.best_observed_fvalue1 = np.inf
-        self._steps: list[tuple[int, float, Array]] = []  # evaluations, cost and point of each improvement
+        # evaluations, cost and point of each improvement
+        self._steps: list[tuple[int, float, Array]] = []
 
     def __call__(self, proposals: object) -> Any:
         """Return the cost of a proposal (d,), or the costs (n,) of proposals (n, d).
@@ -131,7 +141,12 @@ class Problem:
         """
         self.looked = True
         return [
-            [(camera, silhouette.mask) for camera, silhouette in zip(frame.cameras, frame.silhouettes, strict=True)]
+            [
+                (camera, silhouette.mask)
+                for camera, silhouette in zip(
+                    frame.cameras, frame.silhouettes, strict=True
+                )
+            ]
             for frame in self.made.noisy[:1] or self.made.frames
         ]
 
@@ -142,13 +157,17 @@ class Problem:
     @property
     def initial_solution(self) -> Array:
         """The proposal (d,) to start from: the prediction, or the middle of the box."""
-        return np.zeros(self.dimension) if self.start is None else self.start.mean.copy()
+        return (
+            np.zeros(self.dimension) if self.start is None else self.start.mean.copy()
+        )
 
     def initial_solution_proposal(self, restart: int = 0) -> Array:
         """Return the proposal (d,) to start from first, and a random one for each restart."""
         if not restart:
             return self.initial_solution
-        drawn: Array = draw_population(self.space, np.random.default_rng([self.instance, restart]), 1)[0]
+        drawn: Array = draw_population(
+            self.space, np.random.default_rng([self.instance, restart]), 1
+        )[0]
         return drawn
 
     @property
@@ -170,7 +189,9 @@ class Problem:
     def best(self) -> Array:
         """The best proposal (d,) so far, repaired where it was not feasible. Raises ValueError before there is one."""
         if not self._steps:
-            raise InputError(f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost")
+            raise InputError(
+                f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost"
+            )
         best: Array = self.repaired(self._steps[-1][2])[0]
         return best
 
@@ -181,7 +202,9 @@ class Problem:
         With "repair" they are those that were evaluated: in the box and feasible. With "penalise" they are as proposed,
         since the penalty is of the distance. With "reject" only feasible ones have a cost.
         """
-        return np.array([point for *_, point in self._steps]).reshape(-1, self.dimension)
+        return np.array([point for *_, point in self._steps]).reshape(
+            -1, self.dimension
+        )
 
     @property
     def trace(self) -> tuple[Array, Array]:
@@ -192,7 +215,9 @@ class Problem:
         steps = [(used, cost) for used, cost, _ in self._steps]
         if steps and steps[-1][0] < self.evaluations:
             steps.append((self.evaluations, steps[-1][1]))
-        return np.array([used for used, _ in steps], dtype=np.float64), np.array([cost for _, cost in steps])
+        return np.array([used for used, _ in steps], dtype=np.float64), np.array(
+            [cost for _, cost in steps]
+        )
 
     def __deepcopy__(self, memo: object) -> "Problem":
         """Return a problem with the same count, best and trace, which are its own from now on."""
@@ -213,10 +238,14 @@ class Problem:
         try:
             checked = np.asarray(proposals, dtype=np.float64)
         except (TypeError, ValueError):
-            raise InputError(f"proposals must be numbers, got {quoted(proposals)}") from None
+            raise InputError(
+                f"proposals must be numbers, got {quoted(proposals)}"
+            ) from None
         if checked.ndim not in (1, 2) or checked.shape[-1] != self.dimension:
             d = self.dimension
-            raise InputError(f"proposals must have shape ({d},) or (n, {d}), got {checked.shape}")
+            raise InputError(
+                f"proposals must have shape ({d},) or (n, {d}), got {checked.shape}"
+            )
         if not np.isfinite(checked).all():
             raise InputError("proposals must be finite, got nan or infinity")
         return checked
@@ -228,12 +257,22 @@ class Problem:
                 f"{self.id}: {self.remaining_evaluations:g} of {self.budget} evaluations are left, got {len(checked)}"
             )
         costs, repaired, penalties = self._noise_free(checked)
-        measured = self.made.evaluate_noisy(repaired, self.evaluations) + penalties if self.function.noisy else costs
+        measured = (
+            self.made.evaluate_noisy(repaired, self.evaluations) + penalties
+            if self.function.noisy
+            else costs
+        )
         points = checked if self.infeasible == "penalise" else repaired
         for k in np.flatnonzero(costs < self.best_observed_fvalue1):
             if costs[k] < self.best_observed_fvalue1:
                 self.best_observed_fvalue1 = float(costs[k])
-                self._steps.append((self.evaluations + int(k) + 1, self.best_observed_fvalue1, points[k].copy()))
+                self._steps.append(
+                    (
+                        self.evaluations + int(k) + 1,
+                        self.best_observed_fvalue1,
+                        points[k].copy(),
+                    )
+                )
         self.evaluations += len(checked)
         return measured
 
@@ -245,7 +284,9 @@ class Problem:
         if self.infeasible == "reject":
             penalties[~allowed] = np.inf
         elif self.infeasible == "penalise":
-            penalties[~allowed] = PENALTY * np.linalg.norm(checked - repaired, axis=1)[~allowed]
+            penalties[~allowed] = (
+                PENALTY * np.linalg.norm(checked - repaired, axis=1)[~allowed]
+            )
         return self.made.evaluate(repaired) + penalties, repaired, penalties
 
 
@@ -265,7 +306,9 @@ def suite(
     """
     number, instance, dimension = checked_address(name, function, instance, dimension)
     made = suite_instance(number, instance, dimension)
-    return Problem(name, suite_function(number), made, infeasible=infeasible, budget=budget)
+    return Problem(
+        name, suite_function(number), made, infeasible=infeasible, budget=budget
+    )
 
 
 @final
@@ -288,13 +331,27 @@ class Suite:
         budget: int | None = None,
     ) -> None:
         one_of("suite", name, SUITES)
-        for what, numbers in (("functions", functions), ("dimensions", dimensions), ("instances", instances)):
+        for what, numbers in (
+            ("functions", functions),
+            ("dimensions", dimensions),
+            ("instances", instances),
+        ):
             if numbers is not None and not isinstance(numbers, Iterable):
-                raise InputError(f"{what} must be a list of numbers, got {quoted(numbers)}")
-        chosen = FUNCTIONS if functions is None else [suite_function(number) for number in functions]
+                raise InputError(
+                    f"{what} must be a list of numbers, got {quoted(numbers)}"
+                )
+        chosen = (
+            FUNCTIONS
+            if functions is None
+            else [suite_function(number) for number in functions]
+        )
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
-        self.passed_over = tuple(function for function in chosen if not set(dimensions) & set(function.dimensions))
+        self.passed_over = tuple(
+            function
+            for function in chosen
+            if not set(dimensions) & set(function.dimensions)
+        )
         self.name = name
         self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget}
         self._addresses = [
@@ -303,7 +360,9 @@ class Suite:
             if dimension in function.dimensions
         ]
         if not self._addresses:
-            raise InputError(f"a suite must hold at least one problem, got none in {list(dimensions)} dimensions")
+            raise InputError(
+                f"a suite must hold at least one problem, got none in {list(dimensions)} dimensions"
+            )
 
     @property
     def functions(self) -> tuple[SuiteFunction, ...]:

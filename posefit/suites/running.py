@@ -40,7 +40,8 @@ class SuiteRun:
     infeasible: str  # the way with infeasible proposals: see `Problem`
     truth_cost: float
     targets: Array = field(repr=False)  # (t,) costs, falling
-    evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
+    # (k,) of the trace, the last of the run at its end
+    evaluations: Array = field(repr=False)
     costs: Array = field(repr=False)  # (k,)
     looked: bool = False  # whether the method read the silhouette, see `Problem.look`
 
@@ -63,13 +64,21 @@ def run_on(
     Raises ValueError where there is no such optimiser or setting, where the budget does not hold one population, and
     where the plugin breaks a rule of optimisers; ImportError where a library it needs is not installed.
     """
-    evaluations = EVALUATIONS * problem.dimension if evaluations is None else evaluations
+    evaluations = (
+        EVALUATIONS * problem.dimension if evaluations is None else evaluations
+    )
     space = problem.space
-    rng = np.random.default_rng([RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension])
+    rng = np.random.default_rng(
+        [RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension]
+    )
     factory = registry().optimiser(method)
     chosen = settings.check(method, factory, chosen or {})
-    with plugin_errors(f"optimiser {method}", "construction", (BudgetError, ImportError)):
-        optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
+    with plugin_errors(
+        f"optimiser {method}", "construction", (BudgetError, ImportError)
+    ):
+        optimiser = factory(
+            space, rng, **settings.planned(factory, chosen, evaluations)
+        )
     guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", evaluations)
     minimise(problem.evaluate, guarded, evaluations, budget_known=True)
     return run_of(problem, method, chosen, seed=seed, budget=evaluations)
@@ -89,11 +98,17 @@ def run_of(
     budget.
     """
     if not len(problem.points):
-        raise InputError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
+        raise InputError(
+            f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected"
+        )
     if (budget := problem.budget if budget is None else budget) is None:
-        raise InputError(f"{problem.id}: budget must be known, here or of the problem, got none")
+        raise InputError(
+            f"{problem.id}: budget must be known, here or of the problem, got none"
+        )
     if problem.evaluations > budget:
-        raise InputError(f"{problem.id}: evaluations must be at most {budget}, the budget, got {problem.evaluations}")
+        raise InputError(
+            f"{problem.id}: evaluations must be at most {budget}, the budget, got {problem.evaluations}"
+        )
     evaluations, costs = problem.trace
     return SuiteRun(
         suite=problem.suite,
@@ -114,7 +129,8 @@ def run_of(
 
 
 ALL = 0  # the number that stands for all functions together
-SHOWN = (16.0, 4.0, 1.0, 0.25)  # of the targets above the true pose's cost, those with an expected running time
+# of the targets above the true pose's cost, those with an expected running time
+SHOWN = (16.0, 4.0, 1.0, 0.25)
 
 
 @dataclass(frozen=True)
@@ -126,10 +142,13 @@ class SuiteScore:
     name: str
     dimension: int
     budget: int  # evaluations that a run could have had
-    infeasible: str  # the way with infeasible proposals: see `posefit.suites.problem.Problem`
+    # the way with infeasible proposals: see `posefit.suites.problem.Problem`
+    infeasible: str
     looked: bool  # whether the method read silhouettes, where the others search blind
     runs: int
-    above: float  # median of the best costs above the true poses'; below 0 where searches find lower ones
+    # median of the best costs above the true poses'; below 0 where searches find lower
+    # ones
+    above: float
     reached: float  # share of runs and targets
     # expected evaluations to so much above the true pose's cost; None for never. Of all functions there are none: a
     # mean over them would be that of the hardest
@@ -151,7 +170,11 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
     if not groups:
         raise InputError("runs must be at least one, got none")
     pairs = {(dimension, function) for dimension, function, *_ in groups}
-    several = {dimension for dimension, _ in pairs if sum(other == dimension for other, _ in pairs) > 2}
+    several = {
+        dimension
+        for dimension, _ in pairs
+        if sum(other == dimension for other, _ in pairs) > 2
+    }
     scores = [
         _score(method, function, group)
         for (dimension, function, method, *_), group in groups.items()
@@ -162,18 +185,31 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
 
 def _rank(score: SuiteScore) -> tuple[Any, ...]:
     best_first = -score.reached, score.above
-    return score.dimension, score.function, score.looked, *best_first, score.method, score.budget, score.infeasible
+    return (
+        score.dimension,
+        score.function,
+        score.looked,
+        *best_first,
+        score.method,
+        score.budget,
+        score.infeasible,
+    )
 
 
 def method_name(run: SuiteRun) -> str:
     """Return a run's method with its settings, marked where it looks."""
-    chosen = ", ".join([f"{name}={value}" for name, value in sorted(run.settings.items())] + ["looks"] * run.looked)
+    chosen = ", ".join(
+        [f"{name}={value}" for name, value in sorted(run.settings.items())]
+        + ["looks"] * run.looked
+    )
     return f"{run.method} ({chosen})" if chosen else run.method
 
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     """Return the score of runs that differ only in their instances, seeds and functions."""
-    reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
+    reached = np.array(
+        [hits((run.evaluations, run.costs), run.targets) for run in runs]
+    )
     used = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, used)
     shown = () if function == ALL else SHOWN

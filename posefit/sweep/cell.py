@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
-RENAMED_MEASURES = ("evaluations", "evaluations_per_second")  # that a row has under another name, or not at all
+# that a row has under another name, or not at all
+RENAMED_MEASURES = ("evaluations", "evaluations_per_second")
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,8 @@ class CellResult:
     """What a cell measured; but for the times, the same bits wherever it ran."""
 
     row: dict[str, Any]  # as JSON holds it: the key, the spec, and the figures
-    joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
+    # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
+    joints: bytes = field(repr=False)
 
 
 class Cell:
@@ -57,11 +59,16 @@ class Cell:
     @cached_property
     def key(self) -> str:
         """The SHA-256 of its spec without its name, version included, as 64 hexadecimal digits."""
-        return hashlib.sha256(json_of({**self._values, "name": ""}).encode()).hexdigest()
+        return hashlib.sha256(
+            json_of({**self._values, "name": ""}).encode()
+        ).hexdigest()
 
     @property
     def _values(self) -> dict[str, Any]:
-        return {"kind": self.kind, **{field.name: getattr(self, field.name) for field in fields(self)}}  # type: ignore[arg-type]
+        return {
+            "kind": self.kind,
+            **{field.name: getattr(self, field.name) for field in fields(self)},  # type: ignore[arg-type]
+        }
 
     @property
     def total_evaluations(self) -> int:
@@ -130,24 +137,43 @@ class TrackCell(Cell):
 
         for path, digest in self.files.items():
             if (present := digest_of(path)) != digest:
-                raise InputError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
+                raise InputError(
+                    f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}"
+                )
         scene = cell_scene(self)
-        training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
-        options_of_cells = {field.name for field in fields(TrackOptions)} - {*VIEW, "train"}
-        values = {field.name: getattr(self, field.name) for field in fields(self) if field.name in options_of_cells}
+        training = training_motions(
+            training_clips(self.train, followed=self.motion), scene.fps
+        )
+        options_of_cells = {field.name for field in fields(TrackOptions)} - {
+            *VIEW,
+            "train",
+        }
+        values = {
+            field.name: getattr(self, field.name)
+            for field in fields(self)
+            if field.name in options_of_cells
+        }
         options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
         result = track_scene(scene, training, completed(options, self.motion))
         assert result.truth is not None
-        truth, estimate = result.truth.joints, result.motion.joints
-        errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
+        truth = result.truth.joints
+        estimate = result.motion.joints
+        # both roots at one point, as in `mpjpe_mm`
+        errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)
         measured = asdict(result.measures)
         row = {
-            **{name: measured[name] for name in MEASURES if name not in RENAMED_MEASURES},
+            **{
+                name: measured[name]
+                for name in MEASURES
+                if name not in RENAMED_MEASURES
+            },
             "warnings": result.log.warnings,
             "evaluations_used": result.measures.evaluations,
             "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],
-            "mode_reliability": mode_reliability(result.frames, truth, result.motion.skeleton),
+            "mode_reliability": mode_reliability(
+                result.frames, truth, result.motion.skeleton
+            ),
             "trace": anytime_trace(result.frames),
         }
         return CellResult(row, packed_joints(estimate=estimate, truth=truth))
@@ -179,26 +205,45 @@ class SearchCell(Cell):
         from posefit.suites.problem import suite
         from posefit.suites.running import run_on
 
-        problem = suite(self.suite, self.function, self.instance, self.dimension, infeasible=self.infeasible)  # type: ignore[arg-type]
-        run = run_on(problem, self.method, self.settings, evaluations=self.evaluations, seed=self.seed)
+        problem = suite(
+            self.suite,
+            self.function,
+            self.instance,
+            self.dimension,
+            infeasible=self.infeasible,  # type: ignore[arg-type]
+        )
+        run = run_on(
+            problem,
+            self.method,
+            self.settings,
+            evaluations=self.evaluations,
+            seed=self.seed,
+        )
         row = {
             "cost": run.cost,
             "truth_cost": run.truth_cost,
             "evaluations_used": problem.evaluations,
             "dimensions": problem.dimension,
-            "trace": {"evaluations": [int(used) for used in run.evaluations], "cost": run.costs.tolist()},
+            "trace": {
+                "evaluations": [int(used) for used in run.evaluations],
+                "cost": run.costs.tolist(),
+            },
             "warnings": [],
         }
         return CellResult(row, b"")
 
 
-KINDS: dict[str, type[TrackCell] | type[SearchCell]] = {kind.kind: kind for kind in (TrackCell, SearchCell)}
+KINDS: dict[str, type[TrackCell] | type[SearchCell]] = {
+    kind.kind: kind for kind in (TrackCell, SearchCell)
+}
 
 
 def cell_from(spec: Mapping[str, Any]) -> Cell:
     """Return the cell of a spec, as JSON holds it."""
     values: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value for name, value in spec.items() if name != "kind"
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in spec.items()
+        if name != "kind"
     }
     return KINDS[spec["kind"]](**values)
 
@@ -213,17 +258,26 @@ def run_cell(cell: Cell) -> CellResult:
         if installed := other_version(planned):
             raise InputError(f"a worker must have {planned}, got {installed}")
     result = cell.measure()
-    row = {"key": cell.key, "spec": cell.spec, "status": "done", **result.row, "seconds": time.perf_counter() - began}
+    row = {
+        "key": cell.key,
+        "spec": cell.spec,
+        "status": "done",
+        **result.row,
+        "seconds": time.perf_counter() - began,
+    }
     try:
         json.dumps(row, allow_nan=False)
     except ValueError:
-        raise InputError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
+        raise InputError(
+            f"what {cell.method} measures must be finite numbers, got some that are not"
+        ) from None
     return replace(result, row=row)
 
 
 def other_version(origin: str) -> str | None:
     """Return what is installed instead of one origin of a version; None where it is this one, or is unknown here."""
-    name, installed = origin.partition(" ")[0], _installed()
+    name = origin.partition(" ")[0]
+    installed = _installed()
     if origin in installed:
         return None
     return next((other for other in installed if other.partition(" ")[0] == name), None)
@@ -242,13 +296,25 @@ def cell_scene(cell: TrackCell) -> "Scene":
     from posefit.footage.scene import synthetic, with_corruption
     from posefit.motion.instance import motion_of_instance, variation
 
-    motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
-    scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
+    motion = motion_of_instance(
+        cell.motion, cell.instance, frames=cell.frames, fps=cell.fps
+    )
+    scene = synthetic(
+        motion,
+        variation(cell.instance).views(cell.view_degrees),
+        cell.size,
+        [],
+        (None, None),
+    )
     scene = _with_known_person(cell, scene)
     if not cell.corruption:
         return scene
-    noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
-    observations = with_corruption(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
+    noise = {
+        kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED
+    }
+    observations = with_corruption(
+        scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance
+    )
     return replace(scene, observations=observations)
 
 
@@ -263,8 +329,14 @@ def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
     stream = [RNG_STREAM_PERSON, cell.instance, *Path(cell.motion).stem.encode()]
     for_yaw, for_body = np.random.default_rng(stream).spawn(2)
     off = np.radians(cell.yaw_off_degrees) * for_yaw.uniform(-1.0, 1.0)
-    yaw = None if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None else scene.yaw + float(off)
-    return replace(scene, yaw=yaw, body=varied(scene.body, cell.body_off_percent, for_body))
+    yaw = (
+        None
+        if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None
+        else scene.yaw + float(off)
+    )
+    return replace(
+        scene, yaw=yaw, body=varied(scene.body, cell.body_off_percent, for_body)
+    )
 
 
 def json_of(value: Any) -> str:
@@ -287,7 +359,8 @@ def packed_joints(**arrays: "Array") -> bytes:
     buffer = io.BytesIO()
     # to half a millimetre: the digits after that do not compress, and no picture shows them
     rounded: dict[str, Any] = {
-        name: (np.round(array * 1024.0) / 1024.0).astype(np.float32) for name, array in arrays.items()
+        name: (np.round(array * 1024.0) / 1024.0).astype(np.float32)
+        for name, array in arrays.items()
     }
     np.savez_compressed(buffer, **rounded)
     return buffer.getvalue()

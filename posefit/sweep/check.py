@@ -23,14 +23,27 @@ from posefit.registry import Offer, registry, version_of
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.suites.functions import DIMENSIONS, SUITES, checked_address, suite_function
 from posefit.suites.problem import INFEASIBLE
-from posefit.sweep.cell import ALL_AROUND, DROPPED, KINDS, SearchCell, TrackCell, digest_of, json_of
+from posefit.sweep.cell import (
+    ALL_AROUND,
+    DROPPED,
+    KINDS,
+    SearchCell,
+    TrackCell,
+    digest_of,
+    json_of,
+)
 from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import Check, TrackOptions, choice, declared, within
 
-FIELDS = tuple(field.name for field in fields(TrackCell) if field.name not in ("files", "version"))
-MAX_VIEWS, MAX_FRAMES = 100, 100_000  # of a cell
+FIELDS = tuple(
+    field.name for field in fields(TrackCell) if field.name not in ("files", "version")
+)
+# of a cell
+MAX_VIEWS = 100
+MAX_FRAMES = 100_000
 MAX_BODY_OFF = 50.0  # percent that a body may be off
-LARGEST = 1e30  # of a figure in a row: its square is finite, and so is itself in 32 bits
+# of a figure in a row: its square is finite, and so is itself in 32 bits
+LARGEST = 1e30
 
 
 def cell_of(spec: Mapping[str, Any]) -> TrackCell:
@@ -47,14 +60,34 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     offers, chosen = _of_method(values["method"], texts)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
-        raise InputError(f"train must not contain the motion itself, got {values['motion']}")
-    files = {path: digest for motion in (values["motion"], *train) for path, digest in _files(motion)}
+        raise InputError(
+            f"train must not contain the motion itself, got {values['motion']}"
+        )
+    files = {
+        path: digest
+        for motion in (values["motion"], *train)
+        for path, digest in _files(motion)
+    }
     version = version_of(offer.origin for offer in offers)
-    cell = TrackCell(**{**values, "settings": dict(chosen), "train": train, "files": files, "version": version})
+    cell = TrackCell(
+        **{
+            **values,
+            "settings": dict(chosen),
+            "train": train,
+            "files": files,
+            "version": version,
+        }
+    )
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
-        raise InputError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
-    if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
-        raise InputError(f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}")
+        raise InputError(
+            f"evaluations must hold one population of {size}, got {cell.evaluations}"
+        )
+    if files.get(cell.motion) and cell.frames > (
+        length := _length(cell.motion, cell.fps)
+    ):
+        raise InputError(
+            f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}"
+        )
     return cell
 
 
@@ -65,11 +98,17 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
     where the method needs a library that is not installed.
     """
     values = _checked(spec, SEARCH_CHECKS)
-    if (dimension := values["dimension"]) not in suite_function(values["function"]).dimensions:
+    if (dimension := values["dimension"]) not in suite_function(
+        values["function"]
+    ).dimensions:
         return None
-    checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
+    checked_address(
+        *(values[name] for name in ("suite", "function", "instance", "dimension"))
+    )
     evaluations = values.pop("budget") * dimension
-    version = _of_search(values["method"], json_of(values.get("settings", {})), evaluations)
+    version = _of_search(
+        values["method"], json_of(values.get("settings", {})), evaluations
+    )
     return SearchCell(**{**values, "evaluations": evaluations, "version": version})
 
 
@@ -78,14 +117,19 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
     method = _name("method", entry.get("method"))
     entered = flattened("settings", entry.get("settings", {})).items()
     chosen = {name.rpartition(".")[2]: value for name, value in entered}
-    return {**entry, "settings": settings.check(method, registry().optimiser(method), chosen)}
+    return {
+        **entry,
+        "settings": settings.check(method, registry().optimiser(method), chosen),
+    }
 
 
 def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
     """Return fields of a cell, each by itself checked. Raises ValueError where a name or a value makes no sense."""
     if unknown := [name for name in spec if name not in checks]:
         known = suggestion(unknown[0], checks)
-        raise InputError(f"a cell must say {', '.join(checks)}, got {quoted(unknown[0])}{known}")
+        raise InputError(
+            f"a cell must say {', '.join(checks)}, got {quoted(unknown[0])}{known}"
+        )
     return {name: checks[name](name, value) for name, value in spec.items()}
 
 
@@ -99,16 +143,24 @@ def _offers(method: str) -> tuple[Offer, ...]:
     names = method_names(method)
     if names.tracker is not None:
         return (registry().offer("tracker", names.tracker),)
-    return registry().offer("optimiser", names.optimiser), registry().offer("prior", names.prior)
+    return registry().offer("optimiser", names.optimiser), registry().offer(
+        "prior", names.prior
+    )
 
 
 @lru_cache(maxsize=1024)
-def _of_method(method: str, texts: tuple[str, ...]) -> tuple[tuple[Offer, ...], dict[str, Any]]:
+def _of_method(
+    method: str, texts: tuple[str, ...]
+) -> tuple[tuple[Offer, ...], dict[str, Any]]:
     """Return a method's plugins, and the settings of texts such as `sapso.cooling=0.9`: sorted, as their types ask."""
     offers = _offers(method)
     names = {kind: name for name, (kind, _) in places_of(offers).items()}
     each = parsed_settings(offers, texts).items()
-    named = ((f"{names[kind]}.{setting}", value) for kind, values in each for setting, value in values.items())
+    named = (
+        (f"{names[kind]}.{setting}", value)
+        for kind, values in each
+        for setting, value in values.items()
+    )
     return offers, dict(sorted(named))
 
 
@@ -116,8 +168,12 @@ def _of_method(method: str, texts: tuple[str, ...]) -> tuple[tuple[Offer, ...], 
 def _of_search(method: str, chosen: str, evaluations: int) -> str:
     """Return the version of an optimiser. Raises ValueError where its settings, a JSON text, need a larger budget."""
     offer = registry().offer("optimiser", method)
-    if (size := settings.population(offer.factory, json.loads(chosen), evaluations)) > evaluations:
-        raise InputError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
+    if (
+        size := settings.population(offer.factory, json.loads(chosen), evaluations)
+    ) > evaluations:
+        raise InputError(
+            f"evaluations must hold one population of {size}, got {evaluations} of {method}"
+        )
     return version_of([offer.origin])
 
 
@@ -127,7 +183,9 @@ def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
     offer = _offers(method)[0]
     if offer.kind != "optimiser":
         return 1
-    return settings.population(offer.factory, parsed_settings(_offers(method), texts)["optimiser"], evaluations)
+    return settings.population(
+        offer.factory, parsed_settings(_offers(method), texts)["optimiser"], evaluations
+    )
 
 
 @lru_cache(maxsize=1024)
@@ -138,11 +196,19 @@ def _other_styles(motion: str) -> tuple[str, ...]:
 @lru_cache(maxsize=1024)
 def _files(motion: str) -> tuple[tuple[str, str], ...]:
     """Return the files that a motion is read from, each with its digest; none for a built-in one."""
-    if motion in built_in.names() or recorded.is_recorded(motion) or recorded.is_library(motion):
+    if (
+        motion in built_in.names()
+        or recorded.is_recorded(motion)
+        or recorded.is_library(motion)
+    ):
         return ()
     if os.path.isdir(motion):
         training_clips([motion])  # raises where one cannot be read
-        return tuple((str(file), digest_of(file)) for file in sorted(Path(motion).iterdir()) if file.is_file())
+        return tuple(
+            (str(file), digest_of(file))
+            for file in sorted(Path(motion).iterdir())
+            if file.is_file()
+        )
     load_motion(motion, FPS)  # raises where it cannot be read
     path = Path(motion)
     beside = sorted(path.parent.glob("*.asf")) if path.suffix.lower() == ".amc" else []
@@ -162,7 +228,9 @@ def _name(field: str, value: Any) -> str:
 
 def _label(field: str, value: Any) -> str:
     if not isinstance(value, str) or len(value) > SHOWN or not value.isprintable():
-        raise InputError(f"{field} must be a text of at most {SHOWN} characters, got {quoted(value)}")
+        raise InputError(
+            f"{field} must be a text of at most {SHOWN} characters, got {quoted(value)}"
+        )
     return value
 
 
@@ -173,7 +241,11 @@ def _method(field: str, value: Any) -> str:
 
 def _motion(field: str, value: Any) -> str:
     name = _name(field, value)
-    if name not in built_in.names() and not recorded.is_recorded(name) and Path(name).suffix.lower() not in MOTIONS:
+    if (
+        name not in built_in.names()
+        and not recorded.is_recorded(name)
+        and Path(name).suffix.lower() not in MOTIONS
+    ):
         raise InputError(
             f"{field} must be an .amc file, a .bvh file or one of {', '.join(built_in.names())}, "
             f"got {quoted(name)}{suggestion(name, built_in.names())}"
@@ -192,7 +264,11 @@ def _learned_from(field: str, value: Any) -> str:
     if recorded.is_library(value):
         recorded.named(value)  # raises where a person is unknown
         return str(value)
-    return value if isinstance(value, str) and os.path.isdir(value) else _motion(field, value)
+    return (
+        value
+        if isinstance(value, str) and os.path.isdir(value)
+        else _motion(field, value)
+    )
 
 
 def _views(field: str, value: Any) -> tuple[float, ...]:
@@ -204,19 +280,27 @@ def _views(field: str, value: Any) -> tuple[float, ...]:
 
 def _corruption(field: str, value: Any) -> dict[str, float]:
     if not isinstance(value, Mapping):
-        raise InputError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}")
+        raise InputError(
+            f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}"
+        )
     kinds = (*CORRUPTIONS, DROPPED)
     for kind in value:
         if kind not in kinds:
-            raise InputError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{suggestion(kind, kinds)}")
-    strengths = {kind: within(0.0, 1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)}
+            raise InputError(
+                f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{suggestion(kind, kinds)}"
+            )
+    strengths = {
+        kind: within(0.0, 1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)
+    }
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 
 
 def flattened(field: str, value: Any) -> dict[str, Any]:
     """Return settings whose names are NAME.SETTING, of a table that may hold a table for each NAME."""
     if not isinstance(value, Mapping):
-        raise InputError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}")
+        raise InputError(
+            f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}"
+        )
     flat: dict[str, Any] = {}
     for name, inner in value.items():
         flat |= (
@@ -235,7 +319,11 @@ def _whole(least: int, most: float = inf) -> Check:
     return check
 
 
-_OPTIONS = {option.name: check for option in fields(TrackOptions) if (check := declared(option).check) is not None}
+_OPTIONS = {
+    option.name: check
+    for option in fields(TrackOptions)
+    if (check := declared(option).check) is not None
+}
 Checks = Mapping[str, Check]
 CHECKS: Checks = {
     **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
@@ -269,9 +357,17 @@ def _plain(outer: type, *inner: type) -> Check:
     """Return the check of a value of type `outer`, whose parts, if it is a list or a table, are of `inner` types."""
 
     def check(field: str, value: Any) -> Any:
-        parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+        parts = (
+            value.values()
+            if isinstance(value, dict)
+            else value
+            if isinstance(value, list)
+            else [value]
+        )
         if type(value) is not outer or not all(type(part) in inner for part in parts):
-            raise InputError(f"{field} must be what posefit writes, got {quoted(value)}")
+            raise InputError(
+                f"{field} must be what posefit writes, got {quoted(value)}"
+            )
         return value
 
     return check
@@ -279,7 +375,9 @@ def _plain(outer: type, *inner: type) -> Check:
 
 def _number(field: str, value: Any) -> float:
     if type(value) not in (int, float) or not -LARGEST < value < LARGEST:
-        raise InputError(f"{field} must be a number that a cell can measure, got {quoted(value)}")
+        raise InputError(
+            f"{field} must be a number that a cell can measure, got {quoted(value)}"
+        )
     return float(value)
 
 
@@ -299,9 +397,15 @@ def _numbers(field: str, value: Any, count: int | None = None) -> list[float]:
 def _trace(field: str, value: Any) -> None:
     trace = _plain(dict, list)(field, value)
     used, costs = (_numbers(field, trace.get(name)) for name in ("evaluations", "cost"))
-    rising = used == sorted(set(used)) and costs == sorted(costs, reverse=True) and all(number >= 1 for number in used)
+    rising = (
+        used == sorted(set(used))
+        and costs == sorted(costs, reverse=True)
+        and all(number >= 1 for number in used)
+    )
     if not rising or len(used) != len(costs):
-        raise InputError(f"{field} must be rising evaluations from 1 and the best cost after each, got {quoted(value)}")
+        raise InputError(
+            f"{field} must be rising evaluations from 1 and the best cost after each, got {quoted(value)}"
+        )
 
 
 def _modes(field: str, value: Any) -> None:
@@ -331,7 +435,9 @@ FIGURES: Mapping[str, Checks] = {
 }
 
 
-def checked_row(key: str, spec: str, status: str, faults: str, row: str | None) -> dict[str, Any]:
+def checked_row(
+    key: str, spec: str, status: str, faults: str, row: str | None
+) -> dict[str, Any]:
     """Return a row of a ledger as a mapping. Raises InputError saying what was expected instead."""
     values = _parsed(spec)
     one_of("kind", kind := str(values.get("kind")), KINDS)
@@ -341,9 +447,13 @@ def checked_row(key: str, spec: str, status: str, faults: str, row: str | None) 
         if (list(checked) if isinstance(checked, tuple) else checked) != value:
             raise InputError(f"{name} must be what posefit writes, got {quoted(value)}")
     if kind == "search":
-        checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
+        checked_address(
+            *(values[name] for name in ("suite", "function", "instance", "dimension"))
+        )
     if status != "done":
-        reasons = _plain(list, str)("reasons", _parsed(f'{{"reasons": {faults}}}').get("reasons"))
+        reasons = _plain(list, str)(
+            "reasons", _parsed(f'{{"reasons": {faults}}}').get("reasons")
+        )
         return {"key": key, "spec": values, "status": "quarantined", "reasons": reasons}
     figures = _parsed(row or "")
     _check_names(figures, FIGURES[kind].keys() | figures.keys())
@@ -358,9 +468,12 @@ def checked_row(key: str, spec: str, status: str, faults: str, row: str | None) 
 def _parsed(text: str) -> dict[str, Any]:
     try:
         values = json.loads(text)
-        json.dumps(values, ensure_ascii=False, allow_nan=False).encode()  # finite numbers, whole characters
+        # finite numbers, whole characters
+        json.dumps(values, ensure_ascii=False, allow_nan=False).encode()
     except (ValueError, TypeError, RecursionError) as error:
-        raise InputError(f"expected JSON of finite numbers and whole characters, got {quoted(str(error))}") from None
+        raise InputError(
+            f"expected JSON of finite numbers and whole characters, got {quoted(str(error))}"
+        ) from None
     if not isinstance(values, dict):
         raise InputError(f"expected a table of values, got {quoted(values)}")
     return values
@@ -369,4 +482,6 @@ def _parsed(text: str) -> dict[str, Any]:
 def _check_names(values: Mapping[str, Any], names: Set[str]) -> None:
     if values.keys() != names:
         came = "one more" if (wrong := min(values.keys() ^ names)) in values else "none"
-        raise InputError(f"a row must hold what posefit writes, got {came}: {quoted(wrong)}")
+        raise InputError(
+            f"a row must hold what posefit writes, got {came}: {quoted(wrong)}"
+        )

@@ -29,44 +29,67 @@ class Cluster:
     """
 
     def __init__(
-        self, scheduler: str, limits: Limits, run: Run = run_cell, patience: float = CONNECT_TIMEOUT_SECONDS
+        self,
+        scheduler: str,
+        limits: Limits,
+        run: Run = run_cell,
+        patience: float = CONNECT_TIMEOUT_SECONDS,
     ) -> None:
         try:
             import distributed
         except ImportError as error:
-            raise ImportError("Dask needs the library distributed: python -m pip install 'posefit[dask]'") from error
-        self._distributed, self._address = distributed, scheduler
+            raise ImportError(
+                "Dask needs the library distributed: python -m pip install 'posefit[dask]'"
+            ) from error
+        self._distributed = distributed
+        self._address = scheduler
         self._call = partial(_call, run, limits)
         self._running: dict[Any, Any] = {}  # the job of each future
         self._client: Any = None
         try:
-            self._client = distributed.Client(scheduler, timeout=patience, set_as_default=False)  # type: ignore[no-untyped-call]
+            self._client = distributed.Client(
+                scheduler, timeout=patience, set_as_default=False
+            )  # type: ignore[no-untyped-call]
             self._client.wait_for_workers(1, timeout=patience)
         except (OSError, ValueError, TimeoutError) as error:
             self.close()
             cause = " ".join(str(error).split())
-            raise InputError(f"scheduler must be one with workers that answers, got {scheduler}: {cause}") from None
+            raise InputError(
+                f"scheduler must be one with workers that answers, got {scheduler}: {cause}"
+            ) from None
 
     def window(self) -> int:
         """Return how many threads the workers have; while there is none, Dask waits for one with a job."""
         try:
             return max(1, int(sum(self._client.nthreads().values())))
-        except (OSError, TimeoutError, ValueError, AttributeError):  # it went away, and all that it had
-            raise InputError(f"scheduler must stay, got {self._address}, which went away") from None
+        # it went away, and all that it had
+        except (OSError, TimeoutError, ValueError, AttributeError):
+            raise InputError(
+                f"scheduler must stay, got {self._address}, which went away"
+            ) from None
 
     def submit(self, job: Any) -> None:
         """Send a job; Dask chooses the worker."""
         key = f"posefit-{secrets.token_hex(16)}"
-        self._running[self._client.submit(self._call, job, key=key, pure=False, retries=0)] = job
+        self._running[
+            self._client.submit(self._call, job, key=key, pure=False, retries=0)
+        ] = job
 
     def wait(self, seconds: float) -> list[Outcome]:
         """Return the jobs that ended."""
         if self._client.status != "running":
-            raise InputError(f"scheduler must stay, got {self._address}, which went away")
+            raise InputError(
+                f"scheduler must stay, got {self._address}, which went away"
+            )
         if self._running:
-            with suppress(TimeoutError, self._distributed.CancelledError), self._client.as_current():
+            with (
+                suppress(TimeoutError, self._distributed.CancelledError),
+                self._client.as_current(),
+            ):
                 self._distributed.wait(tuple(self._running), seconds, "FIRST_COMPLETED")  # type: ignore[no-untyped-call]
-        return [self._outcome(future) for future in tuple(self._running) if future.done()]
+        return [
+            self._outcome(future) for future in tuple(self._running) if future.done()
+        ]
 
     def close(self) -> None:
         """Leave the scheduler."""
@@ -92,7 +115,8 @@ def _call(run: Run, limits: Limits, job: Any) -> tuple[Any, str | None, bool]:
     if getattr(_thread, "runs", None) != (current := (pickle.dumps(run), limits)):
         if hasattr(_thread, "pool"):
             _thread.pool.close()
-        multiprocessing.current_process().daemon = False  # which Dask's nanny makes it, and no daemon has processes
+        # which Dask's nanny makes it, and no daemon has processes
+        multiprocessing.current_process().daemon = False
         _thread.runs, _thread.pool = current, Pool(1, limits, run)
     _thread.pool.submit(job)
     while not (outcomes := _thread.pool.wait(POLL_SECONDS)):

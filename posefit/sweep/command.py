@@ -39,22 +39,39 @@ def swept(
     from tqdm.auto import tqdm
 
     with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
-        for version, count in Counter(spec["version"] for spec in ledger.old_specs()).items():
+        for version, count in Counter(
+            spec["version"] for spec in ledger.old_specs()
+        ).items():
             if any(map(other_version, version.split(", "))):
-                say(f"{counted(count, 'row')} in {out} are of another version, {cut(version)}, and do not count here")
+                say(
+                    f"{counted(count, 'row')} in {out} are of another version, {cut(version)}, and do not count here"
+                )
         ledger.plan(cells_of(plan, shard))
         if retry_quarantined:
             count = ledger.release_quarantined()
-            say(f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again")
-        total, finished = (counts := ledger.counts()).total(), counts["done"] + counts["quarantined"]
+            say(
+                f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again"
+            )
+        total = (counts := ledger.counts()).total()
+        finished = counts["done"] + counts["quarantined"]
         if finished:
             say(f"{finished} of {total} cells are done already")
         hidden = quiet or not bars_shown()
-        with tqdm(total=total, initial=finished, unit="cell", dynamic_ncols=True, disable=hidden) as bar:
+        with tqdm(
+            total=total,
+            initial=finished,
+            unit="cell",
+            dynamic_ncols=True,
+            disable=hidden,
+        ) as bar:
 
             def watch(tally: Tally) -> None:
                 if tally.failed or tally.quarantined:
-                    bar.set_postfix(failures=tally.failed, quarantined=tally.quarantined, refresh=False)
+                    bar.set_postfix(
+                        failures=tally.failed,
+                        quarantined=tally.quarantined,
+                        refresh=False,
+                    )
                 bar.update(tally.done + tally.quarantined - bar.n)
 
             def say_beside_bar(message: str) -> None:
@@ -80,7 +97,9 @@ def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     return islice(plan, int(first) - 1, None, int(count))
 
 
-def previewed(plan: str, out: str | None, shard: str | None) -> Iterator[tuple[Cell, bool]]:
+def previewed(
+    plan: str, out: str | None, shard: str | None
+) -> Iterator[tuple[Cell, bool]]:
     """Yield the cells of a plan or of a shard, and whether each is done."""
     path = None if out is None else Path(out) / file_of(shard)
     ledger = Ledger(path) if path is not None and path.exists() else None
@@ -94,27 +113,46 @@ def preview_lines(cells: Iterable[tuple[Cell, bool]]) -> list[str]:
     total = to_run = evaluations = 0
     for cell, done in cells:
         total += 1
-        to_run, evaluations = to_run + (not done), evaluations + (not done) * cell.total_evaluations
+        to_run = to_run + (not done)
+        evaluations = evaluations + (not done) * cell.total_evaluations
         for name, value in cell.spec.items():
-            counts.setdefault(name, Counter())[value if isinstance(value, str) else json_of(value)] += 1
+            counts.setdefault(name, Counter())[
+                value if isinstance(value, str) else json_of(value)
+            ] += 1
     lines = []
     for name, values in counts.items():
-        if name in ("method", "motion") or (len(values) > 1 and name not in ("version", "files")):
-            shown = [f"{count:,} x {cut(value)}" for value, count in islice(values.items(), VALUES)]
-            more = [f"and {len(values) - VALUES:,} other values"] * (len(values) > VALUES)
+        if name in ("method", "motion") or (
+            len(values) > 1 and name not in ("version", "files")
+        ):
+            shown = [
+                f"{count:,} x {cut(value)}"
+                for value, count in islice(values.items(), VALUES)
+            ]
+            more = [f"and {len(values) - VALUES:,} other values"] * (
+                len(values) > VALUES
+            )
             lines.append(f"{name:16}  {', '.join(shown + more)}")
-    return [*lines, f"{total:,} cells, {to_run:,} of them to run, {evaluations:,} evaluations"]
+    return [
+        *lines,
+        f"{total:,} cells, {to_run:,} of them to run, {evaluations:,} evaluations",
+    ]
 
 
 def engine(
-    limits: Limits, run: Run = run_cell, *, workers: int | None = None, scheduler: str | None = None
+    limits: Limits,
+    run: Run = run_cell,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> Callable[[], Engine]:
     """Return a function that starts the engine asked for: processes of this machine, or the workers of a scheduler.
 
     Raises ValueError where both are asked for.
     """
     if workers is not None and scheduler is not None:
-        raise InputError("--workers must not be given with --scheduler: cells run in one place")
+        raise InputError(
+            "--workers must not be given with --scheduler: cells run in one place"
+        )
     if workers is not None and workers < 1:
         raise InputError(f"--workers must be at least 1, got {workers}")
 
@@ -139,4 +177,8 @@ def tally_lines(tally: Tally, out: str) -> list[str]:
     if tally.stopped:
         return [f"{line}; stopped: the same command goes on from there"]
     page = shlex.quote(f"{out.rstrip(os.sep)}.html")
-    return [line, f"results: posefit report {shlex.quote(out)} --out {page}"] if tally.done else [line]
+    return (
+        [line, f"results: posefit report {shlex.quote(out)} --out {page}"]
+        if tally.done
+        else [line]
+    )

@@ -29,7 +29,10 @@ class Tally:
 
 
 def drive(
-    ledger: Writer, engine: Engine, say: Callable[[str], None], watch: Callable[[Tally], None] = lambda _: None
+    ledger: Writer,
+    engine: Engine,
+    say: Callable[[str], None],
+    watch: Callable[[Tally], None] = lambda _: None,
 ) -> Tally:
     """Return how a sweep ended: with all planned cells done or quarantined, or stopped. `watch` is called at changes.
 
@@ -38,10 +41,14 @@ def drive(
     counts = ledger.counts()
     tally = Tally(counts.total(), counts["done"], quarantined=counts["quarantined"])
     watch(tally)
-    waiting, running = deque(ledger.planned()), dict[str, int]()  # the place of each cell that runs, by its key
+    # the place of each cell that runs, by its key
+    waiting = deque(ledger.planned())
+    running = dict[str, int]()
     try:
         with _stopping(say) as stop_requests:
-            while len(stop_requests) < 2 and (running or (waiting and not stop_requests)):
+            while len(stop_requests) < 2 and (
+                running or (waiting and not stop_requests)
+            ):
                 while waiting and not stop_requests and len(running) < engine.window():
                     place = waiting.popleft()
                     cell = ledger.cell(place)
@@ -92,7 +99,10 @@ def _stopping(say: Callable[[str], None]) -> Iterator[list[int]]:
         if len(stop_requests) == 1:
             say("finishing the cells that run; Ctrl-C once more stops at once")
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {
+        number: signal.signal(number, stop)
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield stop_requests
     finally:

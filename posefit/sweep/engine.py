@@ -19,7 +19,12 @@ from posefit.limits import GIGABYTES, SECONDS
 
 Run = Callable[[Any], Any]
 POLL_SECONDS = 0.2
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,8 @@ class Outcome:
     job: Any
     result: Any = field(default=None, repr=False)
     reason: str | None = None
-    is_own_fault: bool = True  # its own fault: a limit, an exception, a segfault, an exit; not a kill from outside
+    # its own fault: a limit, an exception, a segfault, an exit; not a kill from outside
+    is_own_fault: bool = True
 
 
 class Engine(Protocol):
@@ -69,13 +75,16 @@ class Engine(Protocol):
 
 def text_of(error: BaseException) -> str:
     """Return an exception in one line."""
-    return printable(f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": "))
+    return printable(
+        f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
+    )
 
 
 def single_thread() -> None:
     """Leave this process one thread of everything: cells run side by side."""
     os.environ.update(dict.fromkeys(THREADS, "1"))  # before they are loaded
-    if "numba" not in sys.modules:  # a loaded one takes another number for an error, at its next compilation
+    # a loaded one takes another number for an error, at its next compilation
+    if "numba" not in sys.modules:
         os.environ["NUMBA_NUM_THREADS"] = "1"
     import cv2
     import numba

@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 
     from posefit.arrays import Array
 
-FILE, SUFFIX, DRIVER = "ledger.sqlite", ".sqlite", ".driver"
+FILE = "ledger.sqlite"
+SUFFIX = ".sqlite"
+DRIVER = ".driver"
 FORMAT = 1  # the file's user_version
 ATTEMPTS = 3  # that fail by a cell's own fault
 LOSSES = 50  # attempts that something outside ended
@@ -68,13 +70,19 @@ class Ledger:
 
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
-        self.files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
+        self.files = list(
+            dict.fromkeys(file for path in paths for file in _files(Path(path)))
+        )
         self._open = [(file, _reader(file)) for file in self.files]
         # of cells in several files the first finished one counts, or the first
         self._places: dict[str, tuple[int, bool]] = {}
         for k in range(len(self._open)):
-            for key, status in self._query(k, "SELECT key, status FROM cells WHERE status != 'planned'"):
-                if key not in self._places or (status == "done" and not self._places[key][1]):
+            for key, status in self._query(
+                k, "SELECT key, status FROM cells WHERE status != 'planned'"
+            ):
+                if key not in self._places or (
+                    status == "done" and not self._places[key][1]
+                ):
                     self._places[key] = k, status == "done"
 
     def __len__(self) -> int:
@@ -86,14 +94,24 @@ class Ledger:
     @property
     def changed(self) -> float:
         """When its latest file was written, in seconds since 1970."""
-        return max(path.stat().st_mtime for file in self.files for path in file.parent.glob(f"{file.name}*"))
+        return max(
+            path.stat().st_mtime
+            for file in self.files
+            for path in file.parent.glob(f"{file.name}*")
+        )
 
     @property
     def version(self) -> str:
         """The versions of posefit whose results these are, with digests of its source; that of today without rows."""
         query = "SELECT DISTINCT json_extract(spec, '$.version') FROM cells WHERE status = 'done'"
-        versions = [str(version) for k in range(len(self._open)) for (version,) in self._query(k, query)]
-        builds = {version.partition(", ")[0] for version in versions} or {posefit_build()}
+        versions = [
+            str(version)
+            for k in range(len(self._open))
+            for (version,) in self._query(k, query)
+        ]
+        builds = {version.partition(", ")[0] for version in versions} or {
+            posefit_build()
+        }
         return ", ".join(sorted(build.removeprefix("posefit ") for build in builds))
 
     def rows(self) -> Iterator[dict[str, Any]]:
@@ -117,7 +135,10 @@ class Ledger:
         try:
             ((data,),) = self._query(k, "SELECT arrays FROM cells WHERE key = ?", key)
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                if sum(member.file_size for member in archive.infolist()) > MAX_JOINTS_BYTES:
+                if (
+                    sum(member.file_size for member in archive.infolist())
+                    > MAX_JOINTS_BYTES
+                ):
                     raise ValueError("more than a cell has")
             with np.load(io.BytesIO(data), allow_pickle=False) as stored:
                 return {name: stored[name] for name in ("estimate", "truth")}
@@ -139,11 +160,15 @@ class Ledger:
 
     def _rows(self, status: str) -> Iterator[dict[str, Any]]:
         for k in range(len(self._open)):
-            for values in self._query(k, f"{SELECT} WHERE status = ? ORDER BY rowid", status):
+            for values in self._query(
+                k, f"{SELECT} WHERE status = ? ORDER BY rowid", status
+            ):
                 if self._places.get(values[0]) == (k, status == "done"):
                     yield self._checked(k, *values)
 
-    def _checked(self, k: int, key: Any, spec: Any, status: Any, faults: Any, row: Any) -> dict[str, Any]:
+    def _checked(
+        self, k: int, key: Any, spec: Any, status: Any, faults: Any, row: Any
+    ) -> dict[str, Any]:
         try:
             return checked_row(str(key), spec, status, faults, row)
         except ValueError as error:
@@ -176,16 +201,22 @@ class Writer:
         _check_place(self.path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(self.path, timeout=BUSY_SECONDS, isolation_level=None)
+            self._db = sqlite3.connect(
+                self.path, timeout=BUSY_SECONDS, isolation_level=None
+            )
             self._lock = _locked(self.path)
         except (OSError, sqlite3.Error) as error:
             raise _unwritable(self.path, error) from None
         try:
-            whole = _check_format(self.path, self._db) and self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
+            whole = (
+                _check_format(self.path, self._db)
+                and self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
+            )
             if whole and whole != "ok":
                 raise sqlite3.DatabaseError(whole)
             self._db.executescript(SCHEMA)
-            self._db.execute("PRAGMA synchronous = FULL")  # what is written survives the loss of power
+            # what is written survives the loss of power
+            self._db.execute("PRAGMA synchronous = FULL")
             self._db.execute("CREATE TEMP TABLE planned (key TEXT PRIMARY KEY)")
         except sqlite3.Error as error:
             self.close()
@@ -235,7 +266,10 @@ class Writer:
         """Return the places of the plan's cells that are to run, those that failed last."""
         query = "SELECT cells.rowid FROM planned JOIN cells USING (key) WHERE status = 'planned'"
         return [
-            place for (place,) in self._db.execute(f"{query} ORDER BY length(faults) > 2 OR losses > 0, cells.rowid")
+            place
+            for (place,) in self._db.execute(
+                f"{query} ORDER BY length(faults) > 2 OR losses > 0, cells.rowid"
+            )
         ]
 
     def counts(self) -> Counter[str]:
@@ -245,18 +279,25 @@ class Writer:
 
     def cell(self, place: int) -> Cell:
         """Return the cell in a place."""
-        (spec,) = self._db.execute("SELECT spec FROM cells WHERE rowid = ?", [place]).fetchone()
+        (spec,) = self._db.execute(
+            "SELECT spec FROM cells WHERE rowid = ?", [place]
+        ).fetchone()
         return cell_from(json.loads(spec))
 
     def finish(self, key: str, result: CellResult) -> bool:
         """Write what a cell measured, and return whether it is the first: of what ran twice the first counts."""
-        row = json.dumps({name: value for name, value in result.row.items() if name not in NAMES}, allow_nan=False)
+        row = json.dumps(
+            {name: value for name, value in result.row.items() if name not in NAMES},
+            allow_nan=False,
+        )
         query = "UPDATE cells SET status = 'done', row = ?, arrays = ? WHERE key = ? AND status != 'done'"
         return self._db.execute(query, [row, result.joints, key]).rowcount == 1
 
     def fail(self, key: str, reason: str, is_own_fault: bool = True) -> bool:
         """Note a failed attempt, and return whether the cell is in quarantine for it."""
-        faults, losses = self._db.execute("SELECT faults, losses FROM cells WHERE key = ?", [key]).fetchone()
+        faults, losses = self._db.execute(
+            "SELECT faults, losses FROM cells WHERE key = ?", [key]
+        ).fetchone()
         reasons = [*json.loads(faults), reason] if is_own_fault else json.loads(faults)
         losses += not is_own_fault
         quarantined = len(reasons) >= ATTEMPTS or losses >= LOSSES
@@ -264,18 +305,30 @@ class Writer:
             reasons = [f"something outside ended it {LOSSES} times", reason]
         self._db.execute(
             "UPDATE cells SET status = ?, faults = ?, losses = ? WHERE key = ? AND status = 'planned'",
-            ["quarantined" if quarantined else "planned", json.dumps(reasons), losses, key],
+            [
+                "quarantined" if quarantined else "planned",
+                json.dumps(reasons),
+                losses,
+                key,
+            ],
         )
         return quarantined
 
     def release_quarantined(self) -> int:
         """Let the plan's cells out of quarantine, and return how many."""
         release = "UPDATE cells SET status = 'planned', faults = '[]', losses = 0 WHERE status = 'quarantined'"
-        return self._db.execute(f"{release} AND key IN (SELECT key FROM planned)").rowcount
+        return self._db.execute(
+            f"{release} AND key IN (SELECT key FROM planned)"
+        ).rowcount
 
     def old_specs(self) -> Iterator[Mapping[str, Any]]:
         """Yield the specs of finished cells."""
-        return (json.loads(spec) for (spec,) in self._db.execute("SELECT spec FROM cells WHERE status = 'done'"))
+        return (
+            json.loads(spec)
+            for (spec,) in self._db.execute(
+                "SELECT spec FROM cells WHERE status = 'done'"
+            )
+        )
 
 
 def _files(path: Path) -> list[Path]:
@@ -284,21 +337,29 @@ def _files(path: Path) -> list[Path]:
         return [path]
     if not (found := sorted(path.glob(f"*{SUFFIX}"))):
         came = "a folder without one" if path.is_dir() else "none"
-        raise InputError(f"{path}: expected a ledger, a folder or .sqlite file that posefit sweep wrote, got {came}")
+        raise InputError(
+            f"{path}: expected a ledger, a folder or .sqlite file that posefit sweep wrote, got {came}"
+        )
     return found
 
 
 def _reader(file: Path) -> sqlite3.Connection:
     """Return what reads a file. Where it can be written, too, SQLite removes what it puts beside it."""
-    mode = "rw" if os.access(file.parent, os.W_OK) and os.access(file, os.W_OK) else "ro"
+    mode = (
+        "rw" if os.access(file.parent, os.W_OK) and os.access(file, os.W_OK) else "ro"
+    )
     mode += "&immutable=1" if mode == "ro" and not Path(f"{file}-wal").exists() else ""
     try:
-        database = sqlite3.connect(f"{file.absolute().as_uri()}?mode={mode}", uri=True, timeout=BUSY_SECONDS)
+        database = sqlite3.connect(
+            f"{file.absolute().as_uri()}?mode={mode}", uri=True, timeout=BUSY_SECONDS
+        )
         database.execute("PRAGMA query_only = ON")
         if hasattr(database, "setlimit"):
             database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
         if not _check_format(file, database):
-            raise InputError(f"{file}: expected a ledger that posefit sweep wrote, got an empty file")
+            raise InputError(
+                f"{file}: expected a ledger that posefit sweep wrote, got an empty file"
+            )
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise _damaged(file, error) from None
     return database
@@ -307,12 +368,20 @@ def _reader(file: Path) -> sqlite3.Connection:
 def _check_format(file: Path, database: sqlite3.Connection) -> bool:
     """Return whether a file is a ledger, and not yet empty. Raises InputError where it is something else."""
     tables = dict(database.execute("SELECT name, type FROM sqlite_master").fetchall())
-    if not tables and 0 < (size := file.stat().st_size) < MIN_FILE_BYTES:  # which SQLite takes for an empty one
-        raise sqlite3.DatabaseError(f"a file of {counted(size, 'byte')}, too short to be one")
+    # which SQLite takes for an empty one
+    if not tables and 0 < (size := file.stat().st_size) < MIN_FILE_BYTES:
+        raise sqlite3.DatabaseError(
+            f"a file of {counted(size, 'byte')}, too short to be one"
+        )
     columns = {row[1] for row in database.execute("PRAGMA table_info(cells)")}
     if tables and (tables.get("cells") != "table" or not columns >= COLUMNS):
-        raise InputError(f"{file}: expected a ledger that posefit sweep wrote, got another SQLite file")
-    if tables and (form := database.execute("PRAGMA user_version").fetchone()[0]) != FORMAT:
+        raise InputError(
+            f"{file}: expected a ledger that posefit sweep wrote, got another SQLite file"
+        )
+    if (
+        tables
+        and (form := database.execute("PRAGMA user_version").fetchone()[0]) != FORMAT
+    ):
         raise InputError(f"{file}: expected a ledger of format {FORMAT}, got {form}")
     return bool(tables)
 
@@ -321,9 +390,15 @@ def _check_place(path: Path) -> None:
     folder = path.parent
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")
-    names = [name for name in sorted(os.listdir(folder)) if not name.startswith(".")] if folder.is_dir() else []
+    names = (
+        [name for name in sorted(os.listdir(folder)) if not name.startswith(".")]
+        if folder.is_dir()
+        else []
+    )
     if names and not any(name.endswith((SUFFIX, DRIVER)) for name in names):
-        raise InputError(f"{folder}: expected a new folder or a ledger, got one with {names[0]}")
+        raise InputError(
+            f"{folder}: expected a new folder or a ledger, got one with {names[0]}"
+        )
 
 
 def _locked(path: Path) -> int:
@@ -351,4 +426,6 @@ def _damaged(file: Path, error: Exception) -> InputError:
 
 def _unwritable(path: Path, error: Exception) -> InputError:
     reason = getattr(error, "strerror", None) or error
-    return InputError(f"{path}: expected a file that can be written to, got {cut(str(reason))}")
+    return InputError(
+        f"{path}: expected a file that can be written to, got {cut(str(reason))}"
+    )

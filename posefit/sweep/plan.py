@@ -18,7 +18,14 @@ from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text, suggesti
 from posefit.suites.functions import FUNCTIONS, HELD_OUT
 from posefit.suites.problem import EVALUATIONS
 from posefit.sweep.cell import Cell
-from posefit.sweep.check import FIELDS, cell_of, families, flattened, search_method, search_of
+from posefit.sweep.check import (
+    FIELDS,
+    cell_of,
+    families,
+    flattened,
+    search_method,
+    search_of,
+)
 
 LISTS = {
     "methods": "method",
@@ -54,7 +61,9 @@ class Plan:
         keys: set[bytes] = set()
         for cell in cells():
             if (key := bytes.fromhex(cell.key)) in keys:
-                raise InputError(f"the cells of a plan must differ, got {cut(str(cell))} twice")
+                raise InputError(
+                    f"the cells of a plan must differ, got {cut(str(cell))} twice"
+                )
             keys.add(key)
         self._count = len(keys)
         if not keys:
@@ -96,9 +105,13 @@ def plan_text(path: str | Path) -> str:
         try:
             text = sys.stdin.read(MAX_BYTES + 1)
         except UnicodeDecodeError:
-            raise InputError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
+            raise InputError(
+                f"{INPUT}: expected a plan in UTF-8, got other bytes"
+            ) from None
         if len(text) > MAX_BYTES:
-            raise InputError(f"{INPUT}: expected a plan of at most {MAX_BYTES:,} characters, got more")
+            raise InputError(
+                f"{INPUT}: expected a plan of at most {MAX_BYTES:,} characters, got more"
+            )
         return text.removeprefix("\ufeff")
     if not Path(path).is_file():
         what = "a folder" if Path(path).is_dir() else "no file of that name"
@@ -109,20 +122,32 @@ def plan_text(path: str | Path) -> str:
 def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     """Return what makes the cells of a plan of tracks."""
     _check_names("a plan", tables, TABLES)
-    _check_names("defaults", defaults := _mapping("defaults", tables.get("defaults", {})), FIELDS)
+    _check_names(
+        "defaults", defaults := _mapping("defaults", tables.get("defaults", {})), FIELDS
+    )
     if not isinstance(listed := tables.get("cells", []), list | tuple):
         raise InputError(f"cells must be a list of tables, got {quoted(listed)}")
     single = [_mapping("cells", spec) for spec in listed]
     crossed = _mapping("product", tables.get("product") or {})
     _check_names("product", crossed, LISTS)
-    lists = {LISTS[name]: _listed(f"product.{name}", LISTS[name], values) for name, values in crossed.items()}
-    names = [{name for entry in entries for name in _fields(field, entry)} for field, entries in lists.items()]
+    lists = {
+        LISTS[name]: _listed(f"product.{name}", LISTS[name], values)
+        for name, values in crossed.items()
+    }
+    names = [
+        {name for entry in entries for name in _fields(field, entry)}
+        for field, entries in lists.items()
+    ]
     for some, others in combinations(names, 2):
         if some & others:
-            raise InputError(f"product must say {min(some & others)} in one list, got it in two")
+            raise InputError(
+                f"product must say {min(some & others)} in one list, got it in two"
+            )
     if "methods" in crossed:
         # methods come last, which a product changes soonest: a sweep under way compares them on what is done
-        lists["method"] = _gridded(lists.pop("method"), tables.get("grid", {}), families)
+        lists["method"] = _gridded(
+            lists.pop("method"), tables.get("grid", {}), families
+        )
     elif "grid" in tables:
         raise InputError("grid must come with the methods of a product, got none")
     shared = flattened("defaults.settings", defaults.get("settings", {}))
@@ -132,9 +157,19 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
         """Return a cell: of the shared settings it has those of what its method uses."""
         method = spec.get("method", defaults.get("method"))
         names = families(method) if shared and isinstance(method, str) else ()
-        fitting = {name: value for name, value in shared.items() if name.partition(".")[0] in names}
+        fitting = {
+            name: value
+            for name, value in shared.items()
+            if name.partition(".")[0] in names
+        }
         used.update(fitting)
-        return cell_of({**defaults, **spec, "settings": fitting | flattened("settings", spec.get("settings", {}))})
+        return cell_of(
+            {
+                **defaults,
+                **spec,
+                "settings": fitting | flattened("settings", spec.get("settings", {})),
+            }
+        )
 
     def cells() -> Iterator[Cell]:
         yield from map(make, chain(_product(lists), single))
@@ -149,16 +184,29 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
 
 def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     """Return what makes the cells of a plan of searches. A dimension that a function does not have is passed over."""
-    _check_names("a plan of a suite", tables, ("suite", *SEARCH_LISTS, "infeasible", "grid"))
+    _check_names(
+        "a plan of a suite", tables, ("suite", *SEARCH_LISTS, "infeasible", "grid")
+    )
     shared = {name: tables[name] for name in ("suite", "infeasible") if name in tables}
     lists = {
-        field: _listed(name, field, tables.get(name, default), HELD_OUT.start if name == "instances" else 0)
+        field: _listed(
+            name,
+            field,
+            tables.get(name, default),
+            HELD_OUT.start if name == "instances" else 0,
+        )
         for name, (field, default) in SEARCH_LISTS.items()
     }
-    methods = _gridded(lists["method"], tables.get("grid", {}), lambda method: (method.partition(":")[0],))
+    methods = _gridded(
+        lists["method"],
+        tables.get("grid", {}),
+        lambda method: (method.partition(":")[0],),
+    )
     lists["method"] = list(map(search_method, methods))
     _check_count(lists)
-    return lambda: filter(None, (search_of({**shared, **spec}) for spec in _product(lists)))
+    return lambda: filter(
+        None, (search_of({**shared, **spec}) for spec in _product(lists))
+    )
 
 
 def _product(lists: Mapping[str, Sequence[Any]]) -> Iterator[Entry]:
@@ -172,7 +220,11 @@ def _product(lists: Mapping[str, Sequence[Any]]) -> Iterator[Entry]:
 
 def _fields(field: str, entry: Any) -> Entry:
     """Return the fields that an entry of a field's list stands for; a corruption is itself a table."""
-    return entry if isinstance(entry, Mapping) and field != "corruption" else {field: entry}
+    return (
+        entry
+        if isinstance(entry, Mapping) and field != "corruption"
+        else {field: entry}
+    )
 
 
 def _listed(name: str, field: str, values: Any, first: int = 0) -> Sequence[Any]:
@@ -185,11 +237,15 @@ def _listed(name: str, field: str, values: Any, first: int = 0) -> Sequence[Any]
     if not isinstance(values, list | tuple | range):
         raise InputError(f"{name} must be a list, got {quoted(values)}")
     if not values:
-        raise InputError(f"{name} must hold at least one, got none: an empty product has no cells")
+        raise InputError(
+            f"{name} must hold at least one, got none: an empty product has no cells"
+        )
     return values
 
 
-def _gridded(methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequence[str]]) -> list[Entry]:
+def _gridded(
+    methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequence[str]]
+) -> list[Entry]:
     """Return entries of methods, each once for every combination of the grid's settings that it has."""
     lists = flattened("grid", grid) if isinstance(grid, Mapping) else {}
     if (grid and not lists) or not isinstance(grid, Mapping):
@@ -197,15 +253,23 @@ def _gridded(methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequen
     for name, values in lists.items():
         if "." not in name or not isinstance(values, list | tuple) or not values:
             raise InputError(f"grid must hold {GRID}, got {name} = {quoted(values)}")
-    entries, used, known = [], set[str](), set[str]()
+    entries = []
+    used = set[str]()
+    known = set[str]()
     for entry in (_fields("method", entry) for entry in methods):
         method = entry.get("method")
         names = names_of(method) if lists and isinstance(method, str) else ()
         known.update(names)
         applicable = [name for name in lists if name.partition(".")[0] in names]
         entry_settings = flattened("settings", entry.get("settings", {}))
-        if twice := [name for name in applicable if {name, name.rpartition(".")[2]} & entry_settings.keys()]:
-            raise InputError(f"grid must hold what no entry of methods sets itself, got {twice[0]}, which one does")
+        if twice := [
+            name
+            for name in applicable
+            if {name, name.rpartition(".")[2]} & entry_settings.keys()
+        ]:
+            raise InputError(
+                f"grid must hold what no entry of methods sets itself, got {twice[0]}, which one does"
+            )
         used.update(applicable)
         for chosen in product(*(lists[name] for name in applicable)):
             settings = entry_settings | dict(zip(applicable, chosen, strict=True))
@@ -217,15 +281,21 @@ def _gridded(methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequen
     return entries
 
 
-def _check_names(what: str, table: Mapping[str, Any], known: Sequence[str] | Mapping[str, str]) -> None:
+def _check_names(
+    what: str, table: Mapping[str, Any], known: Sequence[str] | Mapping[str, str]
+) -> None:
     for name in table:
         if name not in known:
-            raise InputError(f"{what} must hold {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}")
+            raise InputError(
+                f"{what} must hold {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+            )
 
 
 def _check_count(lists: Mapping[str, Sequence[Any]]) -> None:
     if (count := prod(map(len, lists.values()))) > MAX_CELLS:
-        raise InputError(f"a product must hold at most {MAX_CELLS:,} cells, got {count:,}")
+        raise InputError(
+            f"a product must hold at most {MAX_CELLS:,} cells, got {count:,}"
+        )
 
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:

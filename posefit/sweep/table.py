@@ -25,7 +25,16 @@ from posefit.suites.running import SuiteRun
 if TYPE_CHECKING:
     import pandas as pd
 
-ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
+ORDER = (
+    "motion",
+    "view_degrees",
+    "corruption",
+    "instance",
+    "method",
+    "settings",
+    "seed",
+    "key",
+)
 _TEXTS = (
     "key", "version", "status", "reason", "kind", "method", "name", "motion", "train", "settings", "view_degrees",
     "corruption",
@@ -35,7 +44,9 @@ _TEXTS = (
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     pandas = import_pandas()
-    table: pd.DataFrame = pandas.DataFrame([{**dict.fromkeys(_TEXTS), **flat(row)} for row in rows])
+    table: pd.DataFrame = pandas.DataFrame(
+        [{**dict.fromkeys(_TEXTS), **flat(row)} for row in rows]
+    )
     if table.empty:
         return table.reindex(columns=list(_TEXTS))
     return table.sort_values(list(ORDER), ignore_index=True)
@@ -44,13 +55,22 @@ def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return the columns of a row of a ledger."""
     spec = row["spec"]
-    columns: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
+    columns: dict[str, Any] = {
+        "key": row["key"],
+        "version": spec["version"],
+        "status": row["status"],
+    }
     columns["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
-    columns |= {name: value for name, value in spec.items() if name not in ("files", "version")}
+    columns |= {
+        name: value for name, value in spec.items() if name not in ("files", "version")
+    }
     columns["settings"] = ", ".join(settings_text(spec["settings"]))
     if spec["kind"] == "track":
         columns |= {
-            "corruption": ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items())),
+            "corruption": ", ".join(
+                f"{kind} {strength:g}"
+                for kind, strength in sorted(spec["corruption"].items())
+            ),
             "train": ", ".join(spec["train"]),
             "view_degrees": ", ".join(f"{view:g}" for view in spec["view_degrees"]),
             "size": "x".join(map(str, spec["size"])),
@@ -59,7 +79,10 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability"):
             continue
         if name == "joint_errors_mm":
-            columns |= {f"{name}.{joint}": error for joint, error in zip(JOINTS, value, strict=True)}
+            columns |= {
+                f"{name}.{joint}": error
+                for joint, error in zip(JOINTS, value, strict=True)
+            }
         elif isinstance(value, Mapping):
             columns |= {f"{name}.{part}": figure for part, figure in value.items()}
         else:
@@ -76,17 +99,27 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
     table = list(rows)
     if not table:
         raise InputError("rows must be at least one, got none")
-    with new_file(path) as building, building.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in table for name in row)), restval="")
+    with (
+        new_file(path) as building,
+        building.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.DictWriter(
+            file, list(dict.fromkeys(name for row in table for name in row)), restval=""
+        )
         writer.writeheader()
         writer.writerows(table)
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:
     """Return the run of a row of a single search."""
-    spec, trace = row["spec"], row["trace"]
+    spec = row["spec"]
+    trace = row["trace"]
     return SuiteRun(
-        **{name: value for name, value in spec.items() if name not in ("kind", "name", "evaluations", "version")},
+        **{
+            name: value
+            for name, value in spec.items()
+            if name not in ("kind", "name", "evaluations", "version")
+        },
         budget=spec["evaluations"],
         truth_cost=row["truth_cost"],
         targets=row["truth_cost"] + TARGETS,

@@ -27,7 +27,9 @@ class _Process(SpawnProcess):
     def _Popen(process: Any) -> Any:  # noqa: N802
         main = sys.modules["__main__"]
         with _starting:
-            before = {name: getattr(main, name, None) for name in ("__file__", "__spec__")}
+            before = {
+                name: getattr(main, name, None) for name in ("__file__", "__spec__")
+            }
             try:
                 vars(main).update(dict.fromkeys(before))
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
@@ -44,8 +46,10 @@ class Context(SpawnContext):
 def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
     """Make this process a worker: one thread, deaf to Ctrl-C, which is the driver's, and ended with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # so that a kill from outside looks like one
-    with suppress(AttributeError):  # a group of its own: what a terminal or a script sends to the driver is not for it
+    # so that a kill from outside looks like one
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    # a group of its own: what a terminal or a script sends to the driver is not for it
+    with suppress(AttributeError):
         os.setpgid(0, 0)
     sys.path[:] = path
     leave = os._exit

@@ -36,7 +36,9 @@ Factory = Callable[..., Any]
 Settings = Mapping[str, Any] | None
 
 
-def check_optimiser(factory: Factory, *, next_frame: "NextFrame" = "start", settings: Settings = None) -> Report:
+def check_optimiser(
+    factory: Factory, *, next_frame: "NextFrame" = "start", settings: Settings = None
+) -> Report:
     """Return the report on an optimiser's factory, true where no check failed; `next_frame` as it is registered."""
     return run_checks(factory, checks_of("optimiser", factory, settings, next_frame))
 
@@ -46,7 +48,9 @@ def check_prior(factory: Factory, *, settings: Settings = None) -> Report:
     return run_checks(factory, checks_of("prior", factory, settings))
 
 
-def check_tracker(factory: Factory, *, looks_ahead: bool = False, settings: Settings = None) -> Report:
+def check_tracker(
+    factory: Factory, *, looks_ahead: bool = False, settings: Settings = None
+) -> Report:
     """Return the report on a tracker's factory, true where no check failed; `looks_ahead` as it is registered."""
     return run_checks(factory, checks_of("tracker", factory, settings, looks_ahead))
 
@@ -61,7 +65,9 @@ def check_segmenter(factory: Factory, *, settings: Settings = None) -> Report:
     return run_checks(factory, checks_of("segmenter", factory, settings))
 
 
-def checks_of(kind: str, factory: Factory, settings: Settings = None, *registered: Any) -> list[Check]:
+def checks_of(
+    kind: str, factory: Factory, settings: Settings = None, *registered: Any
+) -> list[Check]:
     """Return the checks of a kind of plugin: each of its rules, which are loaded when they are needed."""
     rules = import_module(f"posefit.testing.{kind}_rules")
     case = rules.Case(factory, dict(settings or {}), *registered)

@@ -23,7 +23,8 @@ from posefit.testing.results import BrokenError, SkippedError, expect
 class PluginCase:
     """A factory with its settings."""
 
-    arguments: ClassVar[tuple[str, ...]] = ()  # that a factory of the kind takes by position
+    # that a factory of the kind takes by position
+    arguments: ClassVar[tuple[str, ...]] = ()
 
     factory: Callable[..., Any]
     settings: dict[str, Any] = field(default_factory=dict)
@@ -50,14 +51,21 @@ def construction(case: PluginCase) -> None:
     """A factory takes what its kind is given, and keyword-only settings."""
     parameters = inspect.signature(case.factory).parameters
     kinds = [parameter.kind for parameter in parameters.values()]
-    expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
+    expect(
+        inspect.Parameter.VAR_KEYWORD not in kinds,
+        "settings must be named, got **settings that swallow mistakes",
+    )
     by_position = [
-        name for name, kind in zip(parameters, kinds, strict=True) if kind is not inspect.Parameter.KEYWORD_ONLY
+        name
+        for name, kind in zip(parameters, kinds, strict=True)
+        if kind is not inspect.Parameter.KEYWORD_ONLY
     ]
-    taken, more = ", ".join(case.arguments), ", ".join(by_position[len(case.arguments) :])
+    taken = ", ".join(case.arguments)
+    more = ", ".join(by_position[len(case.arguments) :])
     came = f"{more} before the *" if more else f"({', '.join(by_position)})"
     expect(
-        len(by_position) == len(case.arguments), f"a factory must take ({taken}) and keyword-only settings, got {came}"
+        len(by_position) == len(case.arguments),
+        f"a factory must take ({taken}) and keyword-only settings, got {came}",
     )
     for setting in settings_of(case.factory):
         if setting.annotation is inspect.Parameter.empty:
@@ -72,12 +80,16 @@ def silence(case: PluginCase) -> None:
     """Nothing is printed."""
     with redirect_stdout(io.StringIO()) as printed:
         case.use()
-    expect(not printed.getvalue(), f"a plugin must print nothing, got {quoted(printed.getvalue())}")
+    expect(
+        not printed.getvalue(),
+        f"a plugin must print nothing, got {quoted(printed.getvalue())}",
+    )
 
 
 def global_randomness(case: PluginCase) -> None:
     """The global random generators are neither used nor changed."""
-    if not case.random_unchanged:  # a library that was imported meanwhile may have seeded them
+    # a library that was imported meanwhile may have seeded them
+    if not case.random_unchanged:
         with left_alone():
             case.use_fully()
 
@@ -93,20 +105,29 @@ def unknown_setting(case: PluginCase) -> None:
 
 def nonsense_settings(case: PluginCase, *, harmless: bool = False) -> str:
     """Nonsense in a setting is refused."""
-    tried, refused = 0, list[str]()
+    tried = 0
+    refused = list[str]()
     for setting in settings_of(case.factory):
-        kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
+        kind = (
+            setting.annotation
+            if setting.annotation is not inspect.Parameter.empty
+            else type(setting.default)
+        )
         choice = get_origin(kind) is Literal or setting.name == "variant"
         if not choice and kind not in (int, float):
             continue
-        nonsense: object = "no such choice" if choice else -1 if kind is int else float("nan")
+        nonsense: object = (
+            "no such choice" if choice else -1 if kind is int else float("nan")
+        )
         tried += 1
         try:
             case.use(**{setting.name: nonsense})
         except ValueError:
             refused.append(setting.name)
         else:
-            expect(harmless, f"{setting.name}={nonsense} must raise ValueError, got none")
+            expect(
+                harmless, f"{setting.name}={nonsense} must raise ValueError, got none"
+            )
     if not tried:
         raise SkippedError("it has no settings that could be nonsense")
     return f"refused: {', '.join(refused) or 'none'}"
@@ -119,7 +140,10 @@ def check_speed(what: str, limit: float, work: Callable[[int], int]) -> str:
         began = time.perf_counter()
         count = work(turn)
         seconds = min(seconds, (time.perf_counter() - began) / max(count, 1))
-    expect(seconds < limit, f"{what} must take less than {1e3 * limit:g} ms, got {1e3 * seconds:.3g}")
+    expect(
+        seconds < limit,
+        f"{what} must take less than {1e3 * limit:g} ms, got {1e3 * seconds:.3g}",
+    )
     return f"{1e6 * seconds:.1f} us {what}"
 
 
@@ -134,7 +158,9 @@ def duplicates(plugin: Any) -> dict[str, Any]:
         try:
             made[what] = duplicate(plugin)
         except Exception as error:
-            raise BrokenError(f"{what} of it must be possible, got {type(error).__name__}: {error}") from None
+            raise BrokenError(
+                f"{what} of it must be possible, got {type(error).__name__}: {error}"
+            ) from None
     return made
 
 
@@ -148,7 +174,12 @@ def global_random_state() -> tuple[object, ...]:
     """Return the state of the global random generators, to be compared."""
     numpy_state = np.random.get_state(legacy=False)  # noqa: NPY002
     words = numpy_state["state"]
-    return repr(numpy_state["bit_generator"]), words["key"].tobytes(), words["pos"], random.getstate()
+    return (
+        repr(numpy_state["bit_generator"]),
+        words["key"].tobytes(),
+        words["pos"],
+        random.getstate(),
+    )
 
 
 @contextmanager
@@ -156,4 +187,7 @@ def left_alone() -> Iterator[None]:
     """Check that the body leaves the global random generators as they are."""
     before = global_random_state()
     yield
-    expect(global_random_state() == before, "the global random state must stay as it is, got another")
+    expect(
+        global_random_state() == before,
+        "the global random state must stay as it is, got another",
+    )

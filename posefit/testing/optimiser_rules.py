@@ -37,7 +37,8 @@ case = pickle.loads(case)
 out.write({LOADED!r})
 out.write(pickle.dumps(case.trace()))
 """
-SPACE, BOX = Toy(5, ball), Toy(9)
+SPACE = Toy(5, ball)
+BOX = Toy(9)
 
 Evaluate = Callable[[Array], Array]
 
@@ -50,10 +51,18 @@ class Case(PluginCase):
 
     next_frame: NextFrame = "start"
 
-    def build(self, space: Space = BOX, seed: int = 0, evaluations: int = EVALUATIONS, **more: Any) -> Optimiser:
+    def build(
+        self,
+        space: Space = BOX,
+        seed: int = 0,
+        evaluations: int = EVALUATIONS,
+        **more: Any,
+    ) -> Optimiser:
         """Return a new optimiser of the space."""
         filled = planned(self.factory, {**self.settings, **more}, evaluations)
-        optimiser: Optimiser = self.factory(space, np.random.default_rng(seed), **filled)
+        optimiser: Optimiser = self.factory(
+            space, np.random.default_rng(seed), **filled
+        )
         return optimiser
 
     def use(self, **more: Any) -> None:
@@ -86,16 +95,24 @@ class Case(PluginCase):
 
     def trace(self, seed: int = 0) -> list[Array]:
         """Return six populations that a new optimiser proposes."""
-        return [proposals for proposals, _ in self.steps(self.build(SPACE, seed), SPACE, sphere, 6)]
+        return [
+            proposals
+            for proposals, _ in self.steps(self.build(SPACE, seed), SPACE, sphere, 6)
+        ]
 
-    def best(self, space: Space, evaluate: Evaluate, seed: int, evaluations: int) -> float:
+    def best(
+        self, space: Space, evaluate: Evaluate, seed: int, evaluations: int
+    ) -> float:
         """Return the lowest cost of a search; of a filter, in the last of ten frames with the same costs."""
         optimiser = self.build(space, seed, evaluations)
         lowest = np.inf
         for frame in range(10 if self.next_frame == "carry" else 1):
             if frame:
                 cast(Filter, optimiser).advance(space)
-            lowest = min(float(costs.min()) for _, costs in populations(optimiser, evaluate, evaluations))
+            lowest = min(
+                float(costs.min())
+                for _, costs in populations(optimiser, evaluate, evaluations)
+            )
         return lowest
 
     def valid(self, space: Space, evaluate: Evaluate, count: int = 6) -> str:
@@ -111,24 +128,41 @@ class Case(PluginCase):
 def check_population(proposals: Array, space: Space) -> None:
     """Check that a population consists of finite, allowed proposals in the box."""
     shape = np.shape(proposals)
-    expect(len(shape) == 2 and shape[1] == space.dimensions, f"ask must return (n, {space.dimensions}), got {shape}")
-    expect(np.isfinite(proposals).all(), "ask must return finite proposals, got nan or infinity")
+    expect(
+        len(shape) == 2 and shape[1] == space.dimensions,
+        f"ask must return (n, {space.dimensions}), got {shape}",
+    )
+    expect(
+        np.isfinite(proposals).all(),
+        "ask must return finite proposals, got nan or infinity",
+    )
     far = float(np.abs(proposals).max(initial=0.0))
     expect(far <= 1.0, f"ask must stay in [-1, 1], got {far:.6g} from the middle")
     broken = int(np.count_nonzero(~space.feasible(proposals)))
-    expect(not broken, f"ask must return feasible proposals, got {broken} of {len(proposals)} that are not")
+    expect(
+        not broken,
+        f"ask must return feasible proposals, got {broken} of {len(proposals)} that are not",
+    )
 
 
 def same(first: list[Array], second: list[Array]) -> bool:
     """Return whether two traces are bit for bit the same."""
-    return len(first) == len(second) and all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+    return len(first) == len(second) and all(
+        np.array_equal(a, b) for a, b in zip(first, second, strict=True)
+    )
 
 
 def shape(case: Case) -> str:
     """The method ask returns an array (n, d)."""
     proposals = case.build().ask()
-    expect(isinstance(proposals, np.ndarray), f"ask must return an array, got {type(proposals).__name__}")
-    expect(proposals.ndim == 2 and proposals.shape[1] == 9, f"ask must return (n, 9), got {proposals.shape}")
+    expect(
+        isinstance(proposals, np.ndarray),
+        f"ask must return an array, got {type(proposals).__name__}",
+    )
+    expect(
+        proposals.ndim == 2 and proposals.shape[1] == 9,
+        f"ask must return (n, 9), got {proposals.shape}",
+    )
     expect(len(proposals), "the first population must not be empty, got (0, 9)")
     return f"{len(proposals)} at a time"
 
@@ -136,13 +170,18 @@ def shape(case: Case) -> str:
 def dtype(case: Case) -> None:
     """The method ask returns float64."""
     for proposals, _ in case.steps(case.build(), BOX, sphere, 4):
-        expect(proposals.dtype == np.float64, f"ask must return float64, got {proposals.dtype}")
+        expect(
+            proposals.dtype == np.float64,
+            f"ask must return float64, got {proposals.dtype}",
+        )
 
 
 def box(case: Case) -> str:
     """Every proposal lies in [-1, 1]^d, with coordinates that wrap around and from a start on the edge too."""
     case.valid(Toy(6, wrapping=2), lambda x: 1.0 - np.abs(x[:, 0]), 12)
-    case.valid(Toy(5, start=Start(np.ones(5), np.full(5, 0.5), np.full(5, 0.3))), sphere)
+    case.valid(
+        Toy(5, start=Start(np.ones(5), np.full(5, 0.5), np.full(5, 0.3))), sphere
+    )
     return case.valid(BOX, lambda x: -np.abs(x).sum(axis=1), 12)
 
 
@@ -181,18 +220,24 @@ def costs(case: Case) -> None:
 
 def budget(case: Case) -> str:
     """A search uses its budget, in whole populations."""
-    used, optimiser = 0, case.build()
+    used = 0
+    optimiser = case.build()
     while len(proposals := optimiser.ask()) and used + len(proposals) <= EVALUATIONS:
         optimiser.tell(proposals, sphere(proposals))
         used += len(proposals)
-    expect(used >= 0.75 * EVALUATIONS, f"a search must use most of its budget of {EVALUATIONS}, got {used}")
+    expect(
+        used >= 0.75 * EVALUATIONS,
+        f"a search must use most of its budget of {EVALUATIONS}, got {used}",
+    )
     return f"{used} of {EVALUATIONS} evaluations"
 
 
 def evaluations(case: Case) -> None:
     """All evaluations are the search's: neither ask nor tell draws poses of its own."""
     problem = pose_problem()
-    checked = CheckedOptimiser(case.build(problem.space), problem.space, "the optimiser")
+    checked = CheckedOptimiser(
+        case.build(problem.space), problem.space, "the optimiser"
+    )
     try:
         for _ in case.steps(checked, problem.space, problem.evaluate, 4):
             pass
@@ -212,7 +257,9 @@ def order(case: Case) -> str:
         means = [sphere(proposals).mean() for proposals, _ in steps]
         return float(np.mean(means[len(means) // 2 :]))
 
-    good, bad = ([last(evaluate, seed) for seed in range(3)] for evaluate in (sphere, shuffled))
+    good, bad = (
+        [last(evaluate, seed) for seed in range(3)] for evaluate in (sphere, shuffled)
+    )
     if good == bad:
         raise SkippedError("it ignores the costs, or has one proposal at a time")
     expect(
@@ -230,7 +277,10 @@ def nonsense_settings(case: Case) -> str:
 def seeds(case: Case) -> None:
     """The same seed gives the same proposals, another seed gives others."""
     expect(same(case.trace(), case.trace()), "one seed must give one trace, got two")
-    expect(not same(case.trace(), case.trace(seed=1)), "two seeds must give two traces, got the same")
+    expect(
+        not same(case.trace(), case.trace(seed=1)),
+        "two seeds must give two traces, got the same",
+    )
 
 
 def new_process(case: Case) -> None:
@@ -238,13 +288,23 @@ def new_process(case: Case) -> None:
     try:
         payload = pickle.dumps((sys.path, pickle.dumps(case)))
     except Exception as error:
-        raise SkippedError(f"the factory cannot be sent to another process: {error}") from None
-    ran = subprocess.run([sys.executable, "-c", TRACING], input=payload, capture_output=True)
+        raise SkippedError(
+            f"the factory cannot be sent to another process: {error}"
+        ) from None
+    ran = subprocess.run(
+        [sys.executable, "-c", TRACING], input=payload, capture_output=True
+    )
     _, loaded, trace = ran.stdout.partition(LOADED)
     if not loaded:
         raise SkippedError("the factory cannot be imported in another process")
-    expect(trace, f"it must work in a new process, got one that ended in the middle {ran.stderr.decode()[-300:]}")
-    expect(same(case.trace(), pickle.loads(trace)), "one seed must give one trace in every process, got two")
+    expect(
+        trace,
+        f"it must work in a new process, got one that ended in the middle {ran.stderr.decode()[-300:]}",
+    )
+    expect(
+        same(case.trace(), pickle.loads(trace)),
+        "one seed must give one trace in every process, got two",
+    )
 
 
 def inputs(case: Case) -> None:
@@ -255,9 +315,13 @@ def inputs(case: Case) -> None:
         if not len(proposals):
             break
         values = sphere(proposals)
-        same_proposals, same_costs = unchanged(proposals), unchanged(values)
+        same_proposals = unchanged(proposals)
+        same_costs = unchanged(values)
         optimiser.tell(proposals, values)
-        expect(same_proposals(), "tell must not modify its proposals, got others afterwards")
+        expect(
+            same_proposals(),
+            "tell must not modify its proposals, got others afterwards",
+        )
         expect(same_costs(), "tell must not modify its costs, got others afterwards")
 
 
@@ -274,7 +338,10 @@ def copies(case: Case) -> None:
         twins = duplicates(optimiser)
         original = rest(optimiser)
         for what, twin in twins.items():
-            expect(same(original, rest(twin)), f"{what} must go on as the original, got another after {count}")
+            expect(
+                same(original, rest(twin)),
+                f"{what} must go on as the original, got another after {count}",
+            )
 
 
 def start(case: Case) -> str:
@@ -284,7 +351,10 @@ def start(case: Case) -> str:
     mean = np.where(np.arange(6) % 2, 0.5, -0.4)
     first = case.build(Toy(6, start=Start(mean, np.full(6, 0.02), np.zeros(6)))).ask()
     away = float(np.median(np.abs(first - mean)))
-    expect(away < 0.1, f"the first population must be around the start, spread 0.02, got {away:.3g} away from it")
+    expect(
+        away < 0.1,
+        f"the first population must be around the start, spread 0.02, got {away:.3g} away from it",
+    )
     return f"{away:.3g} away, spread 0.02"
 
 
@@ -294,17 +364,24 @@ def next_frame(case: Case) -> str:
         raise SkippedError(f"it is registered to {case.next_frame}, not to carry")
     space = Toy(4)
     optimiser = case.build(space)
-    expect(hasattr(optimiser, "advance"), "what is registered to carry must have advance(space), got none")
+    expect(
+        hasattr(optimiser, "advance"),
+        "what is registered to carry must have advance(space), got none",
+    )
     for _ in range(3):
         while len(proposals := optimiser.ask()):
             optimiser.tell(proposals, sphere(proposals))
         cast(Filter, optimiser).advance(space)
     proposals = optimiser.ask()
-    expect(len(proposals), "after advance, ask must return a population, got an empty one")
-    check_population(proposals, space)
-    near, chance = sphere(proposals).mean(), sphere(draw_population(space, np.random.default_rng(0), 1000)).mean()
     expect(
-        near < 0.7 * chance, f"particles must be carried, got a mean cost of {near:.3g} where chance has {chance:.3g}"
+        len(proposals), "after advance, ask must return a population, got an empty one"
+    )
+    check_population(proposals, space)
+    near = sphere(proposals).mean()
+    chance = sphere(draw_population(space, np.random.default_rng(0), 1000)).mean()
+    expect(
+        near < 0.7 * chance,
+        f"particles must be carried, got a mean cost of {near:.3g} where chance has {chance:.3g}",
     )
     return f"mean cost {near:.3g}, by chance {chance:.3g}"
 
@@ -323,15 +400,21 @@ def real_problem(case: Case) -> str:
 def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     if getattr(getattr(case.factory, "func", case.factory), "baseline", False):
         raise SkippedError("it is the baseline itself")
-    draws = [draw_population(space, np.random.default_rng(seed), BUDGET) for seed in SEEDS]
+    draws = [
+        draw_population(space, np.random.default_rng(seed), BUDGET) for seed in SEEDS
+    ]
     chance = float(np.median([float(evaluate(drawn).min()) for drawn in draws]))
-    below, lowest = MAX_SHARE_OF_CHANCE * chance, list[float]()
+    below = MAX_SHARE_OF_CHANCE * chance
+    lowest = list[float]()
     for seed in SEEDS:
         lowest.append(case.best(space, evaluate, seed, BUDGET))
         if sum(cost < below for cost in lowest) > len(SEEDS) // 2:
             break  # whatever the other seeds give, the median is below, too
     best = float(np.median(lowest))
-    expect(best < below, f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {best:.4g}")
+    expect(
+        best < below,
+        f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {best:.4g}",
+    )
     return f"cost {best:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
 
 
@@ -339,7 +422,10 @@ def speed(case: Case) -> str:
     """A proposal takes less than 50 ms to make."""
 
     def search(seed: int) -> int:
-        return sum(len(proposals) for proposals, _ in case.steps(case.build(BOX, seed), BOX, sphere, 10))
+        return sum(
+            len(proposals)
+            for proposals, _ in case.steps(case.build(BOX, seed), BOX, sphere, 10)
+        )
 
     return check_speed("a proposal", MAX_SECONDS, search)
 

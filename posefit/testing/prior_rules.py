@@ -12,13 +12,21 @@ from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
 from posefit.motion import built_in
 from posefit.testing import common
-from posefit.testing.common import PluginCase, check_speed, duplicates, global_random_state, left_alone, unchanged
+from posefit.testing.common import (
+    PluginCase,
+    check_speed,
+    duplicates,
+    global_random_state,
+    left_alone,
+    unchanged,
+)
 from posefit.testing.problem import walking_angles
 from posefit.testing.results import BrokenError, expect
 
 ROWS = 100
 MAX_SECONDS = 5e-3  # to recover a pose
-MAX_COPIES = 0.1  # the share of a first population that may be copies before there is a warning
+# the share of a first population that may be copies before there is a warning
+MAX_COPIES = 0.1
 
 
 @dataclass(frozen=True)
@@ -39,9 +47,12 @@ class Case(PluginCase):
         """The prior after it has learned the built-in walks: once for all rules, as that may take minutes."""
         prior: Prior = self.build()
         angles = walking_angles()
-        inputs_unchanged, random = unchanged(angles), global_random_state()
+        inputs_unchanged = unchanged(angles)
+        random = global_random_state()
         returned = prior.fit(angles, built_in.average_skeleton())
-        return Fitting(prior, returned, inputs_unchanged(), random == global_random_state())
+        return Fitting(
+            prior, returned, inputs_unchanged(), random == global_random_state()
+        )
 
     def use(self, **more: Any) -> Prior:
         """Return another prior that has learned the same."""
@@ -61,33 +72,53 @@ class Case(PluginCase):
     @property
     def latents(self) -> Array:
         """Some latents (ROWS, m) within the range."""
-        low, high = np.asarray(self.fitted.low), np.asarray(self.fitted.high)
+        low = np.asarray(self.fitted.low)
+        high = np.asarray(self.fitted.high)
         return np.random.default_rng(0).uniform(low, high, (ROWS, len(low)))
 
 
 def _same(first: Prior, second: Prior, latents: Array) -> bool:
-    angles = np.array_equal(first.inverse_transform(latents), second.inverse_transform(latents))
+    angles = np.array_equal(
+        first.inverse_transform(latents), second.inverse_transform(latents)
+    )
     return angles and np.array_equal(first.feasible(latents), second.feasible(latents))
 
 
 def _check_array(method: str, values: Array, shape: tuple[int, int]) -> None:
     expect(values.shape == shape, f"{method} must return {shape}, got {values.shape}")
-    expect(values.dtype == np.float64, f"{method} must return float64, got {values.dtype}")
-    expect(np.isfinite(values).all(), f"{method} must return finite values, got nan or infinity")
+    expect(
+        values.dtype == np.float64, f"{method} must return float64, got {values.dtype}"
+    )
+    expect(
+        np.isfinite(values).all(),
+        f"{method} must return finite values, got nan or infinity",
+    )
 
 
 def fit(case: Case) -> None:
     """The method fit returns the prior itself."""
-    expect(case.first.returned is case.first.prior, "fit must return self, got another object")
+    expect(
+        case.first.returned is case.first.prior,
+        "fit must return self, got another object",
+    )
 
 
 def ranges(case: Case) -> str:
     """The range of the latents is finite and not reversed."""
     prior = case.fitted
-    low, high = np.asarray(prior.low), np.asarray(prior.high)
-    expect(low.ndim == 1 and low.shape == high.shape and len(low), f"low and high must be (m,), got {low.shape}")
-    expect(np.isfinite(low).all() and np.isfinite(high).all(), "low and high must be finite, got nan or infinity")
-    expect((low <= high).all(), "low must not be above high, got a range that is reversed")
+    low = np.asarray(prior.low)
+    high = np.asarray(prior.high)
+    expect(
+        low.ndim == 1 and low.shape == high.shape and len(low),
+        f"low and high must be (m,), got {low.shape}",
+    )
+    expect(
+        np.isfinite(low).all() and np.isfinite(high).all(),
+        "low and high must be finite, got nan or infinity",
+    )
+    expect(
+        (low <= high).all(), "low must not be above high, got a range that is reversed"
+    )
     return f"{len(low)} latents"
 
 
@@ -95,15 +126,27 @@ def transform(case: Case) -> None:
     """Joint angles (n, 63) become latents (n, m)."""
     prior = case.fitted
     for rows in (1, 7):
-        _check_array("transform", np.asarray(prior.transform(walking_angles()[:rows])), (rows, len(prior.low)))
+        _check_array(
+            "transform",
+            np.asarray(prior.transform(walking_angles()[:rows])),
+            (rows, len(prior.low)),
+        )
 
 
 def inverse(case: Case) -> None:
     """Latents (n, m) become finite joint angles (n, 63), in every corner of the range too."""
     prior = case.fitted
-    corners = np.where(np.random.default_rng(1).random((64, len(prior.low))) < 0.5, prior.low, prior.high)
+    corners = np.where(
+        np.random.default_rng(1).random((64, len(prior.low))) < 0.5,
+        prior.low,
+        prior.high,
+    )
     for latents in (corners, case.latents, case.latents[:1]):
-        _check_array("inverse_transform", np.asarray(prior.inverse_transform(latents)), (len(latents), 63))
+        _check_array(
+            "inverse_transform",
+            np.asarray(prior.inverse_transform(latents)),
+            (len(latents), 63),
+        )
 
 
 def training_in_range(case: Case) -> None:
@@ -111,44 +154,73 @@ def training_in_range(case: Case) -> None:
     prior = case.fitted
     latents = np.asarray(prior.transform(walking_angles()))
     slack = 1e-9 * (1.0 + np.abs(latents).max())
-    out = (latents < np.asarray(prior.low) - slack) | (latents > np.asarray(prior.high) + slack)
-    expect(not out.any(), f"training poses must lie in low to high, got {int(out.any(axis=1).sum())} that do not")
+    out = (latents < np.asarray(prior.low) - slack) | (
+        latents > np.asarray(prior.high) + slack
+    )
+    expect(
+        not out.any(),
+        f"training poses must lie in low to high, got {int(out.any(axis=1).sum())} that do not",
+    )
 
 
 def training_feasible(case: Case) -> str:
     """Nine of ten training poses are feasible."""
     prior = case.fitted
     feasible = np.asarray(prior.feasible(prior.transform(walking_angles())))
-    expect(feasible.shape == (len(walking_angles()),), f"feasible must return (n,), got {feasible.shape}")
-    expect(feasible.dtype == np.bool_, f"feasible must return booleans, got {feasible.dtype}")
-    expect(feasible.mean() >= 0.9, f"90 % of the training poses must be feasible, got {100 * feasible.mean():.0f} %")
+    expect(
+        feasible.shape == (len(walking_angles()),),
+        f"feasible must return (n,), got {feasible.shape}",
+    )
+    expect(
+        feasible.dtype == np.bool_,
+        f"feasible must return booleans, got {feasible.dtype}",
+    )
+    expect(
+        feasible.mean() >= 0.9,
+        f"90 % of the training poses must be feasible, got {100 * feasible.mean():.0f} %",
+    )
     return f"{100 * feasible.mean():.0f} %"
 
 
 def same_bits(case: Case) -> None:
     """A row has the same bits whatever rows stand beside it."""
-    prior, latents = case.fitted, case.latents
-    whole, feasible = prior.inverse_transform(latents), prior.feasible(latents)
+    prior = case.fitted
+    latents = case.latents
+    whole = prior.inverse_transform(latents)
+    feasible = prior.feasible(latents)
     for rows in (slice(0, 1), slice(3, 10), slice(None, None, -1)):
         same = np.array_equal(prior.inverse_transform(latents[rows]), whole[rows])
-        expect(same, "inverse_transform must give a row the same bits in any company, got others")
-        expect(np.array_equal(prior.feasible(latents[rows]), feasible[rows]), "feasible must not depend on other rows")
+        expect(
+            same,
+            "inverse_transform must give a row the same bits in any company, got others",
+        )
+        expect(
+            np.array_equal(prior.feasible(latents[rows]), feasible[rows]),
+            "feasible must not depend on other rows",
+        )
 
 
 def same_again(case: Case) -> None:
     """Learning the same poses again gives the same space."""
     again = case.use()
-    same = np.array_equal(case.fitted.low, again.low) and _same(case.fitted, again, case.latents)
+    same = np.array_equal(case.fitted.low, again.low) and _same(
+        case.fitted, again, case.latents
+    )
     expect(same, "fitting twice must give the same space, got two")
 
 
 def inputs(case: Case) -> None:
     """Methods leave their arguments as they were."""
-    prior, angles, latents = case.fitted, walking_angles(), case.latents
+    prior = case.fitted
+    angles = walking_angles()
+    latents = case.latents
     prior.transform(angles), prior.inverse_transform(latents), prior.feasible(latents)
     same = case.first.inputs_unchanged and np.array_equal(angles, walking_angles())
     expect(same, "joint angles must stay as they are, got others")
-    expect(np.array_equal(latents, case.latents), "latents must stay as they are, got others")
+    expect(
+        np.array_equal(latents, case.latents),
+        "latents must stay as they are, got others",
+    )
 
 
 def global_randomness(case: Case) -> None:
@@ -161,15 +233,25 @@ def global_randomness(case: Case) -> None:
 def copies(case: Case) -> None:
     """A deep copy and what comes out of a pickle are the same space."""
     for what, twin in duplicates(case.fitted).items():
-        expect(_same(twin, case.fitted, case.latents), f"{what} must be the same space, got another")
+        expect(
+            _same(twin, case.fitted, case.latents),
+            f"{what} must be the same space, got another",
+        )
 
 
 def learns(case: Case) -> str:
     """Training poses come back nearer than their mean is."""
-    prior, angles = case.fitted, walking_angles()
+    prior = case.fitted
+    angles = walking_angles()
     back = prior.inverse_transform(prior.transform(angles))
-    error, mean = (np.degrees(np.abs(poses - angles).mean()) for poses in (back, angles.mean(axis=0)))
-    expect(error < 0.9 * mean, f"poses must come back, got {error:.2f} degrees; their mean has {mean:.2f}")
+    error, mean = (
+        np.degrees(np.abs(poses - angles).mean())
+        for poses in (back, angles.mean(axis=0))
+    )
+    expect(
+        error < 0.9 * mean,
+        f"poses must come back, got {error:.2f} degrees; their mean has {mean:.2f}",
+    )
     return f"{error:.2f} degrees, the mean pose {mean:.2f}"
 
 
@@ -178,7 +260,11 @@ def bad_input(case: Case) -> None:
     angles = walking_angles()
     with_nan = angles.copy()
     with_nan[3, 3] = np.nan
-    for what, value in (("60 columns", angles[:, :60]), ("nan", with_nan), ("no frames", angles[:0])):
+    for what, value in (
+        ("60 columns", angles[:, :60]),
+        ("nan", with_nan),
+        ("no frames", angles[:0]),
+    ):
         try:
             case.build().fit(value, built_in.average_skeleton())
         except ValueError:
@@ -191,10 +277,14 @@ def searchable(case: Case) -> str:
     prior = case.fitted
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
     drawn = draw_population(space, np.random.default_rng(0), ROWS)
-    expect(space.feasible(drawn).all(), "a first population must be feasible, got some that are not")
+    expect(
+        space.feasible(drawn).all(),
+        "a first population must be feasible, got some that are not",
+    )
     uniform = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, space.dimensions))
     share = space.feasible(uniform).mean()
-    copies, text = (1.0 - share) ** REDRAWS, f"{100 * share:.3g} % of the box is feasible"
+    copies = (1.0 - share) ** REDRAWS
+    text = f"{100 * share:.3g} % of the box is feasible"
     if copies <= MAX_COPIES:
         return text
     return f"warning: only {text}: of a first population about {100 * copies:.0f} % are copies of the others"
@@ -202,8 +292,11 @@ def searchable(case: Case) -> str:
 
 def speed(case: Case) -> str:
     """A pose is recovered in less than 5 ms."""
-    prior, latents = case.fitted, case.latents
-    return check_speed("a pose", MAX_SECONDS, lambda _: len(prior.inverse_transform(latents)))
+    prior = case.fitted
+    latents = case.latents
+    return check_speed(
+        "a pose", MAX_SECONDS, lambda _: len(prior.inverse_transform(latents))
+    )
 
 
 RULES = [

@@ -19,7 +19,9 @@ SIZE = (160, 120)
 
 def walking_angles() -> Array:
     """Return the joint angles (T, 63) of the built-in walks but `walk` itself."""
-    return np.concatenate([built_in.motion(style).poses[:, 3:] for style in built_in.other_styles("walk")])
+    return np.concatenate(
+        [built_in.motion(style).poses[:, 3:] for style in built_in.other_styles("walk")]
+    )
 
 
 @lru_cache(maxsize=1)
@@ -29,6 +31,10 @@ def pose_problem() -> PoseProblem:
     body = Body.of(motion.skeleton)
     prior = registry().prior("pca")().fit(walking_angles())
     camera = Camera.around(motion.translations[0], 0.8, 3.5, SIZE)
-    space = SearchSpace(prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0])
-    silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
+    space = SearchSpace(
+        prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0]
+    )
+    silhouette = Silhouette.of(
+        project(body, camera, motion.poses[0], motion.translations[0])
+    )
     return PoseProblem(body, [camera], [silhouette], space)

@@ -27,13 +27,25 @@ GIGABYTES = 4.0  # what a check may need
 OVERRUN_SECONDS = 5.0  # that a check may overrun its limit before its process is ended
 
 
-def check_in_process(kind: Any, name: str, settings: Sequence[str] = (), only: Sequence[str] = ()) -> Report:
+def check_in_process(
+    kind: Any, name: str, settings: Sequence[str] = (), only: Sequence[str] = ()
+) -> Report:
     """Return the report on an installed plugin with settings such as `population_size=20`; `only` names the checks.
 
     Raises ValueError where a setting or a check is wrong, or the plugin cannot be loaded.
     """
-    task: dict[str, Any] = {"kind": kind, "name": name, "settings": list(settings), "only": list(only)}
-    task |= {"parent": os.getpid(), "path": sys.path, "seconds": results.SECONDS, "overrun": OVERRUN_SECONDS}
+    task: dict[str, Any] = {
+        "kind": kind,
+        "name": name,
+        "settings": list(settings),
+        "only": list(only),
+    }
+    task |= {
+        "parent": os.getpid(),
+        "path": sys.path,
+        "seconds": results.SECONDS,
+        "overrun": OVERRUN_SECONDS,
+    }
     done: list[Result] = []
     while True:
         messages, blame = _messages(task)
@@ -41,10 +53,14 @@ def check_in_process(kind: Any, name: str, settings: Sequence[str] = (), only: S
         if "mistake" in plugin:
             raise InputError(plugin["mistake"])
         if "checks" not in plugin:
-            raise InputError(f"{kind} {name!r}: it must load in a process of its own; {blame}")
+            raise InputError(
+                f"{kind} {name!r}: it must load in a process of its own; {blame}"
+            )
         done += [Result(**message) for message in messages if "outcome" in message]
         if "outcome" not in messages[-1]:
-            done.append(Result(messages[-1].get("begins", plugin["checks"][0]), "failed", blame))
+            done.append(
+                Result(messages[-1].get("begins", plugin["checks"][0]), "failed", blame)
+            )
         wanted = plugin["checks"][plugin["checks"].index(done[-1].name) + 1 :]
         while wanted and (skipped := not_run(wanted[0], done)):
             done.append(skipped)
@@ -58,7 +74,10 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
     """Return what a process writes that checks a plugin, and why it ended; nothing that it starts is left."""
     with tempfile.TemporaryFile() as written:
         process = subprocess.Popen(
-            [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=written, start_new_session=True
+            [sys.executable, "-m", __name__],
+            stdin=subprocess.PIPE,
+            stdout=written,
+            start_new_session=True,
         )
         try:
             process.communicate(json.dumps(task).encode())
@@ -89,7 +108,9 @@ def _check() -> None:
 
     sys.path[:] = task["path"]
     try:
-        label, checks = _checks(task["kind"], task["name"], task["settings"], task["only"])
+        label, checks = _checks(
+            task["kind"], task["name"], task["settings"], task["only"]
+        )
     except (ValueError, ImportError) as mistake:
         send(mistake=str(mistake))
         return
@@ -98,27 +119,35 @@ def _check() -> None:
     with memory(GIGABYTES):
         for check in checks:
             send(begins=check.name, at=time.monotonic())
-            faulthandler.dump_traceback_later(task["seconds"] + task["overrun"], exit=True)
+            faulthandler.dump_traceback_later(
+                task["seconds"] + task["overrun"], exit=True
+            )
             done.append(not_run(check.name, done) or check.run(task["seconds"]))
             send(**vars(done[-1]))
     sys.stdout.flush()
     os._exit(0)  # whatever the plugin left running
 
 
-def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> tuple[str, list[Check]]:
+def _checks(
+    kind: Any, name: str, texts: Sequence[str], only: Sequence[str]
+) -> tuple[str, list[Check]]:
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
     offer = registry().offer(kind, name)
     if rivals := registry().rivals(offer):
-        theirs = ", ".join(f"{plugin.name} ({plugin.distribution} {plugin.version})" for plugin in rivals)
+        theirs = ", ".join(
+            f"{plugin.name} ({plugin.distribution} {plugin.version})"
+            for plugin in rivals
+        )
         raise InputError(
             f"{kind} {name!r} must be of one plugin, got that of {offer.distribution}, which is used, and that of "
             f"{theirs}, which is left out: give it another name"
         )
     settings = parse_texts(offer.name, offer.factory, texts)
     if kind == "prior" and settings:
-        offer.factory(**settings)  # a value that makes no sense is one mistake, not one a check
+        # a value that makes no sense is one mistake, not one a check
+        offer.factory(**settings)
     registered = {"optimiser": "next_frame", "tracker": "looks_ahead"}
     more = [getattr(offer, registered[kind])] if kind in registered else []
     checks = checks_of(kind, offer.factory, settings, *more)

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 from posefit import limits
 
-SECONDS = 60.0  # how long a check may take before its plugin counts as one that never returns
+# how long a check may take before its plugin counts as one that never returns
+SECONDS = 60.0
 POSEFIT = Path(__file__).parents[1]  # whose frames of a traceback are not a plugin's
 SAME_CAUSE = 2  # checks that fail for the same cause before the others are not run
 
@@ -56,11 +57,14 @@ class Check:
         except BrokenError as broken:
             return Result(self.name, "failed", str(broken))
         except TimeoutError as late:
-            detail, error = f"it must end within {seconds:g} s, and did not", late.__cause__ or late
+            detail = f"it must end within {seconds:g} s, and did not"
+            error = late.__cause__ or late
         except SystemExit as end:
-            detail, error = f"it must not end the program, got SystemExit: {end.code}", end
+            detail = f"it must not end the program, got SystemExit: {end.code}"
+            error = end
         except Exception as raised:  # a plugin may raise anything
-            detail, error = f"it must not fail, got {type(raised).__name__}: {raised}", raised
+            detail = f"it must not fail, got {type(raised).__name__}: {raised}"
+            error = raised
         return Result(self.name, "failed", detail, _plugin_traceback(error))
 
 
@@ -79,19 +83,28 @@ class Report:
         return not self.of("failed")
 
     def __str__(self) -> str:
-        lines, causes = [f"{self.plugin}: {self.summary}"], set[str]()
+        lines = [f"{self.plugin}: {self.summary}"]
+        causes = set[str]()
         width = max((len(result.name) for result in self.results), default=0)
         for result in self.results:
-            lines.append(f"  {result.outcome:8} {result.name:{width}}  {result.detail}".rstrip())
-            if result.traceback and _cause(result.detail) not in causes:  # one traceback a cause
-                lines += [f"           {line}".rstrip() for line in result.traceback.splitlines()]
+            lines.append(
+                f"  {result.outcome:8} {result.name:{width}}  {result.detail}".rstrip()
+            )
+            # one traceback a cause
+            if result.traceback and _cause(result.detail) not in causes:
+                lines += [
+                    f"           {line}".rstrip()
+                    for line in result.traceback.splitlines()
+                ]
             causes.add(_cause(result.detail))
         return "\n".join(lines)
 
     @property
     def summary(self) -> str:
         """How many checks ran, failed and were skipped."""
-        passed, failed, skipped = (len(self.of(outcome)) for outcome in ("passed", "failed", "skipped"))
+        passed, failed, skipped = (
+            len(self.of(outcome)) for outcome in ("passed", "failed", "skipped")
+        )
         return f"{passed + failed} checks ran, {failed} failed, {skipped} skipped"
 
 
@@ -104,7 +117,12 @@ def run_checks(plugin: str | Callable[..., Any], checks: Iterable[Check]) -> Rep
     results: list[Result] = []
     for check in checks:
         results.append(not_run(check.name, results) or check.run())
-    return Report(plugin if isinstance(plugin, str) else getattr(function, "__name__", repr(plugin)), tuple(results))
+    return Report(
+        plugin
+        if isinstance(plugin, str)
+        else getattr(function, "__name__", repr(plugin)),
+        tuple(results),
+    )
 
 
 def not_run(name: str, earlier: Sequence[Result]) -> Result | None:
@@ -113,8 +131,15 @@ def not_run(name: str, earlier: Sequence[Result]) -> Result | None:
     for result in earlier:
         if result.outcome == "failed":
             causes.setdefault(_cause(result.detail), []).append(result.name)
-    failed = next((names[:SAME_CAUSE] for names in causes.values() if len(names) >= SAME_CAUSE), None)
-    return Result(name, "skipped", f"not run: {' and '.join(failed)} fail for one cause") if failed else None
+    failed = next(
+        (names[:SAME_CAUSE] for names in causes.values() if len(names) >= SAME_CAUSE),
+        None,
+    )
+    return (
+        Result(name, "skipped", f"not run: {' and '.join(failed)} fail for one cause")
+        if failed
+        else None
+    )
 
 
 def _cause(detail: str) -> str:

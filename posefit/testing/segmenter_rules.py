@@ -20,10 +20,16 @@ from posefit.testing.common import PluginCase, check_speed, unchanged
 from posefit.testing.results import SkippedError, expect
 
 SIZE = (320, 240)
-EMPTY, FRAMES = 8, 40  # frames of an empty scene, then frames of a person who walks through
-OVERLAP = 0.3  # of the person and the mask: half of what a poor background model reaches
+# frames of an empty scene, then frames of a person who walks through
+EMPTY = 8
+FRAMES = 40
+# of the person and the mask: half of what a poor background model reaches
+OVERLAP = 0.3
 MAX_SECONDS = 1.0  # for a picture of that size
-SKIN, SHIRT, TROUSERS = (150.0, 175.0, 225.0), (235.0, 235.0, 235.0), (200.0, 150.0, 130.0)  # blue, green, red
+# blue, green, red
+SKIN = (150.0, 175.0, 225.0)
+SHIRT = (235.0, 235.0, 235.0)
+TROUSERS = (200.0, 150.0, 130.0)
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,9 @@ class PaintedFilm:
     def __len__(self) -> int:
         return len(self.images)
 
-    def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Image]:
+    def frames(
+        self, start: int = 0, stop: int | None = None, step: int = 1
+    ) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop."""
         return (image.copy() for image in self.images[start:stop:step])
 
@@ -52,22 +60,31 @@ def painted() -> tuple[PaintedFilm, list[Mask]]:
     places = motion.translations.copy()
     places[:, 2] = np.linspace(-1.2, 1.2, FRAMES)
     motion = replace(motion, translations=places)
-    camera, body = Camera.around(np.array([0.0, 0.9, 0.0]), np.pi / 2, 4.0, SIZE), Body.of(motion.skeleton)
+    camera = Camera.around(np.array([0.0, 0.9, 0.0]), np.pi / 2, 4.0, SIZE)
+    body = Body.of(motion.skeleton)
     wall = cv2.GaussianBlur(rng.uniform(0.0, 1.0, SIZE[::-1]), (0, 0), 30.0)
     wall = 60.0 + 15.0 * (wall - wall.mean())[..., None] / wall.std()
     empty = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
     masks = [empty] * EMPTY + [
-        project(body, camera, pose, place) for pose, place in zip(motion.poses, motion.translations, strict=True)
+        project(body, camera, pose, place)
+        for pose, place in zip(motion.poses, motion.translations, strict=True)
     ]
     images = []
     for mask in masks:
         rows = np.flatnonzero(mask.any(axis=1))
-        down = ((np.arange(SIZE[1]) - rows.min(initial=SIZE[1])) / max(1, len(rows)))[:, None, None]
+        down = ((np.arange(SIZE[1]) - rows.min(initial=SIZE[1])) / max(1, len(rows)))[
+            :, None, None
+        ]
         colour = np.where(down < 0.14, SKIN, np.where(down < 0.5, SHIRT, TROUSERS))
         depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)[..., None]
-        person = colour * (0.7 + 0.3 * np.minimum(1.0, depth / 6.0))  # rounded, as a body is
-        image = np.where(mask[..., None], person, wall) + rng.normal(0.0, 2.0, (*mask.shape, 3))
-        images.append(np.clip(cv2.GaussianBlur(image, (0, 0), 0.6), 0.0, 255.0).astype(np.uint8))
+        # rounded, as a body is
+        person = colour * (0.7 + 0.3 * np.minimum(1.0, depth / 6.0))
+        image = np.where(mask[..., None], person, wall) + rng.normal(
+            0.0, 2.0, (*mask.shape, 3)
+        )
+        images.append(
+            np.clip(cv2.GaussianBlur(image, (0, 0), 0.6), 0.0, 255.0).astype(np.uint8)
+        )
     return PaintedFilm(images), masks
 
 
@@ -89,11 +106,13 @@ class Case(PluginCase):
 
     def use_fully(self) -> list[tuple[Mask, Mask]]:
         """Return the masks and shadows of every fourth frame, in order."""
-        segmenter, pairs = self.build(), list[tuple[Mask, Mask]]()
+        segmenter = self.build()
+        pairs = list[tuple[Mask, Mask]]()
         for image in painted()[0].frames(step=4):
             pair = segmenter.segment(image)
             expect(
-                isinstance(pair, tuple) and len(pair) == 2, f"segment must return two masks, got {type(pair).__name__}"
+                isinstance(pair, tuple) and len(pair) == 2,
+                f"segment must return two masks, got {type(pair).__name__}",
             )
             pairs.append((np.asarray(pair[0]), np.asarray(pair[1])))
         return pairs
@@ -107,7 +126,10 @@ class Case(PluginCase):
 def masks(case: Case) -> None:
     """The method segment returns two boolean masks of the picture's size."""
     for mask in (mask for pair in case.masks for mask in pair):
-        expect(mask.shape == SIZE[::-1], f"a mask must have shape {SIZE[::-1]}, got {mask.shape}")
+        expect(
+            mask.shape == SIZE[::-1],
+            f"a mask must have shape {SIZE[::-1]}, got {mask.shape}",
+        )
         expect(mask.dtype == np.bool_, f"a mask must be boolean, got {mask.dtype}")
 
 
@@ -120,7 +142,10 @@ def overlap(case: Case) -> str:
         if mask.any()
     ]
     middle = float(np.median(overlaps))
-    expect(middle > OVERLAP, f"the mask must show the person, got an overlap of {middle:.2f} in half of the frames")
+    expect(
+        middle > OVERLAP,
+        f"the mask must show the person, got an overlap of {middle:.2f} in half of the frames",
+    )
     return f"overlap {middle:.2f}"
 
 
@@ -143,7 +168,10 @@ def background(case: Case) -> str:
     shown = getattr(case.build(), "background", None)
     if shown is None:
         raise SkippedError("it shows no background")
-    expect(np.shape(shown) == (*SIZE[::-1], 3), f"background must have shape {*SIZE[::-1], 3}, got {np.shape(shown)}")
+    expect(
+        np.shape(shown) == (*SIZE[::-1], 3),
+        f"background must have shape {*SIZE[::-1], 3}, got {np.shape(shown)}",
+    )
     expect(shown.dtype == np.uint8, f"background must be uint8, got {shown.dtype}")
     return ""
 
@@ -156,7 +184,10 @@ def landmarks(case: Case) -> str:
     if given is None:
         raise SkippedError("it gives no landmarks")
     shape = len(JOINTS), 3
-    expect(np.shape(given) == shape, f"landmarks must have shape {shape}, got {np.shape(given)}")
+    expect(
+        np.shape(given) == shape,
+        f"landmarks must have shape {shape}, got {np.shape(given)}",
+    )
     fine = np.isfinite(given).all() and np.min(np.asarray(given)[:, 2]) >= 0.0
     expect(fine, "landmarks must be finite, with confidences of 0 or more")
     return ""
@@ -164,8 +195,13 @@ def landmarks(case: Case) -> str:
 
 def speed(case: Case) -> str:
     """A picture of 320 x 240 takes less than a second."""
-    segmenter, images = case.build(), painted()[0].images[16:20]
-    return check_speed("a picture", MAX_SECONDS, lambda _: len([segmenter.segment(image) for image in images]))
+    segmenter = case.build()
+    images = painted()[0].images[16:20]
+    return check_speed(
+        "a picture",
+        MAX_SECONDS,
+        lambda _: len([segmenter.segment(image) for image in images]),
+    )
 
 
 RULES = [

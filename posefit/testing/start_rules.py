@@ -23,7 +23,9 @@ from posefit.testing.results import SkippedError, expect
 from posefit.testing.tracker_rules import scene
 from posefit.uncertainty.modes import Posterior
 
-FRAMES, DISTANCE = (0, 4, 8), 5.0  # of the walk, and of its camera, metres
+# of the walk, and of its camera, metres
+FRAMES = (0, 4, 8)
+DISTANCE = 5.0
 POPULATION = 40
 MAX_SECONDS = 2.0  # for a frame
 
@@ -33,9 +35,14 @@ def images() -> tuple[Task, Sequence[Observation]]:
     """Return a task whose first yaw is unknown, and what one camera shows of three frames of the built-in walk."""
     task, motion, _ = scene()
     camera = Camera.around(motion.translations[0], 0.8, DISTANCE, SIZE)
-    masks = [project(task.body, camera, motion.poses[k], motion.translations[k]) for k in FRAMES]
+    masks = [
+        project(task.body, camera, motion.poses[k], motion.translations[k])
+        for k in FRAMES
+    ]
     observations = [Observation([Silhouette.of(mask)]) for mask in masks]
-    return replace(task, cameras=[camera], yaw=None, translation="aligned"), observations
+    return replace(
+        task, cameras=[camera], yaw=None, translation="aligned"
+    ), observations
 
 
 @dataclass(frozen=True)
@@ -46,7 +53,9 @@ class Case(PluginCase):
 
     def build(self, task: Task | None = None, **more: Any) -> Initialiser:
         """Return a new start of the task."""
-        start: Initialiser = self.factory(task or images()[0], **{**self.settings, **more})
+        start: Initialiser = self.factory(
+            task or images()[0], **{**self.settings, **more}
+        )
         return start
 
     def use(self, **more: Any) -> object:
@@ -61,9 +70,14 @@ class Case(PluginCase):
 
 
 def _check_guess(guess: Posterior | None) -> None:
-    expect(guess is None or isinstance(guess, Posterior), f"it must be a Posterior or None, got {type(guess).__name__}")
+    expect(
+        guess is None or isinstance(guess, Posterior),
+        f"it must be a Posterior or None, got {type(guess).__name__}",
+    )
     if guess is not None:
-        finite = np.isfinite(guess.poses).all() and np.isfinite(guess.translations).all()
+        finite = (
+            np.isfinite(guess.poses).all() and np.isfinite(guess.translations).all()
+        )
         expect(finite, "poses and translations must be finite, got nan or infinity")
 
 
@@ -77,14 +91,18 @@ def posterior(case: Case) -> str:
 def several_views(case: Case) -> None:
     """Cameras that show a part of the person, or nothing, and several of them, are no reason to fail."""
     task, (observation, *_) = images()
-    (near,), parts = scene()[0].cameras, scene()[2][0].silhouettes  # which the feet are below
-    whole, empty = observation.silhouettes, [Silhouette.of(np.zeros(SIZE[::-1], dtype=bool))]
+    # which the feet are below
+    (near,), parts = scene()[0].cameras, scene()[2][0].silhouettes
+    whole = observation.silhouettes
+    empty = [Silhouette.of(np.zeros(SIZE[::-1], dtype=bool))]
     for cameras, shown in (
         ([near], parts),
         ([*task.cameras, near], [*whole, *parts]),
         ([near, near], [*parts, *empty]),
     ):
-        _check_guess(case.build(replace(task, cameras=cameras)).posterior(Observation(shown)))
+        _check_guess(
+            case.build(replace(task, cameras=cameras)).posterior(Observation(shown))
+        )
 
 
 def same_again(case: Case) -> None:
@@ -92,7 +110,8 @@ def same_again(case: Case) -> None:
     start = case.build()
     for observation in [images()[1][-1], *images()[1]]:  # whatever came before
         guess = start.posterior(observation)
-    again, first = guess, case.first[-1]
+    again = guess
+    first = case.first[-1]
     same = again is first is None or (
         again is not None
         and first is not None
@@ -114,11 +133,15 @@ def gain(case: Case) -> str:
     """The best of a population drawn from its modes costs less than that of one from anywhere."""
     task, observations = images()
     prior = registry().prior("pca")().fit(walking_angles())
-    space = SearchSpace(prior, np.zeros(3), np.radians([180.0, 15.0, 15.0]), task.anchor, "aligned")
+    space = SearchSpace(
+        prior, np.zeros(3), np.radians([180.0, 15.0, 15.0]), task.anchor, "aligned"
+    )
     costs = []
     for guess, observation in zip(case.first, observations, strict=True):
         if guess is not None:
-            problem = PoseProblem(task.body, task.cameras, observation.silhouettes, space)
+            problem = PoseProblem(
+                task.body, task.cameras, observation.silhouettes, space
+            )
             start = start_in(problem, modes_apart(task.body.skeleton, guess))
             drawn = [
                 draw_population(each, np.random.default_rng(0), POPULATION)
@@ -128,14 +151,19 @@ def gain(case: Case) -> str:
     if not costs:
         raise SkippedError("it knows no pose of the built-in walk")
     guided, blind = np.mean(costs, axis=0)
-    expect(guided < blind, f"the best of a population must cost less than {blind:.1f}, from anywhere, got {guided:.1f}")
+    expect(
+        guided < blind,
+        f"the best of a population must cost less than {blind:.1f}, from anywhere, got {guided:.1f}",
+    )
     return f"cost {guided:.1f}, from anywhere {blind:.1f}"
 
 
 def speed(case: Case) -> str:
     """A frame takes less than two seconds."""
     start, (observation, *_) = case.build(), images()[1]
-    return check_speed("a frame", MAX_SECONDS, lambda _: len([start.posterior(observation)]))
+    return check_speed(
+        "a frame", MAX_SECONDS, lambda _: len([start.posterior(observation)])
+    )
 
 
 RULES = [

@@ -11,7 +11,8 @@ from posefit.fitting.box import Start
 
 Rule = Callable[[Array], NDArray[np.bool_]]
 
-TARGET = 0.3  # every coordinate of where `sphere` is least: not the centre, which is too easy
+# every coordinate of where `sphere` is least: not the centre, which is too easy
+TARGET = 0.3
 
 
 def anywhere(proposals: Array) -> NDArray[np.bool_]:

@@ -38,7 +38,13 @@ def scene() -> tuple[Task, Motion, Sequence[Observation]]:
     ]
     training = [built_in.motion(style) for style in built_in.other_styles("walk")]
     anchor = motion.translations[0]
-    return Task(body, [camera], EVALUATIONS, 0.0, anchor, fps=motion.fps, training=training), motion, observations
+    return (
+        Task(
+            body, [camera], EVALUATIONS, 0.0, anchor, fps=motion.fps, training=training
+        ),
+        motion,
+        observations,
+    )
 
 
 class Tracked(NamedTuple):
@@ -81,14 +87,19 @@ class Case(PluginCase):
     def same(self, tracker: Tracker) -> bool:
         """Return whether a tracker gives the first track's poses."""
         again = tracker.track(scene()[2], np.random.default_rng(0))
-        return np.array_equal([frame.pose for frame in again], [frame.pose for frame in self.first.frames])
+        return np.array_equal(
+            [frame.pose for frame in again], [frame.pose for frame in self.first.frames]
+        )
 
     @cached_property
     def first(self) -> Tracked:
         """The audited track of a new tracker: once for all rules, as it may take minutes."""
         task, _, observations = scene()
-        tracker, audit = self.build(), Audit("the tracker", BETA)
-        frames, taken, count = list[Frame](), list[int](), 0
+        tracker = self.build()
+        audit = Audit("the tracker", BETA)
+        frames = list[Frame]()
+        taken = list[int]()
+        count = 0
 
         def stream() -> Iterator[Observation]:
             nonlocal count
@@ -97,15 +108,20 @@ class Case(PluginCase):
                 yield observation
 
         masks = [observation.silhouettes[0].mask for observation in observations]
-        inputs_unchanged, random = unchanged(*masks, task.anchor), global_random_state()
+        inputs_unchanged = unchanged(*masks, task.anchor)
+        random = global_random_state()
         try:
-            for frame in drive(tracker, task, stream(), np.random.default_rng(0), audit):
+            for frame in drive(
+                tracker, task, stream(), np.random.default_rng(0), audit
+            ):
                 frames.append(frame)
                 taken.append(count)
         except BrokenRuleError as broken:
             raise BrokenError(str(broken)) from broken.__cause__
         random_unchanged = random == global_random_state()
-        return Tracked(tracker, frames, taken, audit.warnings, inputs_unchanged(), random_unchanged)
+        return Tracked(
+            tracker, frames, taken, audit.warnings, inputs_unchanged(), random_unchanged
+        )
 
 
 def one_frame_each(case: Case) -> str:
@@ -117,7 +133,10 @@ def as_they_come(case: Case) -> None:
     """A frame is given before the observation after the next is taken, unless the tracker is one that looks ahead."""
     for given, taken in enumerate(case.first.taken, 1):
         late = taken > given + 1 and not case.looks_ahead
-        expect(not late, f"frames must come as observations do, got frame {given} after {taken} of them")
+        expect(
+            not late,
+            f"frames must come as observations do, got frame {given} after {taken} of them",
+        )
 
 
 def no_observation(case: Case) -> None:
@@ -139,22 +158,34 @@ def same_seed(case: Case) -> None:
 
 def used_twice(case: Case) -> None:
     """A tracker that has tracked before does the same again."""
-    expect(case.same(case.first.tracker), "a second track must be as the first, got another")
+    expect(
+        case.same(case.first.tracker),
+        "a second track must be as the first, got another",
+    )
 
 
 def inputs(case: Case) -> None:
     """Observations and task stay as they were."""
-    expect(case.first.inputs_unchanged, "observations and task must stay as they are, got others")
+    expect(
+        case.first.inputs_unchanged,
+        "observations and task must stay as they are, got others",
+    )
 
 
 def follows(case: Case) -> str:
     """The track is not lost: its MPJPE is below 150 mm."""
     task, motion, _ = scene()
     poses, places = (
-        np.array([getattr(frame, name) for frame in case.first.frames]) for name in ("pose", "translation")
+        np.array([getattr(frame, name) for frame in case.first.frames])
+        for name in ("pose", "translation")
     )
-    error = metrics.mpjpe_mm(motion.joints, task.body.skeleton.joints(poses, places)).mean()
-    expect(error < metrics.LOST_MM, f"the MPJPE must be below {metrics.LOST_MM:g} mm, got {error:.0f}")
+    error = metrics.mpjpe_mm(
+        motion.joints, task.body.skeleton.joints(poses, places)
+    ).mean()
+    expect(
+        error < metrics.LOST_MM,
+        f"the MPJPE must be below {metrics.LOST_MM:g} mm, got {error:.0f}",
+    )
     return f"MPJPE {error:.0f} mm"
 
 

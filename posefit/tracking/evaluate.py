@@ -38,14 +38,26 @@ def evaluate(
     from the first mask that was read. The build is that of `scene`; that of `task` is from before smoothing.
     """
     skeleton = scene.body.skeleton
-    posteriors = [frame.posterior and _finished(scene, frame.posterior, options.height is not None) for frame in frames]
-    frames = [replace(frame, posterior=each) for frame, each in zip(frames, posteriors, strict=True)]
+    posteriors = [
+        frame.posterior
+        and _finished(scene, frame.posterior, options.height is not None)
+        for frame in frames
+    ]
+    frames = [
+        replace(frame, posterior=each)
+        for frame, each in zip(frames, posteriors, strict=True)
+    ]
     training = None if scene.truth is None else task.angles
-    table, measures = evaluated(scene, frames, method.prior, training, method.audit.beta, clock)
+    table, measures = evaluated(
+        scene, frames, method.prior, training, method.audit.beta, clock
+    )
     trust = None
     if scene.truth is None:
-        trust = trust_of(scene, tracked.frames, frames, table, measures.iou, task.training)
-    motion, modes = scene.motion(frames), track_modes(skeleton, posteriors)
+        trust = trust_of(
+            scene, tracked.frames, frames, table, measures.iou, task.training
+        )
+    motion = scene.motion(frames)
+    modes = track_modes(skeleton, posteriors)
     backwards = walks_backwards(motion, unseen(table))
     warnings = [*scene.warnings, *method.audit.warnings]
     if scene.truth is None and (warning := backwards_warning(backwards)):
@@ -68,7 +80,11 @@ def evaluate(
         fps=scene.fps,
         frames=scene.count,
     )
-    none_right = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
+    none_right = [
+        p.recalibration.none
+        for p in posteriors
+        if p is not None and p.recalibration is not None
+    ]
     log = TrackingLog(
         hypotheses=tracked.hypotheses,
         build=None if shape is None else shape.as_dict(),
@@ -77,8 +93,13 @@ def evaluate(
         none_of_modes=round(float(np.mean(none_right)), 6) if none_right else None,
         unknown_sides=_numbers(table, "unknown_sides", 1.0),
         lost_frames=_numbers(table, "lost", LOST),
-        relocalised=[scene.first + k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
-        retracked_outside=tracked.stay and (scene.first + tracked.stay[0], scene.first + tracked.stay[1]),
+        relocalised=[
+            scene.first + k
+            for k, frame in enumerate(frames)
+            if RELOCALISED in frame.details
+        ],
+        retracked_outside=tracked.stay
+        and (scene.first + tracked.stay[0], scene.first + tracked.stay[1]),
         backwards_share=round(float(backwards.mean()), 6),
         warnings=warnings,
         guesses=[*scene.guesses],
@@ -92,7 +113,9 @@ def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posteri
     model = posterior.recalibration
     if scene.truth is None and model is not None:
         model = in_footage(model, len(scene.cameras), height_known)
-    return replace(posterior, modes=modes_of(scene.body.skeleton, posterior), recalibration=model)
+    return replace(
+        posterior, modes=modes_of(scene.body.skeleton, posterior), recalibration=model
+    )
 
 
 def _numbers(table: Table, name: str, least: float) -> list[int] | None:

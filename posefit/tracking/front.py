@@ -28,7 +28,8 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
-_FILES = ("source", "train", "asf", "camera", "extraction")  # options that may name files, whose content counts
+# options that may name files, whose content counts
+_FILES = ("source", "train", "asf", "camera", "extraction")
 
 
 def track(
@@ -53,11 +54,15 @@ def track(
     """
     known = [option.name for option in fields(TrackOptions)]
     if unknown := [name for name in options if name not in known]:
-        raise TypeError(f"track has no option {unknown[0]!r}{suggestion(unknown[0], known)}")
+        raise TypeError(
+            f"track has no option {unknown[0]!r}{suggestion(unknown[0], known)}"
+        )
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
     sources = _sources(source)
-    changed = [name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)]
+    changed = [
+        name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)
+    ]
     if scene is not None and changed:
         raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
     kind = kind_of(sources[0])
@@ -65,33 +70,54 @@ def track(
     _check_for_kind(chosen, kind == "motion", [*sources, *chosen.train])
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
     chosen = completed(chosen, followed if kind == "motion" else None)
-    clips = training_clips(chosen.train, chosen.of_files, followed=followed)  # before the work, as a name may be wrong
+    # before the work, as a name may be wrong
+    clips = training_clips(chosen.train, chosen.of_files, followed=followed)
     for name, value in (("resume", resume), ("force", force)):
         if value and out is None:
-            raise InputError(f"{name} must be given with out, the folder of the track, got none")
+            raise InputError(
+                f"{name} must be given with out, the folder of the track, got none"
+            )
     progress = progress or interactive()
     recorder = Recorder()
     if out is not None:
-        recorder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
+        recorder = OutputFolder(
+            out,
+            force,
+            resume,
+            _identity(sources, chosen, options.get("train", ())),
+            progress.log,
+        )
     with recorder:
         with progress.phase("masks"):
             start = clocks()
             scene = scene or scene_of(sources, progress, **chosen.view)
-            if scene.truth is None:  # a known motion is drawn frame by frame, as it is tracked
+            # a known motion is drawn frame by frame, as it is tracked
+            if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
                 scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
         training = training_motions(clips, scene.fps)
-        track = track_scene(scene, training, chosen, recorder=recorder, progress=progress)
-        names = [each.name if isinstance(each, Motion) else name_of(each) for each in sources]
+        track = track_scene(
+            scene, training, chosen, recorder=recorder, progress=progress
+        )
+        names = [
+            each.name if isinstance(each, Motion) else name_of(each) for each in sources
+        ]
         view_degrees = options.get("view_degrees")
-        setup = replace(track.setup, source=names, frames_chosen=list(chosen.frames), view_degrees=view_degrees)
+        setup = replace(
+            track.setup,
+            source=names,
+            frames_chosen=list(chosen.frames),
+            view_degrees=view_degrees,
+        )
         track = replace(track, setup=setup)
         with progress.phase("write"):
             recorder.finish(track.content)
         return track
 
 
-def fit(source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any) -> Fit:
+def fit(
+    source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any
+) -> Fit:
     """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
@@ -101,56 +127,114 @@ def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
     """Return one source a camera: an image, a mask or a list of either is that of one."""
     if isinstance(source, Scene):
         if source.truth is None:
-            raise InputError(f"a scene must be of a known motion, got {source.name}, whose truth is unknown")
+            raise InputError(
+                f"a scene must be of a known motion, got {source.name}, whose truth is unknown"
+            )
         return [source.truth]
-    if isinstance(source, Motion) or not isinstance(source, Sequence) or isinstance(source, str):
+    if (
+        isinstance(source, Motion)
+        or not isinstance(source, Sequence)
+        or isinstance(source, str)
+    ):
         source = [source]
-    sources: list[Any] = [np.asarray(each) if hasattr(each, "__array__") else each for each in source]
+    sources: list[Any] = [
+        np.asarray(each) if hasattr(each, "__array__") else each for each in source
+    ]
     if all(isinstance(each, np.ndarray) and each.ndim == 2 for each in sources):
         if len({each.shape for each in sources}) > 1:
-            raise InputError(f"masks must have one shape, got {', '.join(sorted({str(e.shape) for e in sources}))}")
+            raise InputError(
+                f"masks must have one shape, got {', '.join(sorted({str(e.shape) for e in sources}))}"
+            )
         return [np.stack(sources)]
-    images = [isinstance(each, str | Path) and Path(each).suffix.lower() in IMAGES for each in sources]
+    images = [
+        isinstance(each, str | Path) and Path(each).suffix.lower() in IMAGES
+        for each in sources
+    ]
     if all(images):
         return [tuple(Path(each) for each in sources)]
-    return [(Path(each),) if image else each for each, image in zip(sources, images, strict=True)]
+    return [
+        (Path(each),) if image else each
+        for each, image in zip(sources, images, strict=True)
+    ]
 
 
-def _check_for_kind(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
+def _check_for_kind(
+    options: TrackOptions, known: bool, motions: Sequence[Footage]
+) -> None:
     """Raise InputError for an option of motions' files or of a known truth where there is no such thing."""
-    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
-    folders = any(Path(motion).is_dir() for motion in options.train if isinstance(motion, str | Path))
+    captured = any(
+        str(motion).lower().endswith(".amc")
+        for motion in motions
+        if isinstance(motion, str | Path)
+    )
+    folders = any(
+        Path(motion).is_dir()
+        for motion in options.train
+        if isinstance(motion, str | Path)
+    )
     if options.rate is not None and not (captured or folders):
-        raise InputError(f"rate must be given for .amc files only, got {quoted(options.rate)}")
+        raise InputError(
+            f"rate must be given for .amc files only, got {quoted(options.rate)}"
+        )
     if not known:
         if options.translation == "known":
-            raise InputError("translation must be searched or aligned where only masks are given, got known")
+            raise InputError(
+                "translation must be searched or aligned where only masks are given, got known"
+            )
         if options.first_pose == "given":
-            raise InputError("first_pose must be searched where only masks are given, got given")
+            raise InputError(
+                "first_pose must be searched where only masks are given, got given"
+            )
         return
     if options.asf is not None and not captured:
-        raise InputError(f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}")
+        raise InputError(
+            f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}"
+        )
 
 
-def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]) -> dict[str, Digest]:
+def _identity(
+    sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]
+) -> dict[str, Digest]:
     """Return what a track must have in common with one that it goes on with."""
-    values = {option.name: getattr(options, option.name) for option in fields(options) if declared(option).identifies}
+    values = {
+        option.name: getattr(options, option.name)
+        for option in fields(options)
+        if declared(option).identifies
+    }
     values |= {"source": sources, "train": train, "version": __version__}
-    named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()  # a folder of that name is not read
+    # a folder of that name is not read
+    named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()
     return {
-        name: digest_of(value, files=name in _FILES and not (named and name == "source"))
+        name: digest_of(
+            value, files=name in _FILES and not (named and name == "source")
+        )
         for name, value in values.items()
     }
 
 
 def _documented(function: Callable[..., Any]) -> None:
     """Show the options of a track in a function's signature and docstring, as if it declared them itself."""
-    parameters = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
-    listed = [option for option in fields(TrackOptions) if function is track or option.name != "frames"]
+    parameters = [
+        each
+        for each in inspect.signature(function).parameters.values()
+        if each.kind is not each.VAR_KEYWORD
+    ]
+    listed = [
+        option
+        for option in fields(TrackOptions)
+        if function is track or option.name != "frames"
+    ]
     kind = inspect.Parameter.KEYWORD_ONLY
-    more = [inspect.Parameter(option.name, kind, default=option.default, annotation=option.type) for option in listed]
+    more = [
+        inspect.Parameter(
+            option.name, kind, default=option.default, annotation=option.type
+        )
+        for option in listed
+    ]
     function.__signature__ = inspect.Signature([*parameters, *more])  # type: ignore[attr-defined]
-    lines = "\n".join(f"    {option.name}: {declared(option).help}" for option in listed)
+    lines = "\n".join(
+        f"    {option.name}: {declared(option).help}" for option in listed
+    )
     function.__doc__ = f"{(function.__doc__ or '').rstrip()}\n\n    Options:\n{lines}\n"
 
 

@@ -32,14 +32,19 @@ from posefit.tracking.smoothing.path import Visibility
 
 MIN_BODY_FRAMES = 5
 WARM_UP_POPULATIONS = 8
-NEAR_SECONDS = 0.5  # ours: within which a walker hardly turns farther than a search reaches, 45 degrees
+# ours: within which a walker hardly turns farther than a search reaches, 45 degrees
+NEAR_SECONDS = 0.5
 
 
 def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
     """Return the task of tracking a scene, as far as it is known before anything is searched."""
     assert options.evaluations is not None
     assert options.translation is not None
-    first_pose = None if scene.truth is None or options.first_pose == "searched" else scene.truth.poses[0, 3:]
+    first_pose = (
+        None
+        if scene.truth is None or options.first_pose == "searched"
+        else scene.truth.poses[0, 3:]
+    )
     return Task(
         scene.body,
         scene.cameras,
@@ -64,13 +69,19 @@ def initialise(
     if task.yaw is None:
         task = replace(task, start=method.start)
     _warm_up(method, task, scene)
-    start, shape, body_frames = clocks(), None, (options.body_frames or 0) if scene.count > 1 else 0
+    start = clocks()
+    shape = None
+    body_frames = (options.body_frames or 0) if scene.count > 1 else 0
     if options.restarts:
         searched = scene.observations, method.follow, options.restarts, options.seed
         task, _ = best_restart(task, *searched, log=progress.log)
     count = len(usable_observations(scene.observations, body_frames))
     if body_frames and count < MIN_BODY_FRAMES:
-        few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
+        few = (
+            f"{count} of them show enough of the person"
+            if count < body_frames
+            else f"{count} are too few"
+        )
         needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
         progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
     elif body_frames:
@@ -78,7 +89,9 @@ def initialise(
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = options.height or (task.body.stature if alone else None)
         fitted = scene, method.follow, body_frames, height, options.seed
-        shape, cameras = fitted_build(task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0)
+        shape, cameras = fitted_build(
+            task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0
+        )
         task = replace(task, body=shape.body, cameras=cameras)
     return task, shape, start
 
@@ -102,13 +115,20 @@ def fitted_build(
     they may have turned from the pose that the task begins with. Where that is longer ago than `NEAR_SECONDS`, the pose
     is searched again, with so many `restarts`, or by the tracker itself.
     """
-    observations, stride, whole = scene.observations, TRIAL_STRIDE, first_shown_whole(scene.observations)
-    first = next((k for k, observation in enumerate(observations) if observation.usable), 0)
+    observations = scene.observations
+    stride = TRIAL_STRIDE
+    whole = first_shown_whole(scene.observations)
+    first = next(
+        (k for k, observation in enumerate(observations) if observation.usable), 0
+    )
     chosen = usable_observations(observations, frames, stride, whole)
     if len(chosen) < frames:
-        chosen, stride = usable_observations(observations, frames), 1
+        chosen = usable_observations(observations, frames)
+        stride = 1
     elif whole - first > NEAR_SECONDS * task.fps:
-        task = replace(task, yaw=observations[whole].yaw, first_pose=None, modes=(), before=())
+        task = replace(
+            task, yaw=observations[whole].yaw, first_pose=None, modes=(), before=()
+        )
         if restarts:
             reach = min(whole + TRIAL_FRAMES * TRIAL_STRIDE, len(observations))
             ahead = [observations[k] for k in range(whole, reach)]
@@ -116,21 +136,50 @@ def fitted_build(
     task = replace(task, fps=task.fps / stride)
 
     def frames_of(body: Body) -> list[Frame]:
-        return list(follow(replace(task, body=body), chosen, np.random.default_rng(seed)))
+        return list(
+            follow(replace(task, body=body), chosen, np.random.default_rng(seed))
+        )
 
     if scene.cameras_turn:
-        filmed = replace(scene, body=task.body, observations=chosen, count=len(chosen), fps=task.fps)
+        filmed = replace(
+            scene, body=task.body, observations=chosen, count=len(chosen), fps=task.fps
+        )
         average = Shape(task.body, np.ones(len(NAMES)), SPREAD, np.inf, height)
-        fitted = fit_contours(filmed, filmed.motion(frames_of(task.body)), Visibility.of(filmed), average, beta)
+        fitted = fit_contours(
+            filmed,
+            filmed.motion(frames_of(task.body)),
+            Visibility.of(filmed),
+            average,
+            beta,
+        )
         task = replace(task, cameras=fitted[0].cameras)
-    aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
-    shape = fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
+    aligned = task.translation == "aligned"
+    rng = np.random.default_rng(seed)
+    shape = fit_shape(
+        task.body,
+        task.cameras,
+        chosen,
+        frames_of,
+        rng,
+        height=height,
+        aligned=aligned,
+        beta=beta,
+    )
     return shape, task.cameras
 
 
 def _warm_up(method: Method, task: Task, scene: Scene) -> None:
     """Search a few populations of the first frame, so that everything is compiled."""
-    population_size = method.settings.get("optimiser", {}).get("population_size", POPULATION_SIZE)
-    few = replace(task, evaluations=min(task.evaluations, WARM_UP_POPULATIONS * population_size))
-    with suppress(ValueError):  # what fails for want of evaluations is reported where it fails with all of them
-        next(method.follow(few, [next(iter(scene.observations))], np.random.default_rng(0)))
+    population_size = method.settings.get("optimiser", {}).get(
+        "population_size", POPULATION_SIZE
+    )
+    few = replace(
+        task, evaluations=min(task.evaluations, WARM_UP_POPULATIONS * population_size)
+    )
+    # what fails for want of evaluations is reported where it fails with all of them
+    with suppress(ValueError):
+        next(
+            method.follow(
+                few, [next(iter(scene.observations))], np.random.default_rng(0)
+            )
+        )

@@ -32,8 +32,10 @@ from posefit.tracking.pipeline import track_hypothesis, with_notes
 from posefit.tracking.restarts import SEARCHED, TRIAL_FRAMES, TRIAL_STRIDE
 from posefit.tracking.trajectory import Hypothesis
 
-LIVE_METHOD = "sapso@pca"  # the default: `exemplars` takes longer than a frame lasts, and looks ahead
-FRAMES_FILE, POSES_FILE = "frames.jsonl", "poses.npz"
+# the default: `exemplars` takes longer than a frame lasts, and looks ahead
+LIVE_METHOD = "sapso@pca"
+FRAMES_FILE = "frames.jsonl"
+POSES_FILE = "poses.npz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,9 @@ class LiveFrame:
         }
 
 
-def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any) -> Iterator[LiveFrame]:
+def track_live(
+    source: str = "-", *, progress: Progress = QUIET, **options: Any
+) -> Iterator[LiveFrame]:
     """Yield the tracked frames of a stream; of those that come while one is tracked all but the newest are skipped.
 
     `source` is as for `posefit.footage.live.Stream`; options are those of `posefit.track`, and the method is
@@ -71,7 +75,9 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
     chosen = TrackOptions(**options)
     for each in fields(chosen):
         if not declared(each).live and getattr(chosen, each.name) != each.default:
-            raise InputError(f"{each.name} must be left out with live, got {getattr(chosen, each.name)}")
+            raise InputError(
+                f"{each.name} must be left out with live, got {getattr(chosen, each.name)}"
+            )
     if chosen.method is None or isinstance(chosen.method, str):
         chosen = chosen.changed(method=str(method_names(chosen.method or LIVE_METHOD)))
     chosen = completed(chosen.changed(body_frames=0, smooth=False), None)
@@ -99,36 +105,60 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         method = prepare(chosen, task)
         task, _, _ = initialise(scene, method, task, chosen, progress)
         hypothesis = Hypothesis(SEARCHED, task, np.random.default_rng(chosen.seed))
-        for frame in track_hypothesis(hypothesis, method, coming(), method.relocalise_gap):
+        for frame in track_hypothesis(
+            hypothesis, method, coming(), method.relocalise_gap
+        ):
             live = waiting.popleft()
-            arrived, start = live.source.arrived, first[0].source.arrived
-            yield LiveFrame(live.source.number, arrived - start, time.perf_counter() - arrived, live.usable, frame)
+            arrived = live.source.arrived
+            start = first[0].source.arrived
+            yield LiveFrame(
+                live.source.number,
+                arrived - start,
+                time.perf_counter() - arrived,
+                live.usable,
+                frame,
+            )
 
 
 def _scene_of(
     first: Sequence[LiveMask], name: str, fps: float | None, options: TrackOptions
 ) -> tuple[Scene, Callable[[LiveMask], Observation]]:
     """Return the scene of the first frames, and the function that makes an observation of a later one."""
-    check_used("masks" if first and first[0].source.image.ndim == 2 else "pictures", options.view)
+    check_used(
+        "masks" if first and first[0].source.image.ndim == 2 else "pictures",
+        options.view,
+    )
     if not any(live.usable for live in first):
-        raise InputError(f"{name}: expected a person in the first {len(first)} frames, got none")
+        raise InputError(
+            f"{name}: expected a person in the first {len(first)} frames, got none"
+        )
     size = (first[0].mask.shape[1], first[0].mask.shape[0])
 
     def packed(frames: Sequence[LiveMask]) -> PackedMasks:
         names = [f"{name}, frame {live.source.number}" for live in frames]
         masks = np.packbits([live.mask.ravel() for live in frames], axis=1)
         valid = np.packbits([live.valid.ravel() for live in frames], axis=1)
-        usable, landmarks = np.array([live.usable for live in frames]), np.array([live.landmarks for live in frames])
+        usable = np.array([live.usable for live in frames])
+        landmarks = np.array([live.landmarks for live in frames])
         known = landmarks if landmarks[..., 2].any() else None
         return PackedMasks(names, size, masks, valid, usable, landmarks=known)
 
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
-    body, notes, of_height = body_of(options.asf, options.height, None if known else options.unit)
+    body, notes, of_height = body_of(
+        options.asf, options.height, None if known else options.unit
+    )
     view = CameraView(packed(first), notes, name)
     scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
     scene = replace(scene, guesses=[*scene.guesses, *of_height])
-    bent = next(((each, each.maps(size)) for each in known if isinstance(each, Calibration) and each.distorted), None)
+    bent = next(
+        (
+            (each, each.maps(size))
+            for each in known
+            if isinstance(each, Calibration) and each.distorted
+        ),
+        None,
+    )
 
     def observed(live: LiveMask) -> Observation:
         masks = packed([live])
@@ -138,19 +168,25 @@ def _scene_of(
 
 
 def write_live(
-    frames: Iterator[LiveFrame], out: str | Path | None = None, on_frame: Callable[[LiveFrame], None] | None = None
+    frames: Iterator[LiveFrame],
+    out: str | Path | None = None,
+    on_frame: Callable[[LiveFrame], None] | None = None,
 ) -> dict[str, Any]:
     """Return a summary of a live track, followed until its stream ends or Ctrl-C.
 
     With `out`, a new folder gets frames.jsonl, a line a frame as it comes, and at the end poses.npz, also where the
     stream breaks off. Raises InputError then, after both are written.
     """
-    folder, latencies, last = None if out is None else Path(out), list[float](), -1
+    folder = None if out is None else Path(out)
+    latencies = list[float]()
+    last = -1
     check_free(folder)
     if folder is not None:
         folder.mkdir()
     try:
-        with (Path(os.devnull) if folder is None else folder / FRAMES_FILE).open("w", encoding="utf-8") as lines:
+        with (Path(os.devnull) if folder is None else folder / FRAMES_FILE).open(
+            "w", encoding="utf-8"
+        ) as lines:
             for live in frames:
                 latencies.append(live.latency)
                 last = live.number
@@ -161,16 +197,23 @@ def write_live(
         pass
     finally:
         if folder is not None:
-            rows = [json.loads(line) for line in (folder / FRAMES_FILE).read_text("utf-8").splitlines()]
+            rows = [
+                json.loads(line)
+                for line in (folder / FRAMES_FILE).read_text("utf-8").splitlines()
+            ]
             np.savez_compressed(
                 folder / POSES_FILE,
                 frames=np.array([row["frame"] for row in rows], dtype=np.int64),
                 seconds=np.array([row["seconds"] for row in rows]),
                 poses=np.radians([row["pose_degrees"] for row in rows]).reshape(-1, 66),
-                translations=np.array([row["translation_m"] for row in rows]).reshape(-1, 3),
+                translations=np.array([row["translation_m"] for row in rows]).reshape(
+                    -1, 3
+                ),
                 usable=np.array([row["usable"] for row in rows], dtype=bool),
             )
-    median, slow = np.quantile(latencies, (0.5, 0.99)).tolist() if latencies else (np.nan, np.nan)
+    median, slow = (
+        np.quantile(latencies, (0.5, 0.99)).tolist() if latencies else (np.nan, np.nan)
+    )
     return {
         "frames": len(latencies),
         "skipped": last + 1 - len(latencies),

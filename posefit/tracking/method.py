@@ -24,7 +24,12 @@ from posefit.fitting.tracker import (
     Task,
     Tracker,
 )
-from posefit.fitting.validation import CheckedOptimiser, CheckedPrior, check_prior, plugin_errors
+from posefit.fitting.validation import (
+    CheckedOptimiser,
+    CheckedPrior,
+    check_prior,
+    plugin_errors,
+)
 from posefit.reading import quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
@@ -52,14 +57,21 @@ def method_names(method: str, default_prior: str = DEFAULT_PRIOR) -> MethodNames
     optimiser, at, prior = method.partition("@")
     if at:
         return MethodNames(optimiser or DEFAULT_OPTIMISER, prior or default_prior)
-    offers, family = registry().offers, optimiser.partition(":")[0]
+    offers = registry().offers
+    family = optimiser.partition(":")[0]
     if family in offers["tracker"]:
         return MethodNames("", "", optimiser)
     if family in offers["optimiser"]:
         return MethodNames(optimiser, default_prior)
     known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
-    hint = f"; as a prior it is @{optimiser}" if family in offers["prior"] else registry().hint(family, known)
-    raise InputError(f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {quoted(method)}{hint}")
+    hint = (
+        f"; as a prior it is @{optimiser}"
+        if family in offers["prior"]
+        else registry().hint(family, known)
+    )
+    raise InputError(
+        f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {quoted(method)}{hint}"
+    )
 
 
 def offers_of(method: Any) -> tuple[Offer, str | Prior | None]:
@@ -82,15 +94,21 @@ class Method:
     """A method ready to track: its prior has learned, and `build` makes a tracker of a task."""
 
     name: str
-    prior: Latents | None  # which has learned; None for a tracker that is a plugin itself
+    # which has learned; None for a tracker that is a plugin itself
+    prior: Latents | None
     settings: dict[str, dict[str, Any]]
-    looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
-    relocalise_gap: int  # frames of a gap in footage after which it relocalises, 0 for never
+    # whether its tracker takes several observations before it yields a frame
+    looks_ahead: bool
+    # frames of a gap in footage after which it relocalises, 0 for never
+    relocalise_gap: int
     audit: Audit  # what its trackers reported wrongly so far
     build: Callable[[Task], Tracker] = field(repr=False)
-    start: InitialiserFactory | None = field(default=None, repr=False)  # guesses first poses; None for blind searches
+    # guesses first poses; None for blind searches
+    start: InitialiserFactory | None = field(default=None, repr=False)
 
-    def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+    def follow(
+        self, task: Task, observations: Iterable[Observation], rng: np.random.Generator
+    ) -> Iterator[Frame]:
         """Yield a frame for each observation, as a task asks."""
         return drive(self.build(task), task, observations, rng, self.audit)
 
@@ -110,20 +128,39 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     optimiser, prior_choice = offers_of(options.method)
     if prior_choice is None:
         return _tracker_method(optimiser, options.settings)
-    prior = registry().offer("prior", prior_choice) if isinstance(prior_choice, str) else None
-    plugin_settings = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
+    prior = (
+        registry().offer("prior", prior_choice)
+        if isinstance(prior_choice, str)
+        else None
+    )
+    plugin_settings = parsed_settings(
+        [optimiser] if prior is None else [optimiser, prior], options.settings
+    )
     plugin_settings.setdefault("prior", {})
-    planned = settings.planned(optimiser.factory, plugin_settings["optimiser"], task.evaluations)
-    plugin_settings["optimiser"] = settings.check(optimiser.name, optimiser.factory, planned)
+    planned = settings.planned(
+        optimiser.factory, plugin_settings["optimiser"], task.evaluations
+    )
+    plugin_settings["optimiser"] = settings.check(
+        optimiser.name, optimiser.factory, planned
+    )
     if prior is not None:
         with _rules(prior):
-            learned = prior.factory(**plugin_settings["prior"]).fit(task.angles, task.body.skeleton)
+            learned = prior.factory(**plugin_settings["prior"]).fit(
+                task.angles, task.body.skeleton
+            )
             check_prior(learned, task.angles, prior.label)
-        learned, name = CheckedPrior(learned, prior.label), prior.name
+        learned = CheckedPrior(learned, prior.label)
+        name = prior.name
     else:
-        learned, name = prior_choice, type(prior_choice).__name__
+        learned = prior_choice
+        name = type(prior_choice).__name__
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
-    prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **plugin_settings["tracker"]})
+    prediction = Prediction(
+        **{
+            **({} if prior is not None else {"tilt": "box"}),
+            **plugin_settings["tracker"],
+        }
+    )
     tilt = prediction.tilted(learned, task.training)
 
     def build(task: Task) -> Tracker:
@@ -132,7 +169,9 @@ def prepare(options: TrackOptions, task: Task) -> Method:
                 made = optimiser.factory(space, rng, **plugin_settings["optimiser"])
             return CheckedOptimiser(made, space, optimiser.label, task.evaluations)
 
-        return SynthesisTracker(task, learned, optimiser_of, optimiser.next_frame, prediction, tilt)
+        return SynthesisTracker(
+            task, learned, optimiser_of, optimiser.next_frame, prediction, tilt
+        )
 
     label = f"{optimiser.name}@{name}"
     return Method(
@@ -153,7 +192,9 @@ def start_of(name: str | None = None) -> InitialiserFactory | None:
     one_of("start", name or BLIND, [BLIND, *sorted(offered)])
     if name == BLIND or (name is None and DEFAULT_START not in offered):
         return None
-    factory: InitialiserFactory = registry().offer("start", name or DEFAULT_START).factory
+    factory: InitialiserFactory = (
+        registry().offer("start", name or DEFAULT_START).factory
+    )
     return factory
 
 
@@ -162,10 +203,16 @@ def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any
     places: dict[str, tuple[str, Callable[..., Any]]] = {
         offer.name.partition(":")[0]: (offer.kind, offer.factory) for offer in offers
     }
-    return places if offers[0].kind == "tracker" else places | {"tracker": ("tracker", Prediction)}
+    return (
+        places
+        if offers[0].kind == "tracker"
+        else places | {"tracker": ("tracker", Prediction)}
+    )
 
 
-def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
+def parsed_settings(
+    offers: Sequence[Offer], values: Mapping[str, Any] | Sequence[str]
+) -> dict[str, dict[str, Any]]:
     """Return settings by the kind of plugin that they are of.
 
     They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
@@ -175,34 +222,47 @@ def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequenc
     places = places_of(offers)
     by_plugin: dict[str, dict[str, Any]] = {name: {} for name in places}
     stated = isinstance(values, Mapping)  # else texts, whose values are to be parsed
-    items: Iterable[tuple[str, Any]] = values.items() if isinstance(values, Mapping) else map(_assignment, values)
+    items: Iterable[tuple[str, Any]] = (
+        values.items() if isinstance(values, Mapping) else map(_assignment, values)
+    )
     for key, value in items:
         name, setting = _owner(key, places)
         if setting in by_plugin[name]:
             raise InputError(f"a setting must be given once, got {quoted(key)} twice")
         by_plugin[name][setting] = value
     checked = settings.check if stated else settings.parse
-    return {kind: checked(name, factory, by_plugin[name]) for name, (kind, factory) in places.items()}
+    return {
+        kind: checked(name, factory, by_plugin[name])
+        for name, (kind, factory) in places.items()
+    }
 
 
 def _assignment(text: str) -> tuple[str, str]:
     key, equals, value = text.partition("=")
     if not equals or key.endswith("."):
-        raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(text)}")
+        raise InputError(
+            f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(text)}"
+        )
     return key, value
 
 
-def _owner(key: str, places: Mapping[str, tuple[str, Callable[..., Any]]]) -> tuple[str, str]:
+def _owner(
+    key: str, places: Mapping[str, tuple[str, Callable[..., Any]]]
+) -> tuple[str, str]:
     """Return the plugin and the setting that a key names; the plugin may be left out where it alone has the setting."""
     plugin, dot, setting = key.partition(".")
     if dot and plugin in places:
         return plugin, setting
     if dot:
-        raise InputError(f"a setting must name one of {', '.join(places)}, which are in use here, got {quoted(key)}")
+        raise InputError(
+            f"a setting must name one of {', '.join(places)}, which are in use here, got {quoted(key)}"
+        )
     names = {plugin: settings.names(factory) for plugin, (_, factory) in places.items()}
     owners = [plugin for plugin in names if key in names[plugin]]
     if len(owners) != 1:
-        known = ", ".join(f"{plugin}.{setting}" for plugin in names for setting in names[plugin])
+        known = ", ".join(
+            f"{plugin}.{setting}" for plugin in names for setting in names[plugin]
+        )
         raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
     return owners[0], key
 
@@ -210,7 +270,8 @@ def _owner(key: str, places: Mapping[str, tuple[str, Callable[..., Any]]]) -> tu
 def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> Method:
     plugin_settings = parsed_settings([offer], values)["tracker"]
     defaults = {setting.name: setting.default for setting in offer.settings}
-    beta = {"beta": BETA, **defaults, **plugin_settings}["beta"]  # of the costs that it gives
+    # of the costs that it gives
+    beta = {"beta": BETA, **defaults, **plugin_settings}["beta"]
     beta = float(beta) if isinstance(beta, float | int) else BETA
 
     def build(task: Task) -> Tracker:

@@ -29,10 +29,12 @@ if TYPE_CHECKING:
     from posefit.geometry.units import Unit
     from posefit.motion.clips import FileOptions, Source
 
-EVALUATIONS = 2440  # of a frame: N (C + 1) with N = 40 and C = 60 of the SAPSO paper, section 5.2
+# of a frame: N (C + 1) with N = 40 and C = 60 of the SAPSO paper, section 5.2
+EVALUATIONS = 2440
 LARGEST_SIDE = 16_384  # pixels of a rendered picture
 
-Check = Callable[[str, Any], Any]  # of a name and a value that is not None: the value as it is used; raises InputError
+# of a name and a value that is not None: the value as it is used; raises InputError
+Check = Callable[[str, Any], Any]
 
 
 class Option(NamedTuple):
@@ -40,9 +42,12 @@ class Option(NamedTuple):
 
     help: str
     check: Check | None = None
-    unit: str = ""  # or the form of its text; what the command line shows as a placeholder
-    flag: str | None = None  # of the command line; None for the name itself, "" for none
-    parse: Callable[[str], Any] = str  # of a text of the command line; bool for a pair of flags
+    # or the form of its text; what the command line shows as a placeholder
+    unit: str = ""
+    # of the command line; None for the name itself, "" for none
+    flag: str | None = None
+    # of a text of the command line; bool for a pair of flags
+    parse: Callable[[str], Any] = str
     repeated: bool = False  # whether the flag may be given several times
     identifies: bool = True  # whether a track that goes on must have the same value
     heading: str = ""  # in the help, of this option and those below it
@@ -74,18 +79,34 @@ def within(low: float, high: float, unit: str = "") -> Check:
 
     def check(name: str, value: Any) -> float:
         if not low <= finite_number(name, value) <= high:
-            raise InputError(f"{name} must lie in {low:g} to {high:g}{unit}, got {quoted(value)}")
+            raise InputError(
+                f"{name} must lie in {low:g} to {high:g}{unit}, got {quoted(value)}"
+            )
         return float(value)
 
     return check
 
 
-def _int(default: int | None, text: str, least: int, placeholder: str = "N", **others: Any) -> Any:
+def _int(
+    default: int | None, text: str, least: int, placeholder: str = "N", **others: Any
+) -> Any:
     others = {"parse": int, **others}
-    return option(default, text, lambda name, value: whole(name, value, least), placeholder, **others)
+    return option(
+        default,
+        text,
+        lambda name, value: whole(name, value, least),
+        placeholder,
+        **others,
+    )
 
 
-def _float(text: str, ends: tuple[float, float], placeholder: str, unit: str = "", **others: Any) -> Any:
+def _float(
+    text: str,
+    ends: tuple[float, float],
+    placeholder: str,
+    unit: str = "",
+    **others: Any,
+) -> Any:
     return option(None, text, within(*ends, unit), placeholder, parse=float, **others)
 
 
@@ -93,14 +114,18 @@ def _size(name: str, value: Any) -> tuple[int, int]:
     sides = pair(name, value, "(width, height)")
     if not all(_is_whole(side) and 1 <= side <= LARGEST_SIDE for side in sides):
         largest = f"{LARGEST_SIDE}x{LARGEST_SIDE}"
-        raise InputError(f"{name} must be from 1x1 to {largest} pixels, got {sides[0]}x{sides[1]}")
+        raise InputError(
+            f"{name} must be from 1x1 to {largest} pixels, got {sides[0]}x{sides[1]}"
+        )
     return int(sides[0]), int(sides[1])
 
 
 def _range(name: str, value: Any) -> tuple[int | None, int | None]:
     start, stop = pair(name, value, "(start, stop), either of which may be None")
     if not all(end is None or _is_whole(end) for end in (start, stop)):
-        raise InputError(f"{name} must be two whole numbers or None, got {quoted(value)}")
+        raise InputError(
+            f"{name} must be two whole numbers or None, got {quoted(value)}"
+        )
     return start, stop
 
 
@@ -124,12 +149,21 @@ def _device(_name: str, value: Any) -> str:
 
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
     several = hasattr(value, "__len__") and not isinstance(value, str)
-    return tuple(within(-360.0, 360.0, " degrees")(name, degrees) for degrees in (value if several else [value]))
+    return tuple(
+        within(-360.0, 360.0, " degrees")(name, degrees)
+        for degrees in (value if several else [value])
+    )
 
 
 def _method(name: str, value: Any) -> Any:
-    if not (isinstance(value, str) or callable(value) or (isinstance(value, tuple) and len(value) == 2)):
-        raise InputError(f"{name} must be a name, a factory, or a pair of optimiser and prior, got {quoted(value)}")
+    if not (
+        isinstance(value, str)
+        or callable(value)
+        or (isinstance(value, tuple) and len(value) == 2)
+    ):
+        raise InputError(
+            f"{name} must be a name, a factory, or a pair of optimiser and prior, got {quoted(value)}"
+        )
     return value
 
 
@@ -163,7 +197,9 @@ def text_label(text: str) -> int:
     try:
         return int(text, 0)
     except ValueError:
-        raise InputError(f"expected a whole number such as 15, or a colour 0xRRGGBB, got {quoted(text)}") from None
+        raise InputError(
+            f"expected a whole number such as 15, or a colour 0xRRGGBB, got {quoted(text)}"
+        ) from None
 
 
 def text_person(text: str) -> "Choice":
@@ -174,7 +210,9 @@ def text_person(text: str) -> "Choice":
         across, down = map(float, text.split(","))
         return across, down
     except ValueError:
-        raise InputError(f"expected a number such as 2, or X,Y in pixels, got {quoted(text)}") from None
+        raise InputError(
+            f"expected a number such as 2, or X,Y in pixels, got {quoted(text)}"
+        ) from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,7 +220,11 @@ class TrackOptions:
     """The options of a track, checked; what is None or empty is decided by the source."""
 
     asf: str | Path | None = option(
-        None, "Skeleton of SOURCE; by default the only .asf beside an .amc.", None, "FILE", heading="What is seen"
+        None,
+        "Skeleton of SOURCE; by default the only .asf beside an .amc.",
+        None,
+        "FILE",
+        heading="What is seen",
     )
     camera: "Camera | str | Path | Sequence[Camera | str | Path]" = option(
         (),
@@ -203,14 +245,31 @@ class TrackOptions:
         choice(*UNITS),
         "|".join(UNITS),
     )
-    rate: float | None = _float("Rate of .amc files that do not state it; by default 120.", RATES, "HZ")
+    rate: float | None = _float(
+        "Rate of .amc files that do not state it; by default 120.", RATES, "HZ"
+    )
     view_degrees: float | Sequence[float] = option(
-        (), "Where a camera stands: 0 in front, 90 to the side; repeatable.", _degrees, "DEGREES", None, float, True
+        (),
+        "Where a camera stands: 0 in front, 90 to the side; repeatable.",
+        _degrees,
+        "DEGREES",
+        None,
+        float,
+        True,
     )
     size: tuple[int, int] | None = option(
-        None, "Image of a rendered motion, by default 320x240.", _size, "WxH", parse=text_size, live=False
+        None,
+        "Image of a rendered motion, by default 320x240.",
+        _size,
+        "WxH",
+        parse=text_size,
+        live=False,
     )
-    fps: float | None = _float("Rate to resample a motion to, or of masks; by default 30, or theirs.", RATES, "HZ")
+    fps: float | None = _float(
+        "Rate to resample a motion to, or of masks; by default 30, or theirs.",
+        RATES,
+        "HZ",
+    )
     frames: "Range" = option(
         (None, None),
         "Only these frames, (start, stop) in Python: of footage as filmed, of a motion after resampling.",
@@ -220,10 +279,18 @@ class TrackOptions:
         text_range,
         live=False,
     )
-    extraction: "Extraction | None" = option(None, "How the person is taken out of video.", flag="")
-    height: float | None = _float("How tall the person in the footage stands.", HEIGHTS, "METRES", " metres")
+    extraction: "Extraction | None" = option(
+        None, "How the person is taken out of video.", flag=""
+    )
+    height: float | None = _float(
+        "How tall the person in the footage stands.", HEIGHTS, "METRES", " metres"
+    )
     label: int | None = _int(
-        None, "Of masks: the value or the colour that the person has.", 0, parse=text_label, live=False
+        None,
+        "Of masks: the value or the colour that the person has.",
+        0,
+        parse=text_label,
+        live=False,
     )
     holes: float | None = _float(
         "Of masks: fill holes up to this share of the person; by default 0.02.",
@@ -267,7 +334,10 @@ class TrackOptions:
         repeated=True,
     )
     evaluations: int | None = _int(
-        None, "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.", 1, "POSES"
+        None,
+        "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.",
+        1,
+        "POSES",
     )
     translation: "Translation | None" = option(
         None,
@@ -277,16 +347,27 @@ class TrackOptions:
         heading="How it is followed",
     )
     first_pose: Literal["searched", "given"] = option(
-        "searched", "searched, or given (the true one).", choice("searched", "given"), "HOW"
+        "searched",
+        "searched, or given (the true one).",
+        choice("searched", "given"),
+        "HOW",
     )
     restarts: int | None = _int(
-        None, "Searches of an unknown first pose, at most; by default 8, or 0 for a tracker that looks ahead.", 0
+        None,
+        "Searches of an unknown first pose, at most; by default 8, or 0 for a tracker that looks ahead.",
+        0,
     )
     body_frames: int | None = _int(
-        None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", 0, live=False
+        None,
+        "Frames a build is fitted to; by default 12 for footage, 0 for none.",
+        0,
+        live=False,
     )
     hypotheses: int = _int(
-        1, "Tracks from different initial guesses, each at the full budget; one is kept.", 1, live=False
+        1,
+        "Tracks from different initial guesses, each at the full budget; one is kept.",
+        1,
+        live=False,
     )
     smooth: bool | None = option(
         None,
@@ -296,14 +377,21 @@ class TrackOptions:
         live=False,
     )
     seed: int = _int(0, "Of all random numbers.", 0, heading="Method and budget")
-    threads: int = _int(1, "The result is the same with any number.", 1, identifies=False)
+    threads: int = _int(
+        1, "The result is the same with any number.", 1, identifies=False
+    )
     device: str = option(
-        "cpu", "Where poses are drawn: cpu, or cuda with a GPU.", _device, "cpu|cuda", identifies=False
+        "cpu",
+        "Where poses are drawn: cpu, or cuda with a GPU.",
+        _device,
+        "cpu|cuda",
+        identifies=False,
     )
 
     def __post_init__(self) -> None:
         for each in fields(self):
-            value, check = getattr(self, each.name), declared(each).check
+            value = getattr(self, each.name)
+            check = declared(each).check
             if value is None and isinstance(each.default, tuple):
                 object.__setattr__(self, each.name, each.default)
             elif value is not each.default and check is not None:

@@ -45,18 +45,36 @@ from posefit.tracking.restarts import (
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.legs import with_cheapest_legs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth
-from posefit.tracking.trajectory import Hypothesis, Tracked, cheapest, mean_cost, with_effort_of, with_total_effort
+from posefit.tracking.trajectory import (
+    Hypothesis,
+    Tracked,
+    cheapest,
+    mean_cost,
+    with_effort_of,
+    with_total_effort,
+)
 
-PASSES, PASS_EVALUATIONS = 3, 2440  # of a film by several cameras, at most, and of a frame in each, at least
+# of a film by several cameras, at most, and of a frame in each, at least
+PASSES = 3
+PASS_EVALUATIONS = 2440
 SHORTEST = 3  # frames that are more than single pictures
 MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
 
 
 def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
     """Return a scene whose warnings say, too, what was guessed where the files to learn from were read."""
-    notes = list(dict.fromkeys(note for motion in training for note in motion.notes if note not in scene.warnings))
+    notes = list(
+        dict.fromkeys(
+            note
+            for motion in training
+            for note in motion.notes
+            if note not in scene.warnings
+        )
+    )
     if len(notes) > MAX_NOTES:
-        notes[MAX_NOTES:] = [f"and {len(notes) - MAX_NOTES} more of files to learn from"]
+        notes[MAX_NOTES:] = [
+            f"and {len(notes) - MAX_NOTES} more of files to learn from"
+        ]
     return replace(scene, warnings=[*scene.warnings, *notes])
 
 
@@ -65,9 +83,18 @@ def with_turns(scene: Scene, calibrated: Sequence[Camera]) -> Scene:
     cameras = list(zip(scene.cameras, calibrated, strict=True))
     if all(camera is other for camera, other in cameras):
         return scene
-    degrees = [np.degrees(geodesic(camera.rotation, other.rotation)) for camera, other in cameras]
+    degrees = [
+        np.degrees(geodesic(camera.rotation, other.rotation))
+        for camera, other in cameras
+    ]
     said = ", ".join(f"{each:.2f}" for each in degrees)
-    return replace(scene, guesses=[*scene.guesses, f"cameras turned by {said} degrees, so that their masks agree"])
+    return replace(
+        scene,
+        guesses=[
+            *scene.guesses,
+            f"cameras turned by {said} degrees, so that their masks agree",
+        ],
+    )
 
 
 def track_scene(
@@ -86,21 +113,30 @@ def track_scene(
     for warning in scene.warnings:
         progress.warn(warning)
     task = task_of(scene, options, training)
-    with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
+    # an optimiser's matrices are small: BLAS is slower with more threads
+    with threadpool_limits(1):
         method = prepare(options, task)
         passes = _passes(scene, method, task.evaluations, bool(options.smooth))
         task = replace(task, evaluations=task.evaluations // passes)
         with progress.phase("build"):
-            task, shape, start_clocks = initialise(scene, method, task, options, progress)
+            task, shape, start_clocks = initialise(
+                scene, method, task, options, progress
+            )
             scene = replace(scene, body=task.body, cameras=task.cameras)
         method.audit.clear()  # what was tried before the first frame is in no row
         with progress.phase("track"):
-            hypotheses = track_hypotheses(scene, task, method, options, recorder or Recorder(), progress)
+            hypotheses = track_hypotheses(
+                scene, task, method, options, recorder or Recorder(), progress
+            )
             tracked = cheapest(scene, hypotheses, task.training)
             if scene.truth is None and method.looks_ahead:
-                tracked = retrack_spins(task, scene.observations, tracked, method.follow, options.seed)
+                tracked = retrack_spins(
+                    task, scene.observations, tracked, method.follow, options.seed
+                )
                 if tracked.stay is not None:
-                    outside = "tracked again before frame {} and after frame {}".format(*tracked.stay)
+                    outside = "tracked again before frame {} and after frame {}".format(
+                        *tracked.stay
+                    )
                     progress.log(f"the body turned faster than a person can: {outside}")
         frames = tracked.frames
         if scene.count == 1 and task.before and frames[0].posterior is None:
@@ -110,36 +146,56 @@ def track_scene(
             with progress.phase("smooth"):
                 smoothed = smooth(*smoothed, method.audit.beta)
                 usable = sum(observation.usable for observation in scene.observations)
-                if len(scene.cameras) == 1 and usable >= SHORTEST and scene.truth is None:
-                    smoothed, exchanged = with_cheapest_legs(frames, smoothed, method.audit.beta)
+                if (
+                    len(scene.cameras) == 1
+                    and usable >= SHORTEST
+                    and scene.truth is None
+                ):
+                    smoothed, exchanged = with_cheapest_legs(
+                        frames, smoothed, method.audit.beta
+                    )
                     if exchanged.any():
-                        progress.log(f"legs exchanged in {exchanged.sum()} frames, where smooth ones then fit better")
+                        progress.log(
+                            f"legs exchanged in {exchanged.sum()} frames, where smooth ones then fit better"
+                        )
         if passes > 1:
-            tracked, smoothed = _cheapest_pass(task, method, tracked, smoothed, passes, options.seed, progress)
+            tracked, smoothed = _cheapest_pass(
+                task, method, tracked, smoothed, passes, options.seed, progress
+            )
         scene, frames, shape = smoothed
         scene = with_turns(scene, given.cameras)
         for guess in scene.guesses[len(given.guesses) :]:
             progress.log(guess)
         with progress.phase("evaluate"):
             clock = clocks() - start_clocks + scene.reading_seconds
-            track = evaluate(scene, frames, tracked, shape, method, task, options, clock)
+            track = evaluate(
+                scene, frames, tracked, shape, method, task, options, clock
+            )
     for warning in track.log.warnings[len(scene.warnings) :]:
         progress.warn(warning)
     return track
 
 
 def track_hypotheses(
-    scene: Scene, first: Task, method: Method, options: TrackOptions, recorder: Recorder, progress: Progress
+    scene: Scene,
+    first: Task,
+    method: Method,
+    options: TrackOptions,
+    recorder: Recorder,
+    progress: Progress,
 ) -> list[Hypothesis]:
     """Return each hypothesis with all its frames. Each is recorded as it comes; recorded ones are not tracked again."""
     recorded, state = recorder.earlier()
     gap = method.relocalise_gap if scene.truth is None else 0
-    count, total, pivot = scene.count, options.hypotheses, _pivot(scene, first, method)
+    count = scene.count
+    total = options.hypotheses
+    pivot = _pivot(scene, first, method)
     tracked: list[Hypothesis] = []
     for number in range(total):
         hypothesis = _hypothesis(number, scene, first, options, tracked, pivot)
         frames = recorded[number * count : (number + 1) * count]
-        done, which = len(frames), f"track {number + 1} of {total}"
+        done = len(frames)
+        which = f"track {number + 1} of {total}"
         if 0 < done < count and state is not None:
             hypothesis = _resumed(hypothesis, frames, state)
             frames = list(hypothesis.frames)
@@ -149,9 +205,15 @@ def track_hypotheses(
             progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
             rng = stream(options.seed, "back", number)
-            behind = _tracked_back(scene, hypothesis, method, pivot, rng, progress) if pivot and not done else []
+            behind = (
+                _tracked_back(scene, hypothesis, method, pivot, rng, progress)
+                if pivot and not done
+                else []
+            )
             ahead = (scene.observations[k] for k in range(done or pivot, count))
-            for frame in progress.steps(track_hypothesis(hypothesis, method, ahead, gap, behind), count - done):
+            for frame in progress.steps(
+                track_hypothesis(hypothesis, method, ahead, gap, behind), count - done
+            ):
                 recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
                 frames.append(frame)
         tracked.append(replace(hypothesis, frames=frames))
@@ -181,26 +243,40 @@ def track_hypothesis(
 
 
 def _cheapest_pass(
-    task: Task, method: Method, tracked: Tracked, smoothed: Smoothed, passes: int, seed: int, progress: Progress
+    task: Task,
+    method: Method,
+    tracked: Tracked,
+    smoothed: Smoothed,
+    passes: int,
+    seed: int,
+    progress: Progress,
 ) -> tuple[Tracked, Smoothed]:
     """Return the cheapest of so many passes of a film, and what is smoothed of it, with the effort of all."""
     scene, frames, shape = smoothed
     usable = np.array([observation.usable for observation in scene.observations])
 
-    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+    def follow(
+        task: Task, observations: Iterable[Observation], rng: np.random.Generator
+    ) -> Iterator[Frame]:
         return progress.steps(method.follow(task, observations, rng), scene.count)
 
     for number in range(1, passes):
-        progress.log(f"tracking the {scene.count} frames again, {'back in time' if number % 2 else 'onward'}")
+        progress.log(
+            f"tracking the {scene.count} frames again, {'back in time' if number % 2 else 'onward'}"
+        )
         with progress.phase("track"):
             latest = replace(task, body=scene.body, cameras=scene.cameras)
-            again = tracked_again(latest, scene.observations, frames, follow, number, seed)
+            again = tracked_again(
+                latest, scene.observations, frames, follow, number, seed
+            )
         with progress.phase("smooth"):
             other, others, build = smooth(scene, again, shape, method.audit.beta)
         better = mean_cost(others, usable) < mean_cost(frames, usable)
         frames = with_total_effort([frames, others], int(better))
         if better:
-            scene, shape, tracked = other, build, tracked._replace(frames=again)
+            scene = other
+            shape = build
+            tracked = tracked._replace(frames=again)
     return tracked, Smoothed(scene, frames, shape)
 
 
@@ -208,7 +284,11 @@ def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> i
     """Return how often a film is tracked: several cameras show which of two poses is right, once it is tried."""
     if len(scene.cameras) == 1 or scene.count < SHORTEST or scene.truth is not None:
         return 1
-    return max(min(PASSES, evaluations // PASS_EVALUATIONS), 1) if method.looks_ahead and smoothed else 1
+    return (
+        max(min(PASSES, evaluations // PASS_EVALUATIONS), 1)
+        if method.looks_ahead and smoothed
+        else 1
+    )
 
 
 def _pivot(scene: Scene, task: Task, method: Method) -> int:
@@ -219,38 +299,67 @@ def _pivot(scene: Scene, task: Task, method: Method) -> int:
     """
     if scene.truth is not None or not method.looks_ahead:
         return 0
-    first_yaw = next((observation.yaw for observation in scene.observations if observation.usable), None)
+    first_yaw = next(
+        (observation.yaw for observation in scene.observations if observation.usable),
+        None,
+    )
     return first_shown_whole(scene.observations) if task.yaw == first_yaw else 0
 
 
 def _tracked_back(
-    scene: Scene, hypothesis: Hypothesis, method: Method, pivot: int, rng: np.random.Generator, progress: Progress
+    scene: Scene,
+    hypothesis: Hypothesis,
+    method: Method,
+    pivot: int,
+    rng: np.random.Generator,
+    progress: Progress,
 ) -> list[Frame]:
     """Return the frames from the pivot back to the first of the scene."""
     back = (scene.observations[k] for k in range(pivot, -1, -1))
-    return list(progress.steps(method.follow(reversed_task(hypothesis.task), back, rng), pivot + 1))
+    return list(
+        progress.steps(
+            method.follow(reversed_task(hypothesis.task), back, rng), pivot + 1
+        )
+    )
 
 
 def _hypothesis(
-    number: int, scene: Scene, first: Task, options: TrackOptions, tracked: Sequence[Hypothesis], pivot: int
+    number: int,
+    scene: Scene,
+    first: Task,
+    options: TrackOptions,
+    tracked: Sequence[Hypothesis],
+    pivot: int,
 ) -> Hypothesis:
     """Return a hypothesis before its first frame; unless it is the first, its guess varies a frame of the first one."""
     if not tracked:
         return Hypothesis(SEARCHED, first, np.random.default_rng(options.seed))
     usable = (k for k in range(pivot, scene.count) if scene.observations[k].usable)
     estimate = tracked[0].frames[next(usable, 0)]
-    guess, task = initial_guess(number, first, scene.yaw, options.first_pose == "given", estimate)
+    guess, task = initial_guess(
+        number, first, scene.yaw, options.first_pose == "given", estimate
+    )
     return Hypothesis(guess, task, stream(options.seed, "hypothesis", number))
 
 
-def _resumed(hypothesis: Hypothesis, recorded: Sequence[Frame], state: dict[str, Any]) -> Hypothesis:
+def _resumed(
+    hypothesis: Hypothesis, recorded: Sequence[Frame], state: dict[str, Any]
+) -> Hypothesis:
     """Return a hypothesis that goes on from recorded frames, after which the random generator had some state.
 
     What follows has other trajectories than the earlier frames.
     """
     hypothesis.rng.bit_generator.state = state
-    posteriors = [frame.posterior and replace(frame.posterior, coherent=False) for frame in recorded]
-    frames = [replace(frame, posterior=posterior) for frame, posterior in zip(recorded, posteriors, strict=True)]
+    posteriors = [
+        frame.posterior and replace(frame.posterior, coherent=False)
+        for frame in recorded
+    ]
+    frames = [
+        replace(frame, posterior=posterior)
+        for frame, posterior in zip(recorded, posteriors, strict=True)
+    ]
     pose = frames[-1].pose
-    task = replace(hypothesis.task, yaw=float(pose[0]), first_pose=pose[3:], before=tuple(frames))
+    task = replace(
+        hypothesis.task, yaw=float(pose[0]), first_pose=pose[3:], before=tuple(frames)
+    )
     return replace(hypothesis, task=task, frames=frames)

@@ -26,18 +26,33 @@ from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
-from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
+from posefit.geometry.symmetry import (
+    exchanged_limbs,
+    facing,
+    mirrored_poses,
+    reflected_poses,
+    turned_poses,
+)
 from posefit.motion.steadiness import runs
 from posefit.reading import counted
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.tracking.trajectory import Tracked, cheapest_sequence, mean_cost, with_effort_of, with_total_effort
+from posefit.tracking.trajectory import (
+    Tracked,
+    cheapest_sequence,
+    mean_cost,
+    with_effort_of,
+    with_total_effort,
+)
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 
-RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902, "pass": 1965}  # part of the seed of what is tracked again
+# part of the seed of what is tracked again
+RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902, "pass": 1965}
 RESTARTS = 8  # searches of the first frame, at most
 MIN_WEIGHT = 0.05  # of a mode of the first frame that is tried
-JOINT_ERROR, ANGLE_ERROR = 0.06, 0.25  # metres along an axis, and radians, that the right one of searched poses is off
+# metres along an axis, and radians, that the right one of searched poses is off
+JOINT_ERROR = 0.06
+ANGLE_ERROR = 0.25
 TRIAL_FRAMES = 10  # by which a restart is judged
 TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
 TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
@@ -46,20 +61,27 @@ BACKWARDS_PENALTY = 1.1  # on the cost of a restart that walks backwards
 COST_RISE = 1.5  # times the typical cost of the track: costs above it are high
 TYPICAL_COST_SECONDS = 1.0  # of frames that show the typical cost
 HIGH_COST_SECONDS = 0.5  # for which costs are high before a track relocalises
-RELOCALISED = "relocalised"  # in the details of a frame where it did: whether a restart was better
-SPIN_TOLERANCE = 1.5  # a track without spins that costs more is wrong: the person does turn so fast
-MAX_TURN_RATE = np.radians(450.0)  # a second: the fastest that a person turns on the spot
+# in the details of a frame where it did: whether a restart was better
+RELOCALISED = "relocalised"
+# a track without spins that costs more is wrong: the person does turn so fast
+SPIN_TOLERANCE = 1.5
+# a second: the fastest that a person turns on the spot
+MAX_TURN_RATE = np.radians(450.0)
 SPIN_SECONDS = 0.1
-SPIN_ANGLE = np.radians(60.0)  # within that time: more is no turn of a person, even in a smoothed track
+# within that time: more is no turn of a person, even in a smoothed track
+SPIN_ANGLE = np.radians(60.0)
 END_SECONDS = 0.5  # from the ends of what is without spins, where it goes on from
 VOTES_PER_SECOND = 30.0
 EXCESS_TURN_VOTES = 30.0  # that a radian costs which is turned faster than a person can
-SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
+SEARCHED = "searched"
+SEARCHED_AGAIN = "searched again"
 
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
-def stream(seed: int, kind: Literal["hypothesis", "spin", "back", "pass"], number: int) -> np.random.Generator:
+def stream(
+    seed: int, kind: Literal["hypothesis", "spin", "back", "pass"], number: int
+) -> np.random.Generator:
     """Return the random generator of something that is tracked again; that of the first track is of the seed alone."""
     return np.random.default_rng([seed, RNG_STREAMS[kind], number])
 
@@ -77,7 +99,9 @@ def usable_observations(
 ) -> list[Observation]:
     """Return the first `count` observations from `start` on, of every `stride`th, that show enough of the person."""
     each = (observations[k] for k in range(start, len(observations), stride))
-    return list(islice((observation for observation in each if observation.usable), count))
+    return list(
+        islice((observation for observation in each if observation.usable), count)
+    )
 
 
 def first_shown_whole(observations: Sequence[Observation]) -> int:
@@ -85,12 +109,18 @@ def first_shown_whole(observations: Sequence[Observation]) -> int:
 
     Where none does, it is the first that is usable.
     """
-    best, most = 0, 0.0
+    best = 0
+    most = 0.0
     for k, observation in enumerate(observations):
-        whole = sum(np.isfinite(silhouette.extent).all() for silhouette in observation.silhouettes if silhouette.known)
+        whole = sum(
+            np.isfinite(silhouette.extent).all()
+            for silhouette in observation.silhouettes
+            if silhouette.known
+        )
         count = float(whole) if observation.usable else 0.0
         if count > most or (not most and observation.usable):
-            best, most = k, max(count, 0.5)
+            best = k
+            most = max(count, 0.5)
         if count == len(observation.silhouettes):
             break
     return best
@@ -114,32 +144,62 @@ def best_restart(
     posterior of where all searches ended. The `continuation` of a track is followed beside the restarts, and returned
     where none of them is better. `log` gets a line that says where they search.
     """
-    chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
+    chosen = usable_observations(
+        observations, TRIAL_FRAMES, TRIAL_STRIDE
+    ) or usable_observations(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
-    trial, compared = replace(task, fps=task.fps / TRIAL_STRIDE), chosen  # for models of motion
+    # for models of motion
+    trial = replace(task, fps=task.fps / TRIAL_STRIDE)
+    compared = chosen
     if factor > 1:
-        trial = replace(trial, cameras=[coarser_camera(camera, factor) for camera in task.cameras])
+        trial = replace(
+            trial, cameras=[coarser_camera(camera, factor) for camera in task.cameras]
+        )
         masks = [
-            [coarser_silhouette(silhouette, factor) for silhouette in observation.silhouettes] for observation in chosen
+            [
+                coarser_silhouette(silhouette, factor)
+                for silhouette in observation.silhouettes
+            ]
+            for observation in chosen
         ]
-        compared = [replace(observation, silhouettes=small) for observation, small in zip(chosen, masks, strict=True)]
+        compared = [
+            replace(observation, silhouettes=small)
+            for observation, small in zip(chosen, masks, strict=True)
+        ]
     prefix = [seed] if isinstance(seed, int) else [*seed]
-    best, least, tried = continuation or task, np.inf, list[Frame]()
+    best = continuation or task
+    least = np.inf
+    tried = list[Frame]()
     if continuation is not None:
         compared_task = replace(continuation, fps=trial.fps, cameras=trial.cameras)
-        tried += follow(compared_task, compared, np.random.default_rng([*prefix, restarts + 1]))
+        tried += follow(
+            compared_task, compared, np.random.default_rng([*prefix, restarts + 1])
+        )
         least = _trial_cost(tried)
-    modes = [mode for weight, mode in guessed_modes(task, chosen[0])[:restarts] if weight >= MIN_WEIGHT]
-    where = f"around {counted(len(modes), 'pose')} with such a silhouette" if modes else "anywhere"
+    modes = [
+        mode
+        for weight, mode in guessed_modes(task, chosen[0])[:restarts]
+        if weight >= MIN_WEIGHT
+    ]
+    where = (
+        f"around {counted(len(modes), 'pose')} with such a silhouette"
+        if modes
+        else "anywhere"
+    )
     log(f"looking for the first pose {where}")
-    for k, start in enumerate([around(trial, mode) for mode in modes] or [trial] * restarts):
+    for k, start in enumerate(
+        [around(trial, mode) for mode in modes] or [trial] * restarts
+    ):
         frames = list(follow(start, compared, np.random.default_rng([*prefix, k])))
         tried += frames
         if (cost := _trial_cost(frames)) < least:
-            best, least = after(task, frames[0]), cost
+            best = after(task, frames[0])
+            least = cost
     posterior = posterior_of(tried) if len(chosen) == 1 else None
     if factor > 1 and best is not (continuation or task):
-        tried.append(next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts]))))
+        tried.append(
+            next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts])))
+        )
         best = after(task, tried[-1])
     if posterior is not None and best.before:
         best = after(task, replace(best.before[-1], posterior=posterior))
@@ -153,27 +213,41 @@ def _trial_cost(frames: Sequence[Frame]) -> float:
     ahead = np.array([np.sin(yaws).mean(), 0.0, np.cos(yaws).mean()])
     path[1] = 0.0
     backwards = np.linalg.norm(path) > WALKED and path @ ahead < 0.0
-    return float(np.mean([frame.cost for frame in frames])) * (BACKWARDS_PENALTY if backwards else 1.0)
+    return float(np.mean([frame.cost for frame in frames])) * (
+        BACKWARDS_PENALTY if backwards else 1.0
+    )
 
 
 def posterior_of(trials: Sequence[Frame]) -> Posterior:
     """Return what one frame may show, by the poses at which its searches ended: cheaper ones are likelier."""
-    poses, places = np.array([trial.pose for trial in trials]), np.array([trial.translation for trial in trials])
+    poses = np.array([trial.pose for trial in trials])
+    places = np.array([trial.translation for trial in trials])
     costs = np.array([trial.cost for trial in trials])
-    errors = Recalibration(np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR))
+    errors = Recalibration(
+        np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR)
+    )
     weights = np.exp((costs.min() - costs) / TEMPERATURE)
     return Posterior(poses, places, weights, coherent=True, recalibration=errors)
 
 
 def around(task: Task, mode: Posterior) -> Task:
     """Return the task that begins around a mode of what the first frame may show."""
-    pose, place = mode.poses[0], mode.translations[0]
-    return replace(task, yaw=float(pose[0]), anchor=place, first_pose=pose[3:], modes=[(1.0, mode)])
+    pose = mode.poses[0]
+    place = mode.translations[0]
+    return replace(
+        task, yaw=float(pose[0]), anchor=place, first_pose=pose[3:], modes=[(1.0, mode)]
+    )
 
 
 def after(task: Task, frame: Frame) -> Task:
     """Return the task that goes on from a frame."""
-    first = replace(task, yaw=float(frame.pose[0]), anchor=frame.translation, first_pose=frame.pose[3:], modes=())
+    first = replace(
+        task,
+        yaw=float(frame.pose[0]),
+        anchor=frame.translation,
+        first_pose=frame.pose[3:],
+        modes=(),
+    )
     return replace(first, before=(frame,))
 
 
@@ -181,7 +255,11 @@ def after(task: Task, frame: Frame) -> Task:
 
 
 def relocalised(
-    task: Task, follow: Follow, observations: Iterable[Observation], rng: np.random.Generator, gap: int
+    task: Task,
+    follow: Follow,
+    observations: Iterable[Observation],
+    rng: np.random.Generator,
+    gap: int,
 ) -> Iterator[Frame]:
     """Yield the frames that `follow` gives, searched at all yaws again where the person may have turned unseen.
 
@@ -193,23 +271,35 @@ def relocalised(
     if not gap:
         yield from follow(task, observations, rng)
         return
-    coming, watch = _Coming(observations), _Watch(task, gap)
+    coming = _Coming(observations)
+    watch = _Watch(task, gap)
     frames = follow(task, coming, rng)
     while shown := coming.ahead(1):
         (observation,), trials = shown, list[Frame]()
         if observation.usable and (latest := watch.due()) is not None:
             window = coming.ahead(1 + (TRIAL_FRAMES - 1) * TRIAL_STRIDE)
             seeds = independent(rng).integers(0, 2**32, 2).tolist()
-            unconstrained = replace(task, yaw=None, anchor=latest.translation, first_pose=None, modes=(), before=())
+            unconstrained = replace(
+                task,
+                yaw=None,
+                anchor=latest.translation,
+                first_pose=None,
+                modes=(),
+                before=(),
+            )
             continuation = after(unconstrained, latest)
-            best, trials = best_restart(unconstrained, window, follow, RESTARTS, seeds, continuation)
+            best, trials = best_restart(
+                unconstrained, window, follow, RESTARTS, seeds, continuation
+            )
             if best is not continuation:
                 frames = follow(best, coming, rng)
         if (frame := next(frames, None)) is None:
             return
         if trials:
             frame = with_effort_of(frame, [frame, *trials])
-            frame = replace(frame, details={**frame.details, RELOCALISED: best is not continuation})
+            frame = replace(
+                frame, details={**frame.details, RELOCALISED: best is not continuation}
+            )
         watch.add(frame, observation.usable)
         yield frame
     yield from frames  # none: the tracker gets to its end
@@ -226,7 +316,9 @@ class _Coming(Iterator[Observation]):
 
     def ahead(self, count: int) -> list[Observation]:
         """Return the next observations, up to `count` of them, which stay to be taken."""
-        self._waiting.extend(islice(self._observations, max(count - len(self._waiting), 0)))
+        self._waiting.extend(
+            islice(self._observations, max(count - len(self._waiting), 0))
+        )
         return list(islice(self._waiting, count))
 
 
@@ -250,30 +342,45 @@ class _Watch:
             self._costs.clear()
         self._missing += 1
         if usable:
-            self._latest, self._missing = frame, 0
+            self._latest = frame
+            self._missing = 0
             self._costs.append(frame.cost)
 
     def due(self) -> Frame | None:
         """Return the latest frame that showed the person where it is time to relocalise, else None."""
-        typical, high = self._costs[: -self._high_frames], self._costs[-self._high_frames :]
-        costly = len(typical) >= self._typical_frames and min(high) > COST_RISE * float(np.median(typical))
+        typical = self._costs[: -self._high_frames]
+        high = self._costs[-self._high_frames :]
+        costly = len(typical) >= self._typical_frames and min(high) > COST_RISE * float(
+            np.median(typical)
+        )
         return self._latest if costly or self._missing >= self._gap else None
 
 
 # Several hypotheses.
 
 # The initial guesses of the hypotheses after the first, in turn: those first that are mistaken most often.
-GUESSES = ("mirrored", "reflected", SEARCHED_AGAIN, "legs exchanged", "turned", SEARCHED_AGAIN, "arms exchanged")
+GUESSES = (
+    "mirrored",
+    "reflected",
+    SEARCHED_AGAIN,
+    "legs exchanged",
+    "turned",
+    SEARCHED_AGAIN,
+    "arms exchanged",
+)
 
 
-def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, first: Frame) -> tuple[str, Task]:
+def initial_guess(
+    number: int, task: Task, yaw: float | None, pose_known: bool, first: Frame
+) -> tuple[str, Task]:
     """Return the name and the task of a hypothesis after the first; `first` is a frame that the first one estimated.
 
     It starts around a pose whose silhouette is like that of the frame, or searches as the first one did. Poses that
     face elsewhere than the known `yaw` are left out; where the first pose is known, only seeds differ.
     """
     camera_yaw = facing(task.cameras[0], first.translation)
-    skeleton, pose = task.body.skeleton, first.pose[None]
+    skeleton = task.body.skeleton
+    pose = first.pose[None]
     poses = {
         "mirrored": mirrored_poses(skeleton, pose)[0],
         "reflected": reflected_poses(skeleton, pose, camera_yaw)[0],
@@ -283,8 +390,16 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
     }
     if yaw is not None:
         reach = np.radians(ROOT_RANGE_DEGREES[0])
-        poses = {name: pose for name, pose in poses.items() if abs(wrapped(pose[0] - yaw)) <= reach}
-    order = [name for name in GUESSES if name == SEARCHED_AGAIN or (name in poses and not pose_known)]
+        poses = {
+            name: pose
+            for name, pose in poses.items()
+            if abs(wrapped(pose[0] - yaw)) <= reach
+        }
+    order = [
+        name
+        for name in GUESSES
+        if name == SEARCHED_AGAIN or (name in poses and not pose_known)
+    ]
     name = order[(number - 1) % len(order)]
     if name == SEARCHED_AGAIN:
         return name, task
@@ -296,7 +411,11 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
 
 
 def retrack_spins(
-    task: Task, observations: Sequence[Observation], tracked: Tracked, follow: Follow, seed: int
+    task: Task,
+    observations: Sequence[Observation],
+    tracked: Tracked,
+    follow: Follow,
+    seed: int,
 ) -> Tracked:
     """Return a track without spins, whose `stay` is the first and last frame of those that stay; None where all do.
 
@@ -305,16 +424,25 @@ def retrack_spins(
     is kept where the new one spins as often, or costs half as much again. Frames that are tracked again have the effort
     of both tracks.
     """
-    frames, usable = tracked.frames, np.array([observation.usable for observation in observations])
+    frames = tracked.frames
+    usable = np.array([observation.usable for observation in observations])
 
     def spins(track: Sequence[Frame]) -> int:
-        return int(spin_mask(np.array([frame.pose[0] for frame in track]), usable, task.fps).sum())
+        return int(
+            spin_mask(
+                np.array([frame.pose[0] for frame in track]), usable, task.fps
+            ).sum()
+        )
 
     before = spins(frames)
-    every = runs(facing_consensus(frames, task.cameras, usable, task.fps)) if before else []
+    every = (
+        runs(facing_consensus(frames, task.cameras, usable, task.fps)) if before else []
+    )
     if not every:
         return tracked
-    first, last = stay = best_ends(frames, *max(every, key=lambda run: run[1] - run[0]), task.fps)
+    first, last = stay = best_ends(
+        frames, *max(every, key=lambda run: run[1] - run[0]), task.fps
+    )
     steady = replace(task, fastest_turn=MAX_TURN_RATE)
 
     def followed_from(number: int, steady: Task, rows: range) -> list[Frame]:
@@ -322,7 +450,9 @@ def retrack_spins(
         if len(rows) == 1:
             return []
         start = replace(after(steady, frames[rows[0]]), before=())
-        tracked_again = list(follow(start, (observations[k] for k in rows), stream(seed, "spin", number)))
+        tracked_again = list(
+            follow(start, (observations[k] for k in rows), stream(seed, "spin", number))
+        )
         return joined(task.body.skeleton, tracked_again, frames[rows[0]])[1:]
 
     ahead = followed_from(0, steady, range(last, len(frames)))
@@ -336,7 +466,12 @@ def retrack_spins(
 
 
 def tracked_again(
-    task: Task, observations: Sequence[Observation], frames: Sequence[Frame], follow: Follow, number: int, seed: int
+    task: Task,
+    observations: Sequence[Observation],
+    frames: Sequence[Frame],
+    follow: Follow,
+    number: int,
+    seed: int,
 ) -> list[Frame]:
     """Return a track's frames tracked once more, with each of them among the poses that are tried.
 
@@ -344,14 +479,25 @@ def tracked_again(
     """
     order = range(len(frames))[:: -1 if number % 2 else 1]
     start = replace(after(task, frames[order[0]]), before=())
-    shown = (replace(observations[k], estimate=(frames[k].pose, frames[k].translation)) for k in order)
-    again = list(follow(reversed_task(start) if number % 2 else start, shown, stream(seed, "pass", number)))
+    shown = (
+        replace(observations[k], estimate=(frames[k].pose, frames[k].translation))
+        for k in order
+    )
+    again = list(
+        follow(
+            reversed_task(start) if number % 2 else start,
+            shown,
+            stream(seed, "pass", number),
+        )
+    )
     return again[:: order.step]
 
 
 def reversed_task(task: Task) -> Task:
     """Return a task whose observations go back in time."""
-    return replace(task, training=[motion.reversed() for motion in task.training], backwards=True)
+    return replace(
+        task, training=[motion.reversed() for motion in task.training], backwards=True
+    )
 
 
 def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:
@@ -359,16 +505,25 @@ def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Fr
 
     Each of its trajectories goes on as the nearest one there.
     """
-    here, there = ahead.posterior, behind[0].posterior
+    here = ahead.posterior
+    there = behind[0].posterior
     if here is None or there is None:
         return list(behind)
     near = skeleton.joints(there.poses)
-    rows = np.array([((near - joints) ** 2).sum(axis=(1, 2)).argmin() for joints in skeleton.joints(here.poses)])
+    rows = np.array(
+        [
+            ((near - joints) ** 2).sum(axis=(1, 2)).argmin()
+            for joints in skeleton.joints(here.poses)
+        ]
+    )
     frames = []
     for frame in behind:
         if (posterior := frame.posterior) is not None:
-            poses, places = posterior.poses[rows], posterior.translations[rows]
-            posterior = replace(posterior, poses=poses, translations=places, weights=np.ones(len(rows)))
+            poses = posterior.poses[rows]
+            places = posterior.translations[rows]
+            posterior = replace(
+                posterior, poses=poses, translations=places, weights=np.ones(len(rows))
+            )
         frames.append(replace(frame, posterior=posterior))
     return frames
 
@@ -384,7 +539,10 @@ def spin_mask(yaws: Array, usable: NDArray[np.bool_], fps: float) -> NDArray[np.
 
 
 def facing_consensus(
-    frames: Sequence[Frame], cameras: Sequence[Camera], usable: NDArray[np.bool_], fps: float
+    frames: Sequence[Frame],
+    cameras: Sequence[Camera],
+    usable: NDArray[np.bool_],
+    fps: float,
 ) -> NDArray[np.bool_]:
     """Return which frames (T,) face where the whole track does, by the likeliest sequence of yaws without spins.
 
@@ -393,17 +551,24 @@ def facing_consensus(
     """
     yaws = np.array([frame.pose[0] for frame in frames])
     steady = ~spin_mask(yaws, usable, fps)
-    rows, clock = np.flatnonzero(usable & steady), steady.cumsum()  # no turn has time during a spin
+    # no turn has time during a spin
+    rows = np.flatnonzero(usable & steady)
+    clock = steady.cumsum()
     agrees = np.zeros(len(frames), dtype=bool)
     if not len(rows):
         return agrees
     voters = [frames[k] for k in rows.tolist()]
     views = np.array([frame.areas.any(axis=1) for frame in voters])
     camera_yaws = [
-        facing(cameras[int(seeing.argmax())], frame.translation) for frame, seeing in zip(voters, views, strict=True)
+        facing(cameras[int(seeing.argmax())], frame.translation)
+        for frame, seeing in zip(voters, views, strict=True)
     ]
-    both = np.column_stack([yaws[rows], 2.0 * np.array(camera_yaws) + np.pi - yaws[rows]])
-    against = np.column_stack([np.zeros(len(rows)), views.sum(axis=1) * VOTES_PER_SECOND / fps])
+    both = np.column_stack(
+        [yaws[rows], 2.0 * np.array(camera_yaws) + np.pi - yaws[rows]]
+    )
+    against = np.column_stack(
+        [np.zeros(len(rows)), views.sum(axis=1) * VOTES_PER_SECOND / fps]
+    )
     turned = np.abs(wrapped(both[1:, None] - both[:-1, :, None]))
     seconds = (clock[rows[1:]] - clock[rows[:-1]]) / fps
     excess = np.maximum(turned - MAX_TURN_RATE * seconds[:, None, None], 0.0)
@@ -411,7 +576,9 @@ def facing_consensus(
     return agrees
 
 
-def best_ends(frames: Sequence[Frame], start: int, stop: int, fps: float) -> tuple[int, int]:
+def best_ends(
+    frames: Sequence[Frame], start: int, stop: int, fps: float
+) -> tuple[int, int]:
     """Return a frame near the beginning of a run, and one near its end: the best that most cameras see.
 
     The first and the last of all frames need not be good, as nothing goes on from there.
@@ -419,7 +586,12 @@ def best_ends(frames: Sequence[Frame], start: int, stop: int, fps: float) -> tup
     near = min(max(round(END_SECONDS * fps), 1), (stop - start + 1) // 2)
 
     def best(rows: range) -> int:
-        return min(rows, key=lambda k: (-int(frames[k].areas.any(axis=1).sum()), frames[k].cost))
+        return min(
+            rows,
+            key=lambda k: (-int(frames[k].areas.any(axis=1).sum()), frames[k].cost),
+        )
 
     first = best(range(start, start + near)) if start else 0
-    return first, best(range(stop - 1, stop - 1 - near, -1)) if stop < len(frames) else stop - 1
+    return first, best(range(stop - 1, stop - 1 - near, -1)) if stop < len(
+        frames
+    ) else stop - 1

@@ -44,13 +44,15 @@ class Track:
 
     motion: Motion  # the estimate
     frames: list[Frame] = field(repr=False)  # the tracker's, smoothed
-    table: Table = field(repr=False)  # a column (T,) for each figure of a frame: see posefit.evaluation.errors.FRAME
+    # a column (T,) for each figure of a frame: see posefit.evaluation.errors.FRAME
+    table: Table = field(repr=False)
     measures: Measures = field(repr=False)
     trust: Trust | None = field(repr=False)  # where the truth is unknown
     gait: Gait = field(repr=False)
     setup: Setup = field(repr=False)
     log: TrackingLog = field(repr=False)
-    modes: list[TrackMode] = field(repr=False)  # of the whole track, the likeliest first
+    # of the whole track, the likeliest first
+    modes: list[TrackMode] = field(repr=False)
     scene: Scene = field(repr=False)
 
     def __len__(self) -> int:
@@ -67,7 +69,9 @@ class Track:
     @property
     def content(self) -> Content:
         """What its files are made of."""
-        return Content(**{each.name: getattr(self, each.name) for each in fields(Content)})
+        return Content(
+            **{each.name: getattr(self, each.name) for each in fields(Content)}
+        )
 
     @property
     def truth(self) -> Motion | None:
@@ -107,7 +111,9 @@ class Track:
         """
         angles = self._angles()
         if name not in angles:
-            raise InputError(f"angle must be one of {', '.join(angles)}, got {quoted(name)}{suggestion(name, angles)}")
+            raise InputError(
+                f"angle must be one of {', '.join(angles)}, got {quoted(name)}{suggestion(name, angles)}"
+            )
         return angles[name]
 
     def _angles(self) -> dict[str, Array]:
@@ -115,7 +121,9 @@ class Track:
 
         angles = clinical_angles(self.motion.skeleton, self.motion.poses)
         blank = np.isin(self.table["frame"], list(self.unseen))
-        return {name: np.where(blank, np.nan, values) for name, values in angles.items()}
+        return {
+            name: np.where(blank, np.nan, values) for name, values in angles.items()
+        }
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return a table of one row a frame: measures, angles in degrees, joints in metres.
@@ -215,7 +223,9 @@ class Fit:
         scene = self.track.scene
         filmed = None
         if scene.pictures is not None:
-            filmed = next(picture for k, picture in enumerate(scene.pictures()) if k == self.k)
+            filmed = next(
+                picture for k, picture in enumerate(scene.pictures()) if k == self.k
+            )
         painted = Painter(scene).overlay(self.frame, scene.observations[self.k], filmed)
         image = Image.fromarray(painted[..., ::-1])
         if ax is not None:

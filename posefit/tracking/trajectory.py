@@ -18,11 +18,18 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton, root_centred
 from posefit.motion.motion import Motion
 
-VELOCITY_RATE = 30.0  # how often velocities are compared, so that the jitter of a search counts the same at any rate
-WALKING_SPEED = 1.0  # metres a second, of the joints about the root: the typical speed where nothing is learned from
+# how often velocities are compared, so that the jitter of a search counts the same at
+# any rate
+VELOCITY_RATE = 30.0
+# metres a second, of the joints about the root: the typical speed where nothing is
+# learned from
+WALKING_SPEED = 1.0
 MIN_TYPICAL_SPEED = 0.25  # metres a second
-TURN_AROUND_SPEED = 2.0  # typical speeds, which a joint's velocity changes by when it turns around on the spot
-JUMP_SPEED = 5.0  # typical speeds: where the velocities of all joints change by more, the body is somewhere else
+# typical speeds, which a joint's velocity changes by when it turns around on the spot
+TURN_AROUND_SPEED = 2.0
+# typical speeds: where the velocities of all joints change by more, the body is
+# somewhere else
+JUMP_SPEED = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +46,8 @@ class Tracked(NamedTuple):
     """The track that is kept of several, with the effort of all."""
 
     frames: list[Frame]
-    hypotheses: list[dict[str, Any]]  # of each of several: its initial guess, cost and motion term, and whether kept
+    # of each of several: its initial guess, cost and motion term, and whether kept
+    hypotheses: list[dict[str, Any]]
     # the first and last frame that stayed where the others were tracked again because the body spun
     stay: tuple[int, int] | None = None
 
@@ -48,8 +56,10 @@ class Tracked(NamedTuple):
 class TrajectoryCost:
     """What a whole trajectory costs."""
 
-    cost: float  # mean silhouette mismatch of the frames that show enough, 0 to 100. SAPSO (4)
-    motion: float  # half the mean squared change of velocity, over that of turning around
+    # mean silhouette mismatch of the frames that show enough, 0 to 100. SAPSO (4)
+    cost: float
+    # half the mean squared change of velocity, over that of turning around
+    motion: float
 
     @property
     def total(self) -> float:
@@ -59,7 +69,8 @@ class TrajectoryCost:
 
 def cheapest_sequence(costs: Array, steps: Array) -> NDArray[np.int64]:
     """Return the cheapest sequence (n,) of states, by their costs (n, S) and those of steps (n - 1, S, S). Viterbi."""
-    totals, parents = costs[0], []
+    totals = costs[0]
+    parents = []
     for cost, step in zip(costs[1:], steps, strict=True):
         paths = totals[:, None] + step
         parents.append(paths.argmin(axis=0))
@@ -81,26 +92,43 @@ def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
 
     The course of its search is given as if all went on abreast: its evaluations are stretched to those of all.
     """
-    seconds, cpu_seconds = (sum(getattr(each, name) for each in together) for name in ("seconds", "cpu_seconds"))
+    seconds, cpu_seconds = (
+        sum(getattr(each, name) for each in together)
+        for name in ("seconds", "cpu_seconds")
+    )
     frame = with_evaluations(frame, sum(each.evaluations for each in together))
     return replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
 
 
 def with_total_effort(tracks: Sequence[Sequence[Frame]], best: int) -> list[Frame]:
     """Return the frames of the track that is kept, with the evaluations and the time of all tracks."""
-    return [with_effort_of(together[best], together) for together in zip(*tracks, strict=True)]
+    return [
+        with_effort_of(together[best], together)
+        for together in zip(*tracks, strict=True)
+    ]
 
 
-def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[Motion]) -> Tracked:
+def cheapest(
+    scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[Motion]
+) -> Tracked:
     """Return the hypothesis whose trajectory costs least."""
     if len(hypotheses) == 1:
         return Tracked(list(hypotheses[0].frames), [])
-    usable, speed = [observation.usable for observation in scene.observations], typical_speed(training)
+    usable = [observation.usable for observation in scene.observations]
+    speed = typical_speed(training)
     tracks = [hypothesis.frames for hypothesis in hypotheses]
-    costs = [trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed) for frames in tracks]
+    costs = [
+        trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed)
+        for frames in tracks
+    ]
     best = min(range(len(costs)), key=lambda k: costs[k].total)
     table = [
-        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "kept": k == best}
+        {
+            "guess": hypothesis.guess,
+            "cost": cost.cost,
+            "motion": cost.motion,
+            "kept": k == best,
+        }
         for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True))
     ]
     return Tracked(with_total_effort(tracks, best), table)
@@ -108,13 +136,24 @@ def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[
 
 def typical_speed(training: Sequence[Motion]) -> float:
     """Return the root mean square speed of joints about the root in some motions, in metres a second."""
-    squares = [_mean_squares(_velocities(motion.skeleton.joints(motion.poses), motion.fps)) for motion in training]
+    squares = [
+        _mean_squares(_velocities(motion.skeleton.joints(motion.poses), motion.fps))
+        for motion in training
+    ]
     each = np.concatenate(squares) if squares else np.empty(0)
-    return max(float(np.sqrt(each.mean())), MIN_TYPICAL_SPEED) if len(each) else WALKING_SPEED
+    return (
+        max(float(np.sqrt(each.mean())), MIN_TYPICAL_SPEED)
+        if len(each)
+        else WALKING_SPEED
+    )
 
 
 def trajectory_cost(
-    frames: Sequence[Frame], usable: Sequence[bool], skeleton: Skeleton, fps: float, speed: float
+    frames: Sequence[Frame],
+    usable: Sequence[bool],
+    skeleton: Skeleton,
+    fps: float,
+    speed: float,
 ) -> TrajectoryCost:
     """Return what a whole trajectory costs; held frames count for nothing, unless all are held.
 
@@ -124,12 +163,21 @@ def trajectory_cost(
     five typical speeds at most: a body that jumped has jumped, however far.
     """
     shown = np.asarray(usable, dtype=bool)
-    velocities = _velocities(skeleton.joints(np.array([frame.pose for frame in frames])), fps)
+    velocities = _velocities(
+        skeleton.joints(np.array([frame.pose for frame in frames])), fps
+    )
     step = _step(fps)
     changes = _mean_squares(velocities[step:] - velocities[:-step])
-    counted = shown[: -2 * step] & shown[step:-step] & shown[2 * step :]  # of each change, its three frames
-    terms = 0.5 * np.minimum(changes[counted], (JUMP_SPEED * speed) ** 2) / (TURN_AROUND_SPEED * speed) ** 2
-    return TrajectoryCost(mean_cost(frames, shown), float(terms.mean()) if len(terms) else 0.0)
+    # of each change, its three frames
+    counted = shown[: -2 * step] & shown[step:-step] & shown[2 * step :]
+    terms = (
+        0.5
+        * np.minimum(changes[counted], (JUMP_SPEED * speed) ** 2)
+        / (TURN_AROUND_SPEED * speed) ** 2
+    )
+    return TrajectoryCost(
+        mean_cost(frames, shown), float(terms.mean()) if len(terms) else 0.0
+    )
 
 
 def _step(fps: float) -> int:
@@ -139,7 +187,8 @@ def _step(fps: float) -> int:
 
 def _velocities(joints: Array, fps: float) -> Array:
     """Return the velocities (T - step, 27, 3) of joints (T, 27, 3) about the root, in metres a second."""
-    step, rooted = _step(fps), root_centred(joints)
+    step = _step(fps)
+    rooted = root_centred(joints)
     return np.asarray((rooted[step:] - rooted[:-step]) * (fps / step))
 
 

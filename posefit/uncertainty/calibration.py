@@ -12,7 +12,8 @@ from posefit.geometry.skeleton import ANGLES, JOINTS
 
 LEVELS = (0.5, 0.8, 0.95)  # of intervals
 MAIN_LEVEL = LEVELS.index(0.8)  # of the one interval that is drawn and judged by
-SECOND_SIDE = 0.2  # ours: left and right are unknown from this probability on that they are exchanged
+# ours: left and right are unknown from this probability on that they are exchanged
+SECOND_SIDE = 0.2
 DIGITS = 6  # of what a file holds
 BINS = 10  # of probabilities
 
@@ -22,21 +23,45 @@ class Recalibration:
     """Corrections of a posterior's intervals and probabilities, learned on clips whose truth is known."""
 
     # standard deviations of joints (metres, each axis) and angles (radians) about every pose
-    joint_spreads: Array = field(default_factory=lambda: np.zeros(len(JOINTS)), repr=False)  # (27,)
-    angle_spreads: Array = field(default_factory=lambda: np.zeros(ANGLES), repr=False)  # (66,)
+    # (27,)
+    joint_spreads: Array = field(
+        default_factory=lambda: np.zeros(len(JOINTS)), repr=False
+    )
+    # (66,)
+    angle_spreads: Array = field(default_factory=lambda: np.zeros(ANGLES), repr=False)
     # factors of the intervals of each level
-    joint_factors: Array = field(default_factory=lambda: np.ones((len(LEVELS), len(JOINTS))), repr=False)
-    angle_factors: Array = field(default_factory=lambda: np.ones((len(LEVELS), ANGLES)), repr=False)
+    joint_factors: Array = field(
+        default_factory=lambda: np.ones((len(LEVELS), len(JOINTS))), repr=False
+    )
+    angle_factors: Array = field(
+        default_factory=lambda: np.ones((len(LEVELS), ANGLES)), repr=False
+    )
     second_side: float = SECOND_SIDE
-    sharpness: float = 1.0  # the power of modes' weights: below 1, modes are less sure than their share of samples
+    # the power of modes' weights: below 1, modes are less sure than their share of
+    # samples
+    sharpness: float = 1.0
     none: float = 0.0  # the probability that no mode is right
-    place_spreads: Array = field(default_factory=lambda: np.zeros(len(JOINTS)), repr=False)  # (27,) in the world
-    depth: float = 0.0  # standard deviation of the distance from a camera that is alone, a share of it
+    # (27,) in the world
+    place_spreads: Array = field(
+        default_factory=lambda: np.zeros(len(JOINTS)), repr=False
+    )
+    # standard deviation of the distance from a camera that is alone, a share of it
+    depth: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("joint_spreads", "angle_spreads", "place_spreads", "joint_factors", "angle_factors"):
+        for name in (
+            "joint_spreads",
+            "angle_spreads",
+            "place_spreads",
+            "joint_factors",
+            "angle_factors",
+        ):
             length = ANGLES if name.startswith("angle") else len(JOINTS)
-            value = frozen(name, getattr(self, name), (length,) if name.endswith("spreads") else (len(LEVELS), length))
+            value = frozen(
+                name,
+                getattr(self, name),
+                (length,) if name.endswith("spreads") else (len(LEVELS), length),
+            )
             if value.min() < 0.0:
                 raise InputError(f"{name} must be 0 or more, got {value.min():g}")
             object.__setattr__(self, name, value)
@@ -47,18 +72,29 @@ class Recalibration:
             ("depth", 0.0, 1.0),
         ):
             if not low <= getattr(self, name) <= high:
-                raise InputError(f"{name} must lie in {low:g} to {high:g}, got {getattr(self, name)}")
+                raise InputError(
+                    f"{name} must lie in {low:g} to {high:g}, got {getattr(self, name)}"
+                )
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it; its names are those that it is made from."""
-        return {name: np.round(value, DIGITS).tolist() for name, value in vars(self).items()}
+        return {
+            name: np.round(value, DIGITS).tolist() for name, value in vars(self).items()
+        }
 
 
-def reliability(probabilities: Array, right: NDArray[np.bool_]) -> list[tuple[int, float, float]]:
+def reliability(
+    probabilities: Array, right: NDArray[np.bool_]
+) -> list[tuple[int, float, float]]:
     """Return the number of probabilities (n,) in each bin that has any, their mean, and the share that is right."""
-    predicted, observed = np.asarray(probabilities, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    predicted = np.asarray(probabilities, dtype=np.float64)
+    observed = np.asarray(right, dtype=np.float64)
     bin_of = np.minimum((predicted * BINS).astype(np.int64), BINS - 1)
     return [
-        (int((bin_of == k).sum()), float(predicted[bin_of == k].mean()), float(observed[bin_of == k].mean()))
+        (
+            int((bin_of == k).sum()),
+            float(predicted[bin_of == k].mean()),
+            float(observed[bin_of == k].mean()),
+        )
         for k in np.unique(bin_of)
     ]

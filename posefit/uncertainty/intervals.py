@@ -16,7 +16,9 @@ FARTHEST = 6.0  # spreads: the widest radius searched
 CLOSE = 1e-3  # spreads: the least distance that a difference is divided by
 
 
-def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array, world: bool = False) -> Array:
+def joint_intervals(
+    skeleton: Skeleton, posterior: Posterior, pose: Array, world: bool = False
+) -> Array:
     """Return the radii (levels, 27), metres, of the balls about the joints of a `pose` (66,) that hold the true ones.
 
     Joints are relative to the root, or in the `world`. A radius is the quantile, at each of the `LEVELS`, of the
@@ -25,8 +27,12 @@ def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array, world
     """
     model = posterior.recalibration or Recalibration()
     spreads = model.place_spreads if world else model.joint_spreads
-    distances = np.linalg.norm(skeleton.joints(posterior.poses) - skeleton.joints(pose), axis=2)
-    return np.asarray(model.joint_factors * quantiles(distances, posterior.weights, spreads, 3))
+    distances = np.linalg.norm(
+        skeleton.joints(posterior.poses) - skeleton.joints(pose), axis=2
+    )
+    return np.asarray(
+        model.joint_factors * quantiles(distances, posterior.weights, spreads, 3)
+    )
 
 
 def angle_intervals(posterior: Posterior, pose: Array) -> Array:
@@ -36,11 +42,15 @@ def angle_intervals(posterior: Posterior, pose: Array) -> Array:
     """
     model = posterior.recalibration or Recalibration()
     distances = np.abs(wrapped(posterior.poses - pose))
-    halves = model.angle_factors * quantiles(distances, posterior.weights, model.angle_spreads, 1)
+    halves = model.angle_factors * quantiles(
+        distances, posterior.weights, model.angle_spreads, 1
+    )
     return np.asarray(np.minimum(halves, np.pi))
 
 
-def quantiles(distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]) -> Array:
+def quantiles(
+    distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]
+) -> Array:
     """Return the radii (levels, n) that hold such shares of normal errors about points at distances (K, n)."""
     from scipy.special import ndtr
 
@@ -53,8 +63,15 @@ def quantiles(distances: Array, weights: Array, spreads: Array, dimensions: Lite
         middle = 0.5 * (low + high)
         near, far = ((middle[:, None] + sign * away) / spread for sign in (-1.0, 1.0))
         inside = ndtr(near) - ndtr(-far)
-        if dimensions == 3:  # the law of the noncentral chi with three degrees of freedom
-            inside -= spread / away * (np.exp(-0.5 * near**2) - np.exp(-0.5 * far**2)) / np.sqrt(2.0 * np.pi)
+        # the law of the noncentral chi with three degrees of freedom
+        if dimensions == 3:
+            inside -= (
+                spread
+                / away
+                * (np.exp(-0.5 * near**2) - np.exp(-0.5 * far**2))
+                / np.sqrt(2.0 * np.pi)
+            )
         within = np.einsum("k,lkn->ln", weights, inside) >= levels
-        low, high = np.where(within, low, middle), np.where(within, middle, high)
+        low = np.where(within, low, middle)
+        high = np.where(within, middle, high)
     return high

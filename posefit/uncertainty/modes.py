@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
-from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR, SIDES, Skeleton, joint_distances, root_centred
+from posefit.geometry.skeleton import (
+    ANGLES,
+    JOINTS,
+    MIRROR,
+    SIDES,
+    Skeleton,
+    joint_distances,
+    root_centred,
+)
 from posefit.uncertainty.calibration import Recalibration
 
 # ours: metres, the mean over joints, beyond which poses are of different modes; a mirrored stride is 0.15 to 0.2 off
@@ -47,17 +55,28 @@ class Posterior:
     translations: Array = field(repr=False)  # (K, 3) metres
     weights: Array = field(repr=False)  # (K,) which sum to 1
     coherent: bool = False
-    recalibration: Recalibration | None = field(default=None, repr=False)  # learned corrections of these poses' errors
-    modes: Sequence[Mode] = ()  # see `modes_of`, which the frames of a track have filled in
+    # learned corrections of these poses' errors
+    recalibration: Recalibration | None = field(default=None, repr=False)
+    # see `modes_of`, which the frames of a track have filled in
+    modes: Sequence[Mode] = ()
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.weights))
-        for name, shape in (("poses", (count, ANGLES)), ("translations", (count, 3)), ("weights", (count,))):
-            object.__setattr__(self, name, frozen(f"{name} of a posterior", getattr(self, name), shape))
-        total, least = float(self.weights.sum()), float(self.weights.min(initial=0.0))
+        for name, shape in (
+            ("poses", (count, ANGLES)),
+            ("translations", (count, 3)),
+            ("weights", (count,)),
+        ):
+            object.__setattr__(
+                self, name, frozen(f"{name} of a posterior", getattr(self, name), shape)
+            )
+        total = float(self.weights.sum())
+        least = float(self.weights.min(initial=0.0))
         if least < 0.0 or not total > 0.0:
             came = f"{least:g}, sum {total:g}"
-            raise InputError(f"weights of a posterior must be 0 or more, with a sum above 0, got {came}")
+            raise InputError(
+                f"weights of a posterior must be 0 or more, with a sum above 0, got {came}"
+            )
         object.__setattr__(self, "weights", self.weights / total)
 
     def __len__(self) -> int:
@@ -66,15 +85,27 @@ class Posterior:
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it, to a millionth."""
         arrays = {name: getattr(self, name).round(DIGITS).tolist() for name in ARRAYS}
-        corrections = None if self.recalibration is None else self.recalibration.as_dict()
+        corrections = (
+            None if self.recalibration is None else self.recalibration.as_dict()
+        )
         return {**arrays, "coherent": self.coherent, "recalibration": corrections}
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """Return the posterior that `as_dict` gave."""
-        corrections = None if stored["recalibration"] is None else Recalibration(**stored["recalibration"])
+        corrections = (
+            None
+            if stored["recalibration"] is None
+            else Recalibration(**stored["recalibration"])
+        )
         poses, translations, weights = (np.array(stored[name]) for name in ARRAYS)
-        return cls(poses, translations, weights, coherent=stored["coherent"], recalibration=corrections)
+        return cls(
+            poses,
+            translations,
+            weights,
+            coherent=stored["coherent"],
+            recalibration=corrections,
+        )
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
@@ -85,35 +116,58 @@ def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
     the posterior's recalibration; they sum to 1, less its probability that no mode is right.
     """
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
-    clusters = [(weight, row) for weight, row, _ in clusters_of(distances, posterior.weights, APART)]
+    clusters = [
+        (weight, row)
+        for weight, row, _ in clusters_of(distances, posterior.weights, APART)
+    ]
     if posterior.recalibration is not None:
-        powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]  # temperature scaling
+        # temperature scaling
+        powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]
         share = (1.0 - posterior.recalibration.none) / sum(powers)
-        clusters = [(share * power, row) for power, (_, row) in zip(powers, clusters, strict=True)]
-    return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in clusters]
+        clusters = [
+            (share * power, row)
+            for power, (_, row) in zip(powers, clusters, strict=True)
+        ]
+    return [
+        Mode(weight, posterior.poses[row], posterior.translations[row])
+        for weight, row in clusters
+    ]
 
 
-def other_modes(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> list[Mode]:
+def other_modes(
+    skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0
+) -> list[Mode]:
     """Return the modes with weights above `above` but the one nearest to a pose (66,), the likeliest first."""
     if len(modes) < 2:
         return []
     nearest = _nearest(skeleton, modes, skeleton.joints(pose))[0]
-    others = [mode for k, mode in enumerate(modes) if k != nearest and mode.weight > above]
+    others = [
+        mode for k, mode in enumerate(modes) if k != nearest and mode.weight > above
+    ]
     return sorted(others, key=lambda mode: -mode.weight)
 
 
-def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
+def other_mode(
+    skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0
+) -> Mode | None:
     """Return the likeliest of the `other_modes`; None where there are none."""
     return next(iter(other_modes(skeleton, modes, pose, above)), None)
 
 
-def likeliest_is_right(skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART) -> bool:
+def likeliest_is_right(
+    skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART
+) -> bool:
     """Return whether true joints (27, 3) are nearest to the likeliest mode, and at most `apart` metres from it."""
     nearest, off = _nearest(skeleton, modes, joints)
-    return nearest == max(range(len(modes)), key=lambda k: modes[k].weight) and off <= apart
+    return (
+        nearest == max(range(len(modes)), key=lambda k: modes[k].weight)
+        and off <= apart
+    )
 
 
-def _nearest(skeleton: Skeleton, modes: Sequence[Mode], joints: Array) -> tuple[int, float]:
+def _nearest(
+    skeleton: Skeleton, modes: Sequence[Mode], joints: Array
+) -> tuple[int, float]:
     """Return the nearest mode to joints (27, 3), and how far it is away, in metres."""
     centres = skeleton.joints(np.array([mode.pose for mode in modes]))
     distances = joint_distances(centres, joints).mean(axis=-1)
@@ -124,11 +178,19 @@ def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
     """Return the distances (n, K), metres, of poses (n, 66) from others (K, 66): the mean over joints, root-centred."""
     from scipy.spatial.distance import cdist
 
-    pairs = zip(np.moveaxis(skeleton.joints(poses), 1, 0), np.moveaxis(skeleton.joints(others), 1, 0), strict=True)
-    return np.asarray(sum(cdist(joints, targets) for joints, targets in pairs) / len(JOINTS))
+    pairs = zip(
+        np.moveaxis(skeleton.joints(poses), 1, 0),
+        np.moveaxis(skeleton.joints(others), 1, 0),
+        strict=True,
+    )
+    return np.asarray(
+        sum(cdist(joints, targets) for joints, targets in pairs) / len(JOINTS)
+    )
 
 
-def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior | None], apart: float = APART) -> list[TrackMode]:
+def track_modes(
+    skeleton: Skeleton, posteriors: Sequence[Posterior | None], apart: float = APART
+) -> list[TrackMode]:
     """Return the possible tracks of a clip, the likeliest first, by the posteriors of its frames.
 
     Tracks are similar as poses are in `modes_of`, by the mean over frames. There are none where rows are no tracks.
@@ -136,15 +198,22 @@ def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior | None], apar
     coherent = [frame for frame in posteriors if frame is not None and frame.coherent]
     if len(coherent) < len(posteriors) or len({len(frame) for frame in coherent}) != 1:
         return []
-    distances = np.mean([poses_apart(skeleton, frame.poses, frame.poses) for frame in coherent], axis=0)
+    distances = np.mean(
+        [poses_apart(skeleton, frame.poses, frame.poses) for frame in coherent], axis=0
+    )
     weights = np.mean([frame.weights for frame in coherent], axis=0)
     poses = np.array([frame.poses for frame in coherent])
     translations = np.array([frame.translations for frame in coherent])
     clusters = clusters_of(distances, weights, apart)
-    return [TrackMode(weight, poses[:, row], translations[:, row]) for weight, row, _ in clusters]
+    return [
+        TrackMode(weight, poses[:, row], translations[:, row])
+        for weight, row, _ in clusters
+    ]
 
 
-def clusters_of(distances: Array, weights: Array, apart: float) -> list[tuple[float, int, NDArray[np.intp]]]:
+def clusters_of(
+    distances: Array, weights: Array, apart: float
+) -> list[tuple[float, int, NDArray[np.intp]]]:
     """Return the weight, the medoid and all rows of each cluster, the heaviest first.
 
     A centre is the row with the greatest weight near it among those that are near no earlier centre; then every row
@@ -166,7 +235,8 @@ def clusters_of(distances: Array, weights: Array, apart: float) -> list[tuple[fl
     return sorted(clusters, key=lambda cluster: -cluster[0])
 
 
-_LEFT_HIP, _RIGHT_HIP = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
+_LEFT_HIP = JOINTS.index("lhipjoint")
+_RIGHT_HIP = JOINTS.index("rhipjoint")
 _PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
@@ -184,19 +254,31 @@ def mirrored_gain(targets: Array, joints: Array) -> Array:
     The mirror is the plane through the root between the hips; left and right are exchanged. Roots are at one point, and
     only joints that have a counterpart count.
     """
-    targets, joints = root_centred(targets), root_centred(joints)
+    targets = root_centred(targets)
+    joints = root_centred(joints)
     across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
-    mirrored = joints - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
-    direct = np.linalg.norm(targets[:, _PAIRED] - joints[:, _PAIRED], axis=-1).mean(axis=1)
-    exchanged = np.linalg.norm(targets[:, _PAIRED] - mirrored[:, np.array(MIRROR)[_PAIRED]], axis=-1).mean(axis=1)
+    across /= np.maximum(
+        np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny
+    )
+    mirrored = (
+        joints
+        - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
+    )
+    direct = np.linalg.norm(targets[:, _PAIRED] - joints[:, _PAIRED], axis=-1).mean(
+        axis=1
+    )
+    exchanged = np.linalg.norm(
+        targets[:, _PAIRED] - mirrored[:, np.array(MIRROR)[_PAIRED]], axis=-1
+    ).mean(axis=1)
     return np.asarray(direct - exchanged)
 
 
 def second_side(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:
     """Return the probability that left and right of a pose (66,) are exchanged: the weight of poses nearer to it so."""
     reported = np.repeat(skeleton.joints(pose)[None], len(posterior), axis=0)
-    return float(posterior.weights @ nearer_mirrored(skeleton.joints(posterior.poses), reported))
+    return float(
+        posterior.weights @ nearer_mirrored(skeleton.joints(posterior.poses), reported)
+    )
 
 
 def unknown_sides(skeleton: Skeleton, posterior: Posterior, pose: Array) -> bool:

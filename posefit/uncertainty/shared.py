@@ -34,23 +34,32 @@ SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "head": ((15, 20, 15), (0, 35, 20)),
     "arms": ((0, 25, 30), (0, 50, 40)),
 }
-DEPTH = 0.015  # of the distance from a camera that is alone, where the person's height is given
-STATURE = 0.054  # of adults' height; a person who is a tenth taller than assumed is a tenth farther away
+# of the distance from a camera that is alone, where the person's height is given
+DEPTH = 0.015
+# of adults' height; a person who is a tenth taller than assumed is a tenth farther away
+STATURE = 0.054
 
 
 def in_footage(model: Recalibration, cameras: int, height_known: bool) -> Recalibration:
     """Return corrections of what so many cameras show, which are right about the errors of single frames."""
     depth = 0.0 if cameras > 1 else math.hypot(DEPTH, 0.0 if height_known else STATURE)
     shared, placed = (shared_spreads(cameras, world) for world in (False, True))
-    spreads = np.hypot(model.joint_spreads, shared), np.hypot(model.joint_spreads, placed)
-    return replace(model, joint_spreads=spreads[0], place_spreads=spreads[1], depth=depth)
+    spreads = (
+        np.hypot(model.joint_spreads, shared),
+        np.hypot(model.joint_spreads, placed),
+    )
+    return replace(
+        model, joint_spreads=spreads[0], place_spreads=spreads[1], depth=depth
+    )
 
 
 def shared_spreads(cameras: int, world: bool = False) -> Array:
     """Return by how much joints (27,) are off, metres on each axis: about the root, or in the world but for depth."""
     part_of = {name: part for part, names in PARTS.items() for name in names}
     column = min(cameras, 3) - 1
-    return np.array([1e-3 * SHARED_MM[part_of[kind(joint)]][world][column] for joint in JOINTS])
+    return np.array(
+        [1e-3 * SHARED_MM[part_of[kind(joint)]][world][column] for joint in JOINTS]
+    )
 
 
 def depth_halves(model: Recalibration, camera: Camera, place: Array) -> Array:

@@ -42,10 +42,21 @@ print(scaled(np.arange(4, dtype=KIND)))
 """
 
 
-def process(folder: Path, *words: str, **variables: str) -> "subprocess.CompletedProcess[str]":
+def process(
+    folder: Path, *words: str, **variables: str
+) -> "subprocess.CompletedProcess[str]":
     """Return what came of Python in a process of its own, whose cache is in a folder."""
-    own = {"NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_DISABLE_JIT": "0", "PYTHONDONTWRITEBYTECODE": "1"}
-    how = {"env": os.environ | own | variables, "capture_output": True, "text": True, "check": True}
+    own = {
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        "NUMBA_DISABLE_JIT": "0",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    how = {
+        "env": os.environ | own | variables,
+        "capture_output": True,
+        "text": True,
+        "check": True,
+    }
     return subprocess.run([sys.executable, *words], **how)
 
 
@@ -54,21 +65,34 @@ def run(tmp_path: Path) -> Any:
     """Return a function that runs a process and returns the sum that it prints, and what it compiled."""
     (tmp_path / "package").mkdir()
     (tmp_path / "package/__init__.py").touch()
-    (tmp_path / "package/loops.py").write_text(LOOPS.replace("from constants", "from package.constants"))
+    (tmp_path / "package/loops.py").write_text(
+        LOOPS.replace("from constants", "from package.constants")
+    )
 
-    def ran(factor: float = 1.0, before: str = "", kind: str = "float", **variables: str) -> tuple[float, list[str]]:
+    def ran(
+        factor: float = 1.0, before: str = "", kind: str = "float", **variables: str
+    ) -> tuple[float, list[str]]:
         (tmp_path / "package/constants.py").write_text(f"FACTOR = {factor}\n")
-        path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+        path = os.pathsep.join(
+            [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
+        )
         words = ["-c", before + RUN.replace("KIND", kind)]
-        lines = process(tmp_path, *words, PYTHONPATH=path, **variables).stdout.split("\n")
-        return float(lines[-2]), [line.removeprefix("compiled ") for line in lines if line.startswith("compiled")]
+        lines = process(tmp_path, *words, PYTHONPATH=path, **variables).stdout.split(
+            "\n"
+        )
+        return float(lines[-2]), [
+            line.removeprefix("compiled ")
+            for line in lines
+            if line.startswith("compiled")
+        ]
 
     return ran
 
 
 def test_a_change_of_another_file_of_the_package_is_no_stale_result(run: Any) -> None:
     assert run() == (12.0, ["scaled"])
-    assert run(factor=2.0) == (24.0, ["scaled"])  # the file of the function itself stays
+    # the file of the function itself stays
+    assert run(factor=2.0) == (24.0, ["scaled"])
     assert run() == (12.0, [])
 
 
@@ -93,7 +117,11 @@ def with_another_bit(file: Path) -> None:
 
 def test_a_damaged_file_is_a_miss(run: Any, tmp_path: Path) -> None:
     run()
-    cases = [(damage, pattern) for damage in (emptied, cut, unreadable) for pattern in ("*.nbi", "*.nbc")]
+    cases = [
+        (damage, pattern)
+        for damage in (emptied, cut, unreadable)
+        for pattern in ("*.nbi", "*.nbc")
+    ]
     for damage, pattern in (*cases, (with_another_bit, "*.nbc"), (emptied, "*.nb?")):
         files = list((tmp_path / "cache").rglob(pattern))
         assert files
@@ -119,22 +147,34 @@ if __name__ == "__main__":
 """
 
 
-def test_compiling_is_announced_once_in_the_process_that_a_user_started(tmp_path: Path) -> None:
-    (tmp_path / "posefit_loops.py").write_text(LOOPS.replace("from constants import FACTOR", "FACTOR = 1.0"))
+def test_compiling_is_announced_once_in_the_process_that_a_user_started(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "posefit_loops.py").write_text(
+        LOOPS.replace("from constants import FACTOR", "FACTOR = 1.0")
+    )
     (tmp_path / "script.py").write_text(ANNOUNCED)
     announced = {}
     for word in ("child", "quiet", "", "again"):
         if word != "again":
             shutil.rmtree(tmp_path / "cache", ignore_errors=True)
-        announced[word] = process(tmp_path, str(tmp_path / "script.py"), word).stderr.splitlines()
+        announced[word] = process(
+            tmp_path, str(tmp_path / "script.py"), word
+        ).stderr.splitlines()
     message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
     assert announced == {"child": [], "quiet": [], "": [message], "again": []}
 
 
 @pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"])
-def test_without_a_place_for_the_cache_every_process_compiles(run: Any, tmp_path: Path, variable: str) -> None:
+def test_without_a_place_for_the_cache_every_process_compiles(
+    run: Any, tmp_path: Path, variable: str
+) -> None:
     (tmp_path / "file").write_text("a file where the folder should be")
-    nowhere = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": "", variable: str(tmp_path / "file")}
+    nowhere = {
+        "NUMBA_CACHE_DIR": "",
+        "XDG_CACHE_HOME": "",
+        variable: str(tmp_path / "file"),
+    }
     assert run(**nowhere) == (12.0, ["scaled"])
     assert not list((tmp_path / "package").rglob("*.nb*"))
 
@@ -146,5 +186,8 @@ def test_without_room_every_process_compiles(run: Any) -> None:
 
 def test_two_processes_at_once_lose_nothing(run: Any) -> None:
     with ThreadPoolExecutor(2) as pool:
-        assert [total for total, _ in pool.map(lambda kind: run(kind=kind), ("float", "int"))] == [12.0, 12.0]
+        assert [
+            total
+            for total, _ in pool.map(lambda kind: run(kind=kind), ("float", "int"))
+        ] == [12.0, 12.0]
     assert [run(kind=kind) for kind in ("float", "int")] == [(12.0, [])] * 2

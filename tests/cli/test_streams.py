@@ -29,7 +29,9 @@ seeds = 1
 
 def shell(command: str, **variables: str) -> subprocess.CompletedProcess[str]:
     words = ["sh", "-c", command.replace("posefit", f"{sys.executable} -m posefit", 1)]
-    return subprocess.run(words, capture_output=True, text=True, env={**os.environ, **variables})
+    return subprocess.run(
+        words, capture_output=True, text=True, env={**os.environ, **variables}
+    )
 
 
 def test_messages_that_nobody_can_read_end_no_work(tmp_path: Path) -> None:
@@ -37,7 +39,10 @@ def test_messages_that_nobody_can_read_end_no_work(tmp_path: Path) -> None:
     sweep = f"sweep {tmp_path}/plan.toml --workers 1"
     for number, redirected in enumerate(("2>/dev/full", "<&- 2>&-")):
         out = tmp_path / str(number)
-        for command, name, count in ((f"{TRACK} --out {out}", "frames", 2), (f"{sweep} --out {out}-rows", "done", 1)):
+        for command, name, count in (
+            (f"{TRACK} --out {out}", "frames", 2),
+            (f"{sweep} --out {out}-rows", "done", 1),
+        ):
             ran = shell(f"posefit {command} --json {redirected}")
             assert ran.returncode == 0
             assert json.loads(ran.stdout)[name] == count
@@ -58,14 +63,18 @@ def test_results_that_cannot_be_written_are_one_line(unbuffered: str) -> None:
 
 def test_a_file_gets_messages_and_no_bars(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN)
-    for command in (TRACK, f"sweep {tmp_path}/plan.toml --workers 1 --out {tmp_path}/out"):
+    for command in (
+        TRACK,
+        f"sweep {tmp_path}/plan.toml --workers 1 --out {tmp_path}/out",
+    ):
         ran = shell(f"posefit {command}")
         assert ran.returncode == 0
         assert [part for part in ("\r", "it/s", "%|") if part in ran.stderr] == []
 
 
 def test_what_a_machine_refuses_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    fits, denied = "expected work that fits .* GB of memory, got", PermissionError(13, "Permission denied", "a.npz")
+    fits = "expected work that fits .* GB of memory, got"
+    denied = PermissionError(13, "Permission denied", "a.npz")
     for error, line in (
         (MemoryError(), f"{fits} more"),
         (MemoryError("Unable to allocate 9 TiB"), f"{fits} Unable to allocate 9 TiB"),

@@ -10,9 +10,15 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 RUN = ("python", "sh", "toml")  # languages whose blocks are tested
 SHOWN = ("text",)  # what the block before it prints, or what is no code
-_BLOCK = re.compile(r"^(?P<fence>`{3,})(?P<language>[^\n]*)\n(?P<text>.*?)^(?P=fence)[ ]*$", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(
+    r"^(?P<fence>`{3,})(?P<language>[^\n]*)\n(?P<text>.*?)^(?P=fence)[ ]*$",
+    re.MULTILINE | re.DOTALL,
+)
 _MADE = re.compile(r"<!-- from the code: .*?<!-- end -->", re.DOTALL)
-_MARK = re.compile(r"<!-- (nightly|not run|not a plan|not compared): ((?:(?!-->).)*) -->\n\Z", re.DOTALL)
+_MARK = re.compile(
+    r"<!-- (nightly|not run|not a plan|not compared): ((?:(?!-->).)*) -->\n\Z",
+    re.DOTALL,
+)
 
 
 @dataclass(frozen=True)
@@ -23,7 +29,9 @@ class Block:
     line: int
     language: str
     text: str = field(repr=False)
-    mark: str = ""  # "nightly", "not run", "not compared", or "not a plan" of TOML that is something else
+    # "nightly", "not run", "not compared", or "not a plan" of TOML that is something
+    # else
+    mark: str = ""
     reason: str = ""
 
     def __str__(self) -> str:
@@ -33,7 +41,11 @@ class Block:
 def pages() -> list[Path]:
     """Return README and every page of the handbook that was written by hand."""
     files = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
-    written = [path for path in files if not {"_build", "generated", "contributions"} & set(path.parts)]
+    written = [
+        path
+        for path in files
+        if not {"_build", "generated", "contributions"} & set(path.parts)
+    ]
     return [ROOT / "README.md", *sorted(written)]
 
 
@@ -49,7 +61,13 @@ def blocks(page: Path) -> Iterator[Block]:
             continue
         before = text[: block.start()]
         why = marked.groups() if (marked := _MARK.search(before)) else ()
-        yield Block(str(page.relative_to(ROOT)), before.count("\n") + 1, language, block["text"], *why)
+        yield Block(
+            str(page.relative_to(ROOT)),
+            before.count("\n") + 1,
+            language,
+            block["text"],
+            *why,
+        )
 
 
 def _cells(page: Path) -> Iterator[Block]:
@@ -58,5 +76,9 @@ def _cells(page: Path) -> Iterator[Block]:
     for k, cell in enumerate(json.loads(page.read_text("utf-8"))["cells"]):
         if cell["cell_type"] == "code":
             yield Block(name, k, "python", "".join(cell["source"]))
-            texts = [output["text"] for output in cell["outputs"] if output["output_type"] == "stream"]
+            texts = [
+                output["text"]
+                for output in cell["outputs"]
+                if output["output_type"] == "stream"
+            ]
             yield Block(name, k, "text", "".join("".join(text) for text in texts))

@@ -8,7 +8,8 @@ from tests.docs.pages import Block
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?")
 _TIME = re.compile(r"\s*(ms|us|s|seconds?|poses a second)\b")
 TOLERANCE = 0.5  # relative: on another processor a search finds another minimum
-COUNTS = 100  # below which a number without a unit, of a line without fractions, is a count
+# below which a number without a unit, of a line without fractions, is a count
+COUNTS = 100
 _UNIT = re.compile(r"\s*(mm|cm|m|%|degrees|deg)(?!\w)")
 
 
@@ -21,8 +22,12 @@ def differences(block: Block, output: str) -> Iterator[str]:
             continue
         place = next((i for i in range(at, len(lines)) if same(line, lines[i])), None)
         if place is None:
-            near = [other for other in lines[at:] if other.split()[:1] == line.split()[:1]]
-            yield f"{block}: {line!r} is not printed" + (f", but {near[0]!r}" if near else "")
+            near = [
+                other for other in lines[at:] if other.split()[:1] == line.split()[:1]
+            ]
+            yield f"{block}: {line!r} is not printed" + (
+                f", but {near[0]!r}" if near else ""
+            )
         else:
             at = place + 1
 
@@ -54,5 +59,8 @@ def _plain(line: str) -> str:
 
 def _close(a: str, b: str) -> bool:
     decimals = max(len(number.partition(".")[2]) for number in (a, b))
-    x, y = _value(a), _value(b)
-    return abs(x - y) <= max(TOLERANCE * max(abs(x), abs(y)), 2 * 10**-decimals if decimals else 0)
+    x = _value(a)
+    y = _value(b)
+    return abs(x - y) <= max(
+        TOLERANCE * max(abs(x), abs(y)), 2 * 10**-decimals if decimals else 0
+    )

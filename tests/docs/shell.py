@@ -12,7 +12,19 @@ import click
 from posefit.cli import main
 from tests.docs.pages import ROOT
 
-TOOLS = ("bash", "cd", "dask", "ffmpeg", "lint-imports", "mypy", "printf", "ruff", "sphinx-build", "uv", "sqlite3")
+TOOLS = (
+    "bash",
+    "cd",
+    "dask",
+    "ffmpeg",
+    "lint-imports",
+    "mypy",
+    "printf",
+    "ruff",
+    "sphinx-build",
+    "uv",
+    "sqlite3",
+)
 
 
 def commands(text: str) -> Iterator[list[str]]:
@@ -32,7 +44,8 @@ def commands(text: str) -> Iterator[list[str]]:
 
 def check(words: list[str]) -> None:
     """Raise AssertionError or click.UsageError where a command is not one."""
-    while re.fullmatch(r"[A-Z_]+=\S*", words[0]):  # what a variable of the environment is for this command
+    # what a variable of the environment is for this command
+    while re.fullmatch(r"[A-Z_]+=\S*", words[0]):
         words = words[1:]
     name, *rest = words
     if name == "posefit":
@@ -45,8 +58,14 @@ def check(words: list[str]) -> None:
         path = ROOT / words[1]
         assert path.is_file(), f"no file {words[1]}"
         if path.parent.name == "studies":
-            options = {option for parameter in import_module(path.stem).main.params for option in parameter.opts}
-            assert {word for word in words if word.startswith("--")} <= options, f"an option that {path.name} lacks"
+            options = {
+                option
+                for parameter in import_module(path.stem).main.params
+                for option in parameter.opts
+            }
+            assert {word for word in words if word.startswith("--")} <= options, (
+                f"an option that {path.name} lacks"
+            )
     elif name == "sbatch":
         for inner in commands(rest[rest.index("--wrap") + 1]):
             check(inner)
@@ -59,12 +78,15 @@ def _check_posefit(command: click.Command, words: list[str]) -> None:
     while isinstance(command, click.Group) and words and not words[0].startswith("-"):
         inner = command.get_command(context, words[0])
         assert inner is not None, f"posefit has no command {words[0]}"
-        command, words = inner, words[1:]
+        command = inner
+        words = words[1:]
     command.make_context(command.name, list(words))
 
 
 def _check_extras(words: list[str]) -> None:
-    known = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    known = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
+        "optional-dependencies"
+    ]
     for word in words:
         extras = re.fullmatch(r"(\.|posefit)\[(.*)\]", word)
         for extra in extras[2].split(",") if extras else ():

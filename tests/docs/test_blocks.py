@@ -22,7 +22,11 @@ BLOCKS = [block for page in pages() for block in blocks(page)]
 # pages that take seconds of a processor
 SLOW = (
     *(f"docs/{page}.md" for page in ("ways/sweep", "howto/suite", "howto/masks")),
-    *("docs/reference/settings.md", "docs/notebooks/array_to_angles.ipynb", "docs/notebooks/learner.ipynb"),
+    *(
+        "docs/reference/settings.md",
+        "docs/notebooks/array_to_angles.ipynb",
+        "docs/notebooks/learner.ipynb",
+    ),
 )
 VIDEO = ROOT.parent / "shared/data/video/sports2d_walk"
 
@@ -78,18 +82,29 @@ def _prepare(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         site = folder / "site"
         info = site / "posefit_spiral-0.1.0.dist-info"
         info.mkdir(parents=True)
-        (info / "METADATA").write_text("Name: posefit-spiral\nVersion: 0.1.0\n", "utf-8")
-        (info / "entry_points.txt").write_text("[posefit]\nspiral = posefit_spiral\n", "utf-8")
-        monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(site), str(folder / "posefit-spiral"))))
+        (info / "METADATA").write_text(
+            "Name: posefit-spiral\nVersion: 0.1.0\n", "utf-8"
+        )
+        (info / "entry_points.txt").write_text(
+            "[posefit]\nspiral = posefit_spiral\n", "utf-8"
+        )
+        monkeypatch.setenv(
+            "PYTHONPATH", os.pathsep.join((str(site), str(folder / "posefit-spiral")))
+        )
 
 
 def _shell(block: Block, folder: Path) -> str:
     """Return what a block prints; what installs a package is left out."""
     tools = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
-    text = re.sub(r"^python -m pip install .*?(&& |$)", "", block.text, flags=re.MULTILINE)
-    words, environment = ["bash", "-euo", "pipefail", "-c", text], {**os.environ, "PATH": tools}
+    text = re.sub(
+        r"^python -m pip install .*?(&& |$)", "", block.text, flags=re.MULTILINE
+    )
+    words = ["bash", "-euo", "pipefail", "-c", text]
+    environment = {**os.environ, "PATH": tools}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    result = subprocess.run(words, cwd=folder, env=environment, text=True, timeout=600, **pipes)
+    result = subprocess.run(
+        words, cwd=folder, env=environment, text=True, timeout=600, **pipes
+    )
     assert result.returncode == 0, f"{block}: {result.stdout[-2000:]}"
     return result.stdout
 
@@ -131,19 +146,29 @@ def test_what_a_page_shows_as_printed_is_compared_or_has_its_reason() -> None:
 
 
 def test_messages_that_are_explained_exist() -> None:
-    paths = [path for folder in ("posefit", "plugins") for path in (ROOT / folder).rglob("*.py")]
+    paths = [
+        path
+        for folder in ("posefit", "plugins")
+        for path in (ROOT / folder).rglob("*.py")
+    ]
     code = " ".join(path.read_text("utf-8") for path in paths)
     code = re.sub(r'"\s*f?"', "", code)  # of a text over several lines
     page = (ROOT / "docs/howto/troubleshooting.md").read_text("utf-8")
     messages = re.findall(r"^\| `([^`]+)`", page, re.MULTILINE)
     assert len(messages) > 15
-    parts = [(message, part.strip()) for message in messages for part in message.split("...")]
+    parts = [
+        (message, part.strip()) for message in messages for part in message.split("...")
+    ]
     assert [message for message, part in parts if part not in code] == []
 
 
 def test_words_and_counts_are_compared_exactly_and_figures_about() -> None:
     for shown, line, holds in (
-        ("error 1.21 degrees, 5.6 ms a frame", "error 1.04 degrees, 90.1 ms a frame", True),
+        (
+            "error 1.21 degrees, 5.6 ms a frame",
+            "error 1.04 degrees, 90.1 ms a frame",
+            True,
+        ),
         ("cost 1.65 after 2440 proposals", "cost 6.91 after 2440 proposals", False),
         ("20 checks ran, 1 failed", "20 checks ran, 2 failed", False),
         ("10 poses, toe 269", "10 poses, toe 281", True),
@@ -155,5 +180,9 @@ def test_words_and_counts_are_compared_exactly_and_figures_about() -> None:
 
 
 def test_pages_import_posefit_and_its_plugin_module_alone() -> None:
-    deep = [str(block) for block in BLOCKS if re.search(r"(from|import) posefit\.(?!plugin\b)", block.text)]
+    deep = [
+        str(block)
+        for block in BLOCKS
+        if re.search(r"(from|import) posefit\.(?!plugin\b)", block.text)
+    ]
     assert deep == []

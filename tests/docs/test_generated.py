@@ -32,7 +32,9 @@ def rows(page: str) -> set[str]:
 
 def test_the_settings_of_every_method_are_described() -> None:
     page = settings.page()
-    names = [offer.name for offers in registry().offers.values() for offer in offers.values()]
+    names = [
+        offer.name for offers in registry().offers.values() for offer in offers.values()
+    ]
     assert [name for name in names if f"`{name}`" not in page] == []
 
 
@@ -57,28 +59,51 @@ def head_of(path: Path) -> list[str]:
 
 def test_every_column_of_frames_csv_is_described(tracked: Path) -> None:
     of_places = {f"{place}_{axis}" for place in PLACES for axis in "xyz"}
-    assert [name for name in head_of(tracked / "frames.csv") if name not in of_places] == list(figures.FRAME)
+    assert [
+        name for name in head_of(tracked / "frames.csv") if name not in of_places
+    ] == list(figures.FRAME)
 
 
 def test_every_column_of_a_sweeps_csv_is_described() -> None:
-    row = run_cell(cell_of({"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80})).row
-    described = rows(figures.page()) | rows((DOCS / "howto" / "plan.md").read_text("utf-8"))
-    names = [column for column in flat(row) if not column.startswith("joint_errors_mm.")]
-    assert [name for name in names if not described & {name, name.partition(".")[0]}] == []
+    row = run_cell(
+        cell_of(
+            {"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80}
+        )
+    ).row
+    described = rows(figures.page()) | rows(
+        (DOCS / "howto" / "plan.md").read_text("utf-8")
+    )
+    names = [
+        column for column in flat(row) if not column.startswith("joint_errors_mm.")
+    ]
+    assert [
+        name for name in names if not described & {name, name.partition(".")[0]}
+    ] == []
 
 
 def test_every_angle_is_described(tracked: Path) -> None:
     assert head_of(tracked / "angles.csv") == ["frame", "seconds", *COLUMNS]
     described = re.findall(r"^\| `(\w+)` \|", angles.page(), re.MULTILINE)
     assert {name.partition("_")[2] for name in COLUMNS} == set(described)
-    page = (DOCS / "howto" / "measuring.md").read_text("utf-8").partition("of `gait.csv`")[2]
-    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == head_of(tracked / "gait.csv")
+    page = (
+        (DOCS / "howto" / "measuring.md")
+        .read_text("utf-8")
+        .partition("of `gait.csv`")[2]
+    )
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == head_of(
+        tracked / "gait.csv"
+    )
 
 
 def test_what_is_made_from_the_code_is_up_to_date() -> None:
     # words alone: another click breaks lines elsewhere
-    pages = [(name, (DOCS / name).read_text("utf-8").split(), text.split()) for name, text in generator.pages().items()]
-    assert [name for name, page, text in pages if page != text] == [], "python docs/generator writes them"
+    pages = [
+        (name, (DOCS / name).read_text("utf-8").split(), text.split())
+        for name, text in generator.pages().items()
+    ]
+    assert [name for name, page, text in pages if page != text] == [], (
+        "python docs/generator writes them"
+    )
 
 
 def test_a_plan_is_described_with_every_field_list_and_corruption() -> None:
@@ -96,15 +121,39 @@ def test_a_plan_is_described_with_every_field_list_and_corruption() -> None:
 
 
 def test_a_docstring_is_read_as_plain_text() -> None:
-    assert restructured(["`a`s and b* and c_ of |d|"])[0] == "``a``\\ s and b\\* and c\\_ of \\|d\\|"
-    assert restructured(["So:", "", "    x = 1"])[:5] == ["So:", "", "::", "", "    x = 1"]
-    assert restructured(["    x = 1", "", "    y = 2"]) == ["::", "", "    x = 1", "", "    y = 2", ""]
+    assert (
+        restructured(["`a`s and b* and c_ of |d|"])[0]
+        == "``a``\\ s and b\\* and c\\_ of \\|d\\|"
+    )
+    assert restructured(["So:", "", "    x = 1"])[:5] == [
+        "So:",
+        "",
+        "::",
+        "",
+        "    x = 1",
+    ]
+    assert restructured(["    x = 1", "", "    y = 2"]) == [
+        "::",
+        "",
+        "    x = 1",
+        "",
+        "    y = 2",
+        "",
+    ]
     assert restructured(["one   first", "two   second"])[0] == "::"
     assert restructured(["| a | b |", "|---|---|", "| 1 | 2 |"])[0] == ".. list-table::"
-    assert restructured(["Settings:", "    a (b): c"])[:3] == ["Settings:", "", "* **a (b)**: c"]
+    assert restructured(["Settings:", "    a (b): c"])[:3] == [
+        "Settings:",
+        "",
+        "* **a (b)**: c",
+    ]
 
 
 def test_the_page_of_the_architecture_lists_every_package() -> None:
     page = (DOCS / "background" / "architecture.md").read_text("utf-8")
-    packages = {module.name for module in pkgutil.iter_modules(posefit.__path__) if not module.name.startswith("_")}
+    packages = {
+        module.name
+        for module in pkgutil.iter_modules(posefit.__path__)
+        if not module.name.startswith("_")
+    }
     assert [name for name in sorted(packages) if f"`{name}`" not in page] == []

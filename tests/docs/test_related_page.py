@@ -10,29 +10,52 @@ from posefit.sweep.plan import Plan
 from tests.docs.pages import DOCS
 
 
-def row(method: str, motion: str, cameras: int, seed: int, mm: float, **fields: Any) -> dict[str, Any]:
-    spec = {"method": method, "motion": motion, "seed": seed, "view_degrees": 45 if cameras == 1 else [0, 90], **fields}
-    figures = {"mpjpe_mm": mm, "lost_rate": 0.25, "cost": mm / 10.0, "cpu_seconds_per_frame": 0.002}
+def row(
+    method: str, motion: str, cameras: int, seed: int, mm: float, **fields: Any
+) -> dict[str, Any]:
+    spec = {
+        "method": method,
+        "motion": motion,
+        "seed": seed,
+        "view_degrees": 45 if cameras == 1 else [0, 90],
+        **fields,
+    }
+    figures = {
+        "mpjpe_mm": mm,
+        "lost_rate": 0.25,
+        "cost": mm / 10.0,
+        "cpu_seconds_per_frame": 0.002,
+    }
     return {"spec": spec, "error_degrees": {"mean": mm / 20.0}, **figures}
 
 
 ROWS = [
     row(method, "walk", cameras, seed, base + 10.0 * (cameras == 1) + step * seed)
-    for method, base, step in (("sapso@pca", 20.0, 1.0), ("sapso@isomap", 30.0, 1.0), ("sapso@gplvm", 20.0, -1.0))
+    for method, base, step in (
+        ("sapso@pca", 20.0, 1.0),
+        ("sapso@isomap", 30.0, 1.0),
+        ("sapso@gplvm", 20.0, -1.0),
+    )
     for cameras in (1, 2)
     for seed in (0, 2)
 ]
 
 
 def test_a_condition_is_motion_cameras_yaw_and_masks() -> None:
-    disturbed = row("sapso@pca", "walk", 2, 0, 1.0, yaw_off_degrees=180, corruption={"holes": 0.5})
+    disturbed = row(
+        "sapso@pca", "walk", 2, 0, 1.0, yaw_off_degrees=180, corruption={"holes": 0.5}
+    )
     assert related.condition_of(disturbed) == ("walk", 2, False, False)
     assert related.condition_of(ROWS[0]) == ("walk", 1, True, True)
 
 
 def test_methods_stand_in_order_with_medians_of_parts() -> None:
     lines = [line.split(" | ") for line in related.methods(ROWS)][2:]
-    assert [line[0].strip("| ") for line in lines] == ["`sapso@gplvm`", "`sapso@pca`", "`sapso@isomap`"]
+    assert [line[0].strip("| ") for line in lines] == [
+        "`sapso@gplvm`",
+        "`sapso@pca`",
+        "`sapso@isomap`",
+    ]
     # of 30, 32, 20 and 22 mm the median is 26; with one camera 31, with two 21
     assert lines[1][1:6] == ["26", "25.0", "31", "-", "21"]
     assert lines[1][-1].strip("| ") == "2.0"
@@ -40,22 +63,38 @@ def test_methods_stand_in_order_with_medians_of_parts() -> None:
 
 def test_who_leads_is_said_with_one_that_is_not_surely_behind() -> None:
     heads, _, one_camera, _two_cameras = related.winners(ROWS)
-    assert [cell.strip() for cell in heads.split("|")[1:4]] == ["motion", "cameras", "known yaw, clean"]
+    assert [cell.strip() for cell in heads.split("|")[1:4]] == [
+        "motion",
+        "cameras",
+        "known yaw, clean",
+    ]
     # means of 29 and 31 mm; pairs differ by 0 and by 4
-    assert [cell.strip() for cell in one_camera.split("|")[1:4]] == ["walk", "1", "`sapso@gplvm` 29 or `sapso@pca`"]
+    assert [cell.strip() for cell in one_camera.split("|")[1:4]] == [
+        "walk",
+        "1",
+        "`sapso@gplvm` 29 or `sapso@pca`",
+    ]
     sure = [row("sapso@pca", "run", 1, seed, 10.0) for seed in range(4)]
-    sure += [row("sapso@isomap", "run", 1, seed, 20.0 + 0.1 * seed) for seed in range(4)]
+    sure += [
+        row("sapso@isomap", "run", 1, seed, 20.0 + 0.1 * seed) for seed in range(4)
+    ]
     assert "`sapso@pca` 10 |" in list(related.winners(sure))[2]
 
 
 def test_a_sentence_holds_fails_or_is_open_by_its_interval() -> None:
-    lines = [line for line in related.verdicts(ROWS) if "no way back" in line or "not continuous" in line]
+    lines = [
+        line
+        for line in related.verdicts(ROWS)
+        if "no way back" in line or "not continuous" in line
+    ]
     holds, fails = (line.split(" | ") for line in lines)
     assert holds[2:] == ["4", "**holds** +10 (+10 to +10) |"]  # always 10 mm worse
-    assert fails[3].startswith("**fails** -2 (")  # 0 and 4 mm better, alike in both conditions
+    # 0 and 4 mm better, alike in both conditions
+    assert fails[3].startswith("**fails** -2 (")
     assert related.difference([-1.0, -1.1, -0.9], ["a"] * 3, [0, 1, 2])[2] == "fails"
     assert related.difference([-1.0, 5.0, -0.9], ["a"] * 3, [0, 1, 2])[2] == "open"
-    assert related.difference([3.0, 4.0], ["a", "a"], [0, 0])[1:] == ("-", "open")  # one condition tells nothing
+    # one condition tells nothing
+    assert related.difference([3.0, 4.0], ["a", "a"], [0, 0])[1:] == ("-", "open")
 
 
 def test_pairs_are_of_one_condition_and_seed() -> None:
@@ -75,4 +114,6 @@ def test_the_plan_has_every_method_in_every_condition_at_one_budget() -> None:
     assert len(conditions) == 4 * 2 * 2 * 2
     assert len(cells) == len(names) * len(conditions) * 10
     assert {cell.spec.get("evaluations", 2440) for cell in cells} == {2440}
-    assert np.unique([cell.spec.get("seed", 0) for cell in cells]).tolist() == list(range(10))
+    assert np.unique([cell.spec.get("seed", 0) for cell in cells]).tolist() == list(
+        range(10)
+    )

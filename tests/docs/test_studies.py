@@ -38,10 +38,14 @@ def test_every_study_starts_and_is_named_by_a_page() -> None:
 
 
 def test_plans_of_built_in_motions_are_plans() -> None:
-    assert [len(Plan.read(STUDIES / f"{name}.toml")) for name in ("views", "degradation")] == [45, 36]
+    assert [
+        len(Plan.read(STUDIES / f"{name}.toml")) for name in ("views", "degradation")
+    ] == [45, 36]
 
 
-def test_a_plan_of_recorded_clips_is_one(cmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_of_recorded_clips_is_one(
+    cmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(cmu)
     assert len(Plan.read(STUDIES / "accuracy.toml")) == 60
 
@@ -57,12 +61,17 @@ def test_the_table_of_a_plan_has_a_line_a_group(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     lines = [line for line in result.stdout.splitlines() if line.startswith("|")]
     starts = ["| random@pca | - | 2 |", "| random@pca | holes 0.5 | 2 |"]
-    assert [line.startswith(start) for line, start in zip(lines[2:], starts, strict=True)] == [True, True]
+    assert [
+        line.startswith(start) for line, start in zip(lines[2:], starts, strict=True)
+    ] == [True, True]
 
 
 def test_rows_are_written_as_they_come_and_read_again(tmp_path: Path) -> None:
     path = str(tmp_path / "rows.jsonl")
-    rows = {name: {"name": name, "cost": cost} for name, cost in (("one", 1.5), ("other", 2.5))}
+    rows = {
+        name: {"name": name, "cost": cost}
+        for name, cost in (("one", 1.5), ("other", 2.5))
+    }
     assert table.earlier(path, lambda row: row["name"]) == {}
     coming = table.kept(path, iter(rows.items()), 2)
     assert next(coming) == ("one", rows["one"])
@@ -78,11 +87,15 @@ def test_an_interval_holds_the_median() -> None:
     assert table.interval(values, "aaaaa") == (3.0, 3.0)
 
 
-def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target() -> None:  # Interpretation V5
+# Interpretation V5
+def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target() -> (
+    None
+):
     rng = np.random.default_rng(1)
     before = np.column_stack([np.zeros((90, 3)), rng.normal(0.0, 0.3, (90, 40))])
     after = before + rng.normal(0.0, 0.05, before.shape)
-    inputs, target = before[:, 3:], 0.1 * rng.normal(size=(43, 40))
+    inputs = before[:, 3:]
+    target = 0.1 * rng.normal(size=(43, 40))
     matrix, offset = normalised_ridge(before, after, target, 0.15)
     unit = np.sqrt(inputs.var(axis=0).sum() / 10.0)
     scaled = (inputs - inputs.mean(axis=0)) / unit
@@ -92,7 +105,9 @@ def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target
     outputs = np.vstack([wanted - wanted.mean(axis=0), np.zeros((40, 43))])
     flow = np.linalg.lstsq(rows, outputs, rcond=None)[0]
     assert np.allclose(matrix, flow.T / unit + target)
-    assert np.allclose(inputs @ (matrix - target).T + offset, scaled @ flow + wanted.mean(axis=0))
+    assert np.allclose(
+        inputs @ (matrix - target).T + offset, scaled @ flow + wanted.mean(axis=0)
+    )
 
 
 def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
@@ -101,7 +116,8 @@ def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
     The sign is that of its largest number; those of a left and a right limb are equally large but for rounding.
     """
     others = tuple(person for person in TRAINING_PEOPLE if person != "17")
-    learned, stored = learned_from(upright_poses(others)), learned_without("17")
+    learned = learned_from(upright_poses(others))
+    stored = learned_without("17")
     assert np.abs(STEP * learned["mean"] - stored.mean).max() <= STEP
     components = STEP * learned["components"]
     components *= np.sign((components * stored.components).sum(axis=1))[:, None]
@@ -115,7 +131,8 @@ def test_a_body_at_rest_leaves_few_frames_and_one_that_moves_all() -> None:
 
     thrown = np.zeros((50, 3))
     assert kept(thrown) == [*range(0, 49, LONGEST_GAP), 49]
-    thrown[::2, 1] = 4.0 * TOLERANCE  # the root, to and fro by twice the tolerance: every frame is a corner
+    # the root, to and fro by twice the tolerance: every frame is a corner
+    thrown[::2, 1] = 4.0 * TOLERANCE
     assert kept(thrown) == list(range(50))
     # at an even pace, everything lies on a line
     assert len(kept(np.linspace(0.0, 5.0, 50)[:, None] * [1.0, 0.0, 0.0])) == 8
@@ -125,7 +142,9 @@ def test_clips_count_alike_and_the_one_to_come_as_infinitely_far() -> None:
     # three clips: 1, 2 | 3 | 4. Each weighs a quarter, shared by its scores; the last quarter is the new clip's
     scores = [np.array([2.0, 1.0]), np.array([3.0]), np.array([4.0])]
     # for a level of 0.6, of the three that are known alone 3 would be enough
-    assert [conformal_factor(scores, level) for level in (0.125, 0.2, 0.5, 0.6, 0.75)] == [1.0, 2.0, 3.0, 4.0, 4.0]
+    assert [
+        conformal_factor(scores, level) for level in (0.125, 0.2, 0.5, 0.6, 0.75)
+    ] == [1.0, 2.0, 3.0, 4.0, 4.0]
     for clips, level, message in (
         (scores, 0.8, r"clips must be at least 4 for a level of 0\.8, got 3"),
         ([], 0.5, "scores must be of one clip or more"),
@@ -138,34 +157,63 @@ def test_clips_count_alike_and_the_one_to_come_as_infinitely_far() -> None:
 
 def test_features_of_functions_that_are_known(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(functions, "LONGEST", 200)
-    scales = 100.0 ** np.linspace(0.0, 1.0, 3)  # a quadratic whose Hessian has a condition number of 100
-    quadratic, rng = (lambda points: (scales * points**2).sum(axis=1)), np.random.default_rng(1)
+    # a quadratic whose Hessian has a condition number of 100
+    scales = 100.0 ** np.linspace(0.0, 1.0, 3)
+
+    def quadratic(points: np.ndarray) -> np.ndarray:
+        return (scales * points**2).sum(axis=1)
+
+    rng = np.random.default_rng(1)
     drawn = rng.uniform(-1.0, 1.0, (functions.POINTS, 3))
     for cost in (quadratic, lambda points: np.sqrt(quadratic(points))):
         row, basins = functions.features(cost, cost, np.full(3, 0.001), drawn, rng)
         assert row["conditioning"] == pytest.approx(100.0, rel=0.1)
-        assert (row["elsewhere"], row["basins"], row["rises"], row["noise"]) == (0, 1, 0, 0)
+        assert (row["elsewhere"], row["basins"], row["rises"], row["noise"]) == (
+            0,
+            1,
+            0,
+            0,
+        )
         assert len(basins) == 1
         assert np.abs(basins[0][1]).max() < 1e-3
     row, _ = functions.features(quadratic, quadratic, np.zeros(3), drawn, rng)
     assert row["interaction"] < 1e-9
-    noisy = lambda points: quadratic(points) + 100.0 * rng.standard_normal(len(points))  # noqa: E731
+
+    def noisy(points: np.ndarray) -> np.ndarray:
+        return quadratic(points) + 100.0 * rng.standard_normal(len(points))
+
     row, _ = functions.features(noisy, quadratic, np.zeros(3), drawn, rng)
     assert row["noise"] > 0.5
     assert row["conditioning"] == pytest.approx(100.0, rel=0.1)
+
     # two wells, at 0.5 and -0.5 along each coordinate; the second costs 0.1 at its bottom
-    wells = lambda points: np.minimum(((points - 0.5) ** 2).sum(axis=1), ((points + 0.5) ** 2).sum(axis=1) + 0.1)  # noqa: E731
+    def wells(points: np.ndarray) -> np.ndarray:
+        one = ((points - 0.5) ** 2).sum(axis=1)
+        other = ((points + 0.5) ** 2).sum(axis=1) + 0.1
+        return np.minimum(one, other)
+
     row, basins = functions.features(wells, wells, np.full(3, 0.5), drawn, rng)
     assert row["basins"] == 2
     assert 0.0 < row["elsewhere"] < 1.0
-    assert [np.round(point, 2).tolist() for _, point in basins] == [[0.5] * 3, [-0.5] * 3]
-    assert functions.sliced(wells, basins, rng, "wells").shape == (functions.TILE + 26, functions.TILE + 4, 3)
+    assert [np.round(point, 2).tolist() for _, point in basins] == [
+        [0.5] * 3,
+        [-0.5] * 3,
+    ]
+    assert functions.sliced(wells, basins, rng, "wells").shape == (
+        functions.TILE + 26,
+        functions.TILE + 4,
+        3,
+    )
 
 
 def test_shares_are_of_problems_and_targets() -> None:
     targets = np.array([[4.0, 2.0], [5.0, 3.0]])
-    one, other = ({name: [9.0, last] for name in functions.METHODS} for last in (4.0, 9.0))
-    shares = functions.shares_of(targets, [one | {"pso": [4.0, 4.0]}, other | {"cma": [9.0, 3.0]}])
+    one, other = (
+        {name: [9.0, last] for name in functions.METHODS} for last in (4.0, 9.0)
+    )
+    shares = functions.shares_of(
+        targets, [one | {"pso": [4.0, 4.0]}, other | {"cma": [9.0, 3.0]}]
+    )
     assert shares["pso"] == [0.25, 0.25]
     assert shares["cma"] == [0.0, 0.75]
 
@@ -175,49 +223,110 @@ def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> 
         monkeypatch.setattr(functions, name, value)
     row, targets, costs, picture = functions.measured(2, 10_000, 9)
     median = functions.medians([row])
-    others = {(number, d): {**median, "rises": 0.1 * number} for number, d in ((1, 9), (3, 9), (0, 20))}
+    others = {
+        (number, d): {**median, "rises": 0.1 * number}
+        for number, d in ((1, 9), (3, 9), (0, 20))
+    }
     lines = list(functions.feature_lines({(2, 9): median}, others))
-    assert lines[2].endswith("| 1 |")  # rises are nearer to a tenth than to three; of nine dimensions
-    shares = list(functions.share_lines({2: functions.shares_of(targets[None], [costs])}))
-    assert [part[2].partition(" |")[0] for part in (lines, shares)] == ["| 2 next frame"] * 2
+    # rises are nearer to a tenth than to three; of nine dimensions
+    assert lines[2].endswith("| 1 |")
+    shares = list(
+        functions.share_lines({2: functions.shares_of(targets[None], [costs])})
+    )
+    assert [part[2].partition(" |")[0] for part in (lines, shares)] == [
+        "| 2 next frame"
+    ] * 2
     assert picture.any()
 
 
 def test_proportions_are_of_as_many_men_as_women(tmp_path: Path) -> None:
-    heads = sorted({"stature", *(name.strip("-") for of in proportions.MEASURES.values() for name in of)})
+    heads = sorted(
+        {
+            "stature",
+            *(name.strip("-") for of in proportions.MEASURES.values() for name in of),
+        }
+    )
     men_csv = tmp_path / "men.csv"
-    person = dict.fromkeys(heads, 100.0) | {"stature": 2000.0, "trochanterionheight": 1100.0, "cervicaleheight": 1700.0}
-    people = [person | {"lateralfemoralepicondyleheight": height} for height in (500.0, 600.0)]
-    men_csv.write_text("\n".join([",".join(heads), *(",".join(str(row[name]) for name in heads) for row in people)]))
+    person = dict.fromkeys(heads, 100.0) | {
+        "stature": 2000.0,
+        "trochanterionheight": 1100.0,
+        "cervicaleheight": 1700.0,
+    }
+    people = [
+        person | {"lateralfemoralepicondyleheight": height} for height in (500.0, 600.0)
+    ]
+    men_csv.write_text(
+        "\n".join(
+            [
+                ",".join(heads),
+                *(",".join(str(row[name]) for name in heads) for row in people),
+            ]
+        )
+    )
     logs = proportions.proportions(men_csv)
     assert logs.shape == (2, 9)
-    np.testing.assert_allclose(logs[:, :3], np.log([[2.0, 0.3, 0.2], [2.0, 0.25, 0.25]]))
-    men, women = np.array([[0.0, 0.0], [2.0, 2.0]]), np.array([[3.0, -3.0], [3.0, -1.0], [3.0, -2.0]])
+    np.testing.assert_allclose(
+        logs[:, :3], np.log([[2.0, 0.3, 0.2], [2.0, 0.25, 0.25]])
+    )
+    men = np.array([[0.0, 0.0], [2.0, 2.0]])
+    women = np.array([[3.0, -3.0], [3.0, -1.0], [3.0, -2.0]])
     spread, correlation = proportions.moments(men, women)
     # means 2 and -0.5; variances 0.5 * (0.5 * (4 + 0) + 1) and 0.5 * (0.5 * (0.25 + 6.25) + (6.25 + 0.25 + 2.25) / 3)
     assert spread**2 == pytest.approx([1.5, 0.5 * (3.25 + 8.75 / 3)])
     covariance = 0.5 * (0.5 * (-2.0 * 0.5 + 0.0) + 1.0 * -1.5)
-    assert correlation[0, 1] == pytest.approx(covariance / np.sqrt(1.5 * 0.5 * (3.25 + 8.75 / 3)))
+    assert correlation[0, 1] == pytest.approx(
+        covariance / np.sqrt(1.5 * 0.5 * (3.25 + 8.75 / 3))
+    )
 
 
 def test_tracks_are_as_far_apart_as_the_median_joint_of_all_pairs() -> None:
-    tracks = [np.zeros((1, 3, 3)), np.full((1, 3, 3), [3.0, 4.0, 0.0]), np.full((1, 3, 3), [0.0, 12.0, 0.0])]
-    assert seeds.median_distance(tracks) == pytest.approx(np.sqrt(73.0))  # of 5, 12 and the square root of 9 + 64
+    tracks = [
+        np.zeros((1, 3, 3)),
+        np.full((1, 3, 3), [3.0, 4.0, 0.0]),
+        np.full((1, 3, 3), [0.0, 12.0, 0.0]),
+    ]
+    # of 5, 12 and the square root of 9 + 64
+    assert seeds.median_distance(tracks) == pytest.approx(np.sqrt(73.0))
     assert seeds.median_distance(tracks[:1]) == 0.0
 
 
-def test_blind_equivalents_lie_between_the_budgets_measured_by_their_logarithm() -> None:
+def test_blind_equivalents_lie_between_the_budgets_measured_by_their_logarithm() -> (
+    None
+):
     blind = {100: 10.0, 10_000: 2.0}
-    assert [agents.equivalent(blind, cost) for cost in (10.0, 6.0, 2.0)] == ["100", "1,000", "10,000"]
-    assert [agents.equivalent(blind, cost) for cost in (10.1, 1.9)] == ["< 100", "> 10,000"]
+    assert [agents.equivalent(blind, cost) for cost in (10.0, 6.0, 2.0)] == [
+        "100",
+        "1,000",
+        "10,000",
+    ]
+    assert [agents.equivalent(blind, cost) for cost in (10.1, 1.9)] == [
+        "< 100",
+        "> 10,000",
+    ]
 
 
 def test_the_table_of_agents_has_a_search_in_a_line_and_the_mean_of_seeds() -> None:
     rows = [
-        {"agent": name, "budget": budget, "costs": [cost, cost + 2.0], "cpu_seconds": 3.0}
-        for name, budget, cost in (("sapso", 40, 9.0), ("sapso", 4_000, 1.0), ("cma", 40, 9.0), ("cma", 4_000, 5.0))
+        {
+            "agent": name,
+            "budget": budget,
+            "costs": [cost, cost + 2.0],
+            "cpu_seconds": 3.0,
+        }
+        for name, budget, cost in (
+            ("sapso", 40, 9.0),
+            ("sapso", 4_000, 1.0),
+            ("cma", 40, 9.0),
+            ("cma", 4_000, 5.0),
+        )
     ]
-    rows += [{"agent": "PPO", "budget": 1_000, "costs": [cost, cost], "cpu_seconds": 60.0} for cost in (5.0, 7.0)]
-    _, _, sapso, _, ppo = [[cell.strip() for cell in line.strip("|").split("|")] for line in agents.table(rows)]
+    rows += [
+        {"agent": "PPO", "budget": 1_000, "costs": [cost, cost], "cpu_seconds": 60.0}
+        for cost in (5.0, 7.0)
+    ]
+    _, _, sapso, _, ppo = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in agents.table(rows)
+    ]
     assert (*sapso[:2], sapso[5]) == ("sapso", "40; 4,000", "10.0; 2.0")
     assert ppo == ["PPO", "8", "1,000", "60", "2", "6.0", "5.0 to 7.0", "400", "4,000"]

@@ -19,16 +19,24 @@ from tests.cases import each
 
 def alone(name: str, number: int, seed: int, evaluations: int) -> Any:
     """Return the library's minimum without an environment."""
-    problem, factory = first_episode(world_of(), number, evaluations).problem, registry().optimiser(name)
-    optimiser = factory(problem.space, np.random.default_rng(seed), **planned(factory, {}, evaluations))
+    problem = first_episode(world_of(), number, evaluations).problem
+    factory = registry().optimiser(name)
+    optimiser = factory(
+        problem.space, np.random.default_rng(seed), **planned(factory, {}, evaluations)
+    )
     return minimise(problem.evaluate, optimiser, evaluations)
 
 
 @each("name", ["sapso", "cma"])  # 40 and 10 proposals
-def test_any_population_on_any_number_of_environments_is_the_library_bit_for_bit(name: str) -> None:
+def test_any_population_on_any_number_of_environments_is_the_library_bit_for_bit(
+    name: str,
+) -> None:
     expected = alone(name, 3, 5, 400)
     ends: dict[str, Any] = {"instance": 3, "max_evaluations": 13}
-    for env in (gym.make("posefit/FitImage-v0", **ends), gym.make_vec("posefit/FitImage-v0", num_envs=7, **ends)):
+    for env in (
+        gym.make("posefit/FitImage-v0", **ends),
+        gym.make_vec("posefit/FitImage-v0", num_envs=7, **ends),
+    ):
         minimum = drive(env, name, seed=5, evaluations=400)
         np.testing.assert_array_equal(minimum.trace, expected.trace)
         np.testing.assert_array_equal(minimum.proposal, expected.proposal)
@@ -54,50 +62,90 @@ def test_a_search_starts_from_the_proposals_of_a_policy() -> None:
     start = Start(best, np.full(9, 1e-3), np.zeros(9))
     space = replace(env.unwrapped.problem.space, start=start)
     search = registry().optimiser("cma")(space, np.random.default_rng(0))
-    assert minimise(env.unwrapped.problem.evaluate, search, 10).cost < 2.0 * episode["best_cost"]
+    assert (
+        minimise(env.unwrapped.problem.evaluate, search, 10).cost
+        < 2.0 * episode["best_cost"]
+    )
 
 
 def test_what_cannot_be_driven_is_named() -> None:
     vector = gym.make_vec("posefit/FitImage-v0", num_envs=3)
-    with pytest.raises(error.Error, match=r"instance must be the same in all environments, got \[.*\]: use drive_each"):
+    with pytest.raises(
+        error.Error,
+        match=r"instance must be the same in all environments, got \[.*\]: use drive_each",
+    ):
         drive(vector, "sapso")
-    with pytest.raises(error.Error, match="evaluations must hold one population of 40, got 20"):
+    with pytest.raises(
+        error.Error, match="evaluations must hold one population of 40, got 20"
+    ):
         drive_each(vector, "sapso", evaluations=20)
-    for other in (gym.make("posefit/Race-v0"), gym.make("CartPole-v1"), gym.make_vec("posefit/Race-v0", 2)):
+    for other in (
+        gym.make("posefit/Race-v0"),
+        gym.make("CartPole-v1"),
+        gym.make_vec("posefit/Race-v0", 2),
+    ):
         with pytest.raises(error.Error, match="env must be posefit/FitImage-v0, got"):
             drive(other, "sapso")
 
 
 @pytest.fixture(scope="module")
 def tracking() -> Any:
-    return gym.make("posefit/Track-v0", instance=17, frames=4, evaluations_per_frame=800)
+    return gym.make(
+        "posefit/Track-v0", instance=17, frames=4, evaluations_per_frame=800
+    )
 
 
-def test_a_reference_is_what_a_step_reports_that_commits_and_nearer_than_the_middle_of_the_box(tracking: Any) -> None:
+def test_a_reference_is_what_a_step_reports_that_commits_and_nearer_than_the_middle_of_the_box(
+    tracking: Any,
+) -> None:
     tracking.reset(seed=0)
     rows = track_reference(tracking)
     infos = [tracking.step(np.zeros(9))[-1] for _ in range(4 * 800)]
     committed = [info for info in infos if "committed_pose" in info]
-    assert [row["committed_frame"] for row in rows] == [info["committed_frame"] for info in committed] == [0, 1, 2, 3]
-    assert set(rows[0]) == {name for name in committed[0] if name.startswith("committed_")}
-    reference, middle = (np.mean([row["committed_mpjpe_mm"] for row in some]) for some in (rows, committed))
+    assert (
+        [row["committed_frame"] for row in rows]
+        == [info["committed_frame"] for info in committed]
+        == [0, 1, 2, 3]
+    )
+    assert set(rows[0]) == {
+        name for name in committed[0] if name.startswith("committed_")
+    }
+    reference, middle = (
+        np.mean([row["committed_mpjpe_mm"] for row in some])
+        for some in (rows, committed)
+    )
     assert reference < 0.5 * middle
 
 
-def test_a_reference_learns_from_train_and_has_the_trackers_settings(tracking: Any) -> None:
+def test_a_reference_learns_from_train_and_has_the_trackers_settings(
+    tracking: Any,
+) -> None:
     tracking.reset(seed=0)
-    pose = track_reference(tracking, "exemplars", train=["walk-b"], lag=0)[0]["committed_pose"]
-    assert not np.array_equal(pose, track_reference(tracking, "exemplars")[0]["committed_pose"])
-    assert np.array_equal(pose, track_reference(tracking, train=["walk-b"], lag=0)[0]["committed_pose"])
+    pose = track_reference(tracking, "exemplars", train=["walk-b"], lag=0)[0][
+        "committed_pose"
+    ]
+    assert not np.array_equal(
+        pose, track_reference(tracking, "exemplars")[0]["committed_pose"]
+    )
+    assert np.array_equal(
+        pose, track_reference(tracking, train=["walk-b"], lag=0)[0]["committed_pose"]
+    )
 
 
 def test_mistakes_of_a_reference_are_named(tracking: Any) -> None:
     tracking.reset(seed=0)
-    with pytest.raises(ValueError, match="method must be .*one of exemplars, .*did you mean 'exemplars'"):
+    with pytest.raises(
+        ValueError,
+        match="method must be .*one of exemplars, .*did you mean 'exemplars'",
+    ):
         track_reference(tracking, "exemplar")
-    with pytest.raises(ValueError, match="a setting of exemplars must be one of .*, got 'lags'"):
+    with pytest.raises(
+        ValueError, match="a setting of exemplars must be one of .*, got 'lags'"
+    ):
         track_reference(tracking, lags=3)
-    with pytest.raises(error.Error, match="env must be posefit/Track-v0, got FitImageEnv"):
+    with pytest.raises(
+        error.Error, match="env must be posefit/Track-v0, got FitImageEnv"
+    ):
         track_reference(gym.make("posefit/FitImage-v0"))
     with pytest.raises(error.ResetNeeded):
         track_reference(gym.make("posefit/Track-v0").unwrapped)

@@ -22,7 +22,13 @@ def azimuth(camera: Camera) -> float:
 
 def both(motion: str, number: int, frames: int, **arguments):
     """Return the scene of a cell, and an environment's instance of the same number."""
-    spec = {"method": "random@pca", "motion": motion, "instance": number, "frames": frames, "view_degrees": [45, 90]}
+    spec = {
+        "method": "random@pca",
+        "motion": motion,
+        "instance": number,
+        "frames": frames,
+        "view_degrees": [45, 90],
+    }
     (cell,) = Plan.of({"cells": [spec]})
     world = world_of(motion=motion, view_degrees=(45.0, 90.0), **arguments)
     return cell_scene(cell), instance(world, number, frames, 10)
@@ -39,7 +45,14 @@ def test_a_built_in_motion_and_its_views_are_the_same(number):
 
 def test_what_is_drawn_besides_changes_neither_the_motion_nor_the_cameras():
     _, plain = both("walk", 17, 3)
-    _, noisy = both("walk", 17, 3, noise={"holes": 0.5}, mismatch_percent=10.0, translation="searched")
+    _, noisy = both(
+        "walk",
+        17,
+        3,
+        noise={"holes": 0.5},
+        mismatch_percent=10.0,
+        translation="searched",
+    )
     assert noisy.truth.poses.tobytes() == plain.truth.poses.tobytes()
     for camera, expected in zip(noisy.task.cameras, plain.task.cameras, strict=True):
         assert camera.rotation.tobytes() == expected.rotation.tobytes()
@@ -49,7 +62,8 @@ def test_what_is_drawn_besides_changes_neither_the_motion_nor_the_cameras():
 
 def test_the_test_split_is_held_out_by_number():
     for split, (first, last) in SPLITS.items():
-        world, rng = world_of(split=split), np.random.default_rng(0)
+        world = world_of(split=split)
+        rng = np.random.default_rng(0)
         numbers = {world.next_instance(rng) for _ in range(20)}
         assert len(numbers) > 15
         assert all(first <= number < last for number in numbers)
@@ -60,34 +74,56 @@ def test_the_test_split_is_held_out_by_number():
 def test_each_corruption_changes_the_silhouette_more_the_stronger_it_is(name):
     def masks(noise):
         world = world_of(noise=noise, size=(160, 120))
-        return np.stack([first_episode(world, number, 10).problem.silhouettes[0].mask for number in range(12)])
+        return np.stack(
+            [
+                first_episode(world, number, 10).problem.silhouettes[0].mask
+                for number in range(12)
+            ]
+        )
 
     clean = masks(None)
-    changed = [(masks({name: strength}) != clean).mean() for strength in (0.1, 0.4, 1.0)]
+    changed = [
+        (masks({name: strength}) != clean).mean() for strength in (0.1, 0.4, 1.0)
+    ]
     assert 0.0 <= changed[0] < changed[1] < changed[2] < 0.5
     assert (masks({name: 0.0}) == clean).all()
 
 
 WORLDS: list[dict[str, Any]] = [
     {},
-    {"view_degrees": (0.0, 90.0), "translation": "searched", "mismatch_percent": 10.0, "size": (130, 70)},
-    {"prior": "full", "translation": "aligned", "mismatch_percent": 20.0, "noise": {"holes": 0.5}},
+    {
+        "view_degrees": (0.0, 90.0),
+        "translation": "searched",
+        "mismatch_percent": 10.0,
+        "size": (130, 70),
+    },
+    {
+        "prior": "full",
+        "translation": "aligned",
+        "mismatch_percent": 20.0,
+        "noise": {"holes": 0.5},
+    },
 ]
 
 
 def staged(numbers: tuple[int, ...], **arguments: Any) -> tuple[Stage, list[Episode]]:
     world = world_of(**arguments)
-    stage, episodes = Stage(world, len(numbers)), [first_episode(world, number, 10) for number in numbers]
+    stage = Stage(world, len(numbers))
+    episodes = [first_episode(world, number, 10) for number in numbers]
     for row, episode in enumerate(episodes):
         stage.set_values(row, values_of(episode.problem))
     return stage, episodes
 
 
 @each("arguments", WORLDS)
-def test_scenes_together_are_what_the_library_computes_of_each_alone(arguments: dict[str, Any]) -> None:
+def test_scenes_together_are_what_the_library_computes_of_each_alone(
+    arguments: dict[str, Any],
+) -> None:
     stage, episodes = staged((3, 17, 17, 9_000), **arguments)
     rng = np.random.default_rng(0)
-    proposals = rng.uniform(-1.0, 1.0, (len(episodes), 5, episodes[0].problem.space.dimensions))
+    proposals = rng.uniform(
+        -1.0, 1.0, (len(episodes), 5, episodes[0].problem.space.dimensions)
+    )
     costs = stage.costs(proposals, stage.all_rows)
     evaluation = stage.evaluate(proposals[:, 0], stage.all_rows)
     for row, episode in enumerate(episodes):
@@ -98,9 +134,14 @@ def test_scenes_together_are_what_the_library_computes_of_each_alone(arguments: 
         np.testing.assert_array_equal(evaluation.translations[row], places[0])
         assert evaluation.costs[row] == costs[row, 0]
         for view, camera in enumerate(problem.cameras):
-            body, mask = project(problem.body, camera, poses[0], places[0]), problem.silhouettes[view].mask
-            np.testing.assert_array_equal(evaluation.pictures[row, ..., 2 * view + 1], 255 * body)
-            np.testing.assert_array_equal(evaluation.pictures[row, ..., 2 * view], 255 * mask)
+            body = project(problem.body, camera, poses[0], places[0])
+            mask = problem.silhouettes[view].mask
+            np.testing.assert_array_equal(
+                evaluation.pictures[row, ..., 2 * view + 1], 255 * body
+            )
+            np.testing.assert_array_equal(
+                evaluation.pictures[row, ..., 2 * view], 255 * mask
+            )
             areas = [(mask & ~body).sum(), (body & ~mask).sum(), (body & mask).sum()]
             np.testing.assert_array_equal(evaluation.areas[row, view], areas)
 
@@ -111,19 +152,30 @@ def test_rows_that_are_left_out_show_nothing_proposed() -> None:
     for rows in (np.array([1]), np.array([], dtype=np.int64)):
         evaluation = stage.evaluate(np.zeros((2, 9)), rows)
         mask = episodes[0].problem.silhouettes[0].mask
-        np.testing.assert_array_equal(evaluation.pictures[0], np.stack([255 * mask, 0 * mask], axis=-1))
+        np.testing.assert_array_equal(
+            evaluation.pictures[0], np.stack([255 * mask, 0 * mask], axis=-1)
+        )
         assert not evaluation.areas[0].any()
         assert evaluation.areas[1].any() == bool(len(rows))
 
 
 def test_held_out_people_are_in_no_training_instance_and_not_in_the_prior():
     world = world_of(motion=["walk", "run"], held_out_people=True)
-    assert {world.motion_of(number) for number in range(20)} == {"walk-a", "walk-b", "run-a"}
-    assert {world.motion_of(number) for number in range(10_000, 10_020)} == {"walk-c", "run-b"}
+    assert {world.motion_of(number) for number in range(20)} == {
+        "walk-a",
+        "walk-b",
+        "run-a",
+    }
+    assert {world.motion_of(number) for number in range(10_000, 10_020)} == {
+        "walk-c",
+        "run-b",
+    }
     assert world.training == ("walk-a", "walk-b", "run-a")
     kinds = world_of(motion="all").motion
     assert {"walk", "walk-a"} & set(kinds) == {"walk"}
-    assert [world_of(motion="all").motion_of(number) for number in range(len(kinds))] == list(kinds)
+    assert [
+        world_of(motion="all").motion_of(number) for number in range(len(kinds))
+    ] == list(kinds)
 
 
 def test_the_truth_is_the_proposal_that_decodes_to_the_true_pose():
@@ -136,14 +188,22 @@ def test_the_truth_is_the_proposal_that_decodes_to_the_true_pose():
 
 
 def test_an_unknown_yaw_is_anywhere_about_the_camera_and_a_searched_place_is_not_the_boxs_middle():
-    plain, unknown = world_of(), world_of(yaw="unknown", translation="searched")
-    turns, places = [], []
+    plain = world_of()
+    unknown = world_of(yaw="unknown", translation="searched")
+    turns = []
+    places = []
     for number in range(40):
         episode = first_episode(unknown, number, 10)
-        from_camera = episode.problem.space.root_centre[0] - azimuth(episode.problem.cameras[0])
+        from_camera = episode.problem.space.root_centre[0] - azimuth(
+            episode.problem.cameras[0]
+        )
         assert np.cos(from_camera) == pytest.approx(1.0, abs=1e-9)
-        assert episode.instance.truth.poses.tobytes() == first_episode(plain, number, 10).instance.truth.poses.tobytes()
+        assert (
+            episode.instance.truth.poses.tobytes()
+            == first_episode(plain, number, 10).instance.truth.poses.tobytes()
+        )
         turns.append(episode.truth[0])
         places.append(episode.truth[3:6])
     assert min(turns) < -0.7 < 0.7 < max(turns)
-    assert 0.1 < np.abs(places).mean() < 0.4  # half a metre is 1, and guesses are up to a quarter of it off
+    # half a metre is 1, and guesses are up to a quarter of it off
+    assert 0.1 < np.abs(places).mean() < 0.4

@@ -22,20 +22,68 @@ FIT: list[dict[str, Any]] = [
     {"yaw": "unknown", "translation": "searched"},
     {"motion": "all", "held_out_people": True, "max_evaluations": 1},
     {"view_degrees": [0.0, 90.0], "translation": "aligned", "max_evaluations": 5},
-    {"mismatch_percent": 10.0, "view_degrees": [0.0, 90.0, 200.0], "prior": "full", "max_evaluations": 7},
-    {"translation": "aligned", "mismatch_percent": 10.0, "noise": {"jitter": 0.8}, "max_evaluations": 6},
-    {"motion": "run", "split": "test", "size": (36, 36), "errors": False, "max_evaluations": 5},
+    {
+        "mismatch_percent": 10.0,
+        "view_degrees": [0.0, 90.0, 200.0],
+        "prior": "full",
+        "max_evaluations": 7,
+    },
+    {
+        "translation": "aligned",
+        "mismatch_percent": 10.0,
+        "noise": {"jitter": 0.8},
+        "max_evaluations": 6,
+    },
+    {
+        "motion": "run",
+        "split": "test",
+        "size": (36, 36),
+        "errors": False,
+        "max_evaluations": 5,
+    },
 ]
 TRACK: list[dict[str, Any]] = [
     {"frames": 3, "evaluations_per_frame": 4},
-    {"frames": 2, "evaluations_per_frame": 5, "translation": "aligned", "view_degrees": [0.0, 70.0]},
-    {"frames": 3, "evaluations_per_frame": 3, "translation": "searched", "mismatch_percent": 10.0, "prior": "full"},
-    {"frames": 2, "evaluations_per_frame": 2, "noise": {"holes": 0.4, "blobs": 0.4}, "errors": False},
+    {
+        "frames": 2,
+        "evaluations_per_frame": 5,
+        "translation": "aligned",
+        "view_degrees": [0.0, 70.0],
+    },
+    {
+        "frames": 3,
+        "evaluations_per_frame": 3,
+        "translation": "searched",
+        "mismatch_percent": 10.0,
+        "prior": "full",
+    },
+    {
+        "frames": 2,
+        "evaluations_per_frame": 2,
+        "noise": {"holes": 0.4, "blobs": 0.4},
+        "errors": False,
+    },
 ]
 RACE: list[dict[str, Any]] = [
-    {"searches": 3, "generations": (4, 9), "translation": "aligned", "mismatch_percent": 8.0},
-    {"population_size": 3, "generations": (1, 6), "prior": "full", "translation": "searched", "errors": False},
-    {"searches": 2, "generations": (30, 30), "view_degrees": [0.0, 90.0], "optimiser": "cma"},
+    {
+        "searches": 3,
+        "generations": (4, 9),
+        "translation": "aligned",
+        "mismatch_percent": 8.0,
+    },
+    {
+        "population_size": 3,
+        "generations": (1, 6),
+        "prior": "full",
+        "translation": "searched",
+        "errors": False,
+    },
+    {
+        "searches": 2,
+        "generations": (30, 30),
+        "view_degrees": [0.0, 90.0],
+        "optimiser": "cma",
+    },
 ]
 CASES = {"posefit/FitImage-v0": FIT, "posefit/Track-v0": TRACK, "posefit/Race-v0": RACE}
 SHORT: dict[str, dict[str, Any]] = {
@@ -45,62 +93,94 @@ SHORT: dict[str, dict[str, Any]] = {
 }
 
 
-def resets_as_gymnasiums(name: str, mode: AutoresetMode, limit: int | None, arguments: dict[str, Any]) -> int:
+def resets_as_gymnasiums(
+    name: str, mode: AutoresetMode, limit: int | None, arguments: dict[str, Any]
+) -> int:
     """Check that a vector does to the last bit what Gymnasium's own does with single ones; return how often it ends.
 
     Neither changes what it has returned before.
     """
-    native = gym.make_vec(name, 3, max_episode_steps=limit, autoreset_mode=mode, **arguments)
-    sync = gym.make_vec(name, 3, "sync", {"autoreset_mode": mode}, max_episode_steps=limit, **arguments)
+    native = gym.make_vec(
+        name, 3, max_episode_steps=limit, autoreset_mode=mode, **arguments
+    )
+    sync = gym.make_vec(
+        name, 3, "sync", {"autoreset_mode": mode}, max_episode_steps=limit, **arguments
+    )
     assert type(native.unwrapped).__module__.startswith("posefit_envs")
     assert native.metadata["autoreset_mode"] is mode
     assert native.single_observation_space == sync.single_observation_space
     assert native.single_action_space == sync.single_action_space
-    ours, theirs, ends = native.reset(seed=[5, 40, 5]), sync.reset(seed=[5, 40, 5]), 0
+    ours = native.reset(seed=[5, 40, 5])
+    theirs = sync.reset(seed=[5, 40, 5])
+    ends = 0
     assert data_equivalence(ours, theirs)
     sync.action_space.seed(1)
     for _ in range(30):
         actions = sync.action_space.sample()
-        before, copied = ours, copy.deepcopy(ours)
-        ours, theirs = native.step(actions), sync.step(actions)
+        before = ours
+        copied = copy.deepcopy(ours)
+        ours = native.step(actions)
+        theirs = sync.step(actions)
         assert ours[0] in native.observation_space
         assert data_equivalence(before[:4], copied[:4])
         assert data_equivalence(ours, theirs)
         assert native.np_random_seed == sync.np_random_seed == (5, 40, 5)
         ends += int(np.count_nonzero(theirs[2] | theirs[3]))
-    for mask in ([False, True, False], [True, False, True]) if name == "posefit/Race-v0" else ():
+    for mask in (
+        ([False, True, False], [True, False, True]) if name == "posefit/Race-v0" else ()
+    ):
         # those that go on show the observation from before
-        assert data_equivalence(*(vector.reset(options={"reset_mask": np.array(mask)}) for vector in (native, sync)))
-    for seed in (None, [None, 8, None], 70):  # a later reset without a seed goes on with the generators
+        assert data_equivalence(
+            *(
+                vector.reset(options={"reset_mask": np.array(mask)})
+                for vector in (native, sync)
+            )
+        )
+    # a later reset without a seed goes on with the generators
+    for seed in (None, [None, 8, None], 70):
         assert data_equivalence(native.reset(seed=seed), sync.reset(seed=seed))  # type: ignore[arg-type]
         assert native.np_random_seed == sync.np_random_seed
-    states = [[rng.bit_generator.state for rng in vector.np_random] for vector in (native, sync)]
+    states = [
+        [rng.bit_generator.state for rng in vector.np_random]
+        for vector in (native, sync)
+    ]
     assert states[0] == states[1]
     return ends
 
 
-@each(("name", "arguments"), [(name, arguments) for name, many in CASES.items() for arguments in many])
-def test_a_vector_environment_equals_single_ones(name: str, arguments: dict[str, Any]) -> None:
+@each(
+    ("name", "arguments"),
+    [(name, arguments) for name, many in CASES.items() for arguments in many],
+)
+def test_a_vector_environment_equals_single_ones(
+    name: str, arguments: dict[str, Any]
+) -> None:
     resets_as_gymnasiums(name, AutoresetMode.NEXT_STEP, None, arguments)
 
 
 @each("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 @each(("name", "limit"), [(name, limit) for name in CASES for limit in (3, 7)])
-def test_ends_and_time_limits_reset_it_as_gymnasiums_own(name: str, limit: int, mode: AutoresetMode) -> None:
+def test_ends_and_time_limits_reset_it_as_gymnasiums_own(
+    name: str, limit: int, mode: AutoresetMode
+) -> None:
     assert resets_as_gymnasiums(name, mode, limit, CASES[name][-1] | SHORT[name]) > 3
 
 
 def test_neither_threads_nor_neighbours_change_a_row() -> None:
     # environments 0 to 2 of 50 are those of three: their seeds are the same, and so are their actions
     for name in CASES:
-        few, many, threaded = (gym.make_vec(name, n, threads=k) for n, k in ((3, 1), (50, 1), (50, 3)))
+        few, many, threaded = (
+            gym.make_vec(name, n, threads=k) for n, k in ((3, 1), (50, 1), (50, 3))
+        )
         first = few.reset(seed=11)[0]
         for vector in (many, threaded):
             np.testing.assert_array_equal(first, vector.reset(seed=11)[0][:3])
         for _ in range(2):
             actions = many.action_space.sample()
             rows = few.step(actions[:3])[:4]
-            for first, own, other in zip(rows, many.step(actions), threaded.step(actions), strict=False):
+            for first, own, other in zip(
+                rows, many.step(actions), threaded.step(actions), strict=False
+            ):
                 np.testing.assert_array_equal(first, own[:3])
                 np.testing.assert_array_equal(own, other)
     with pytest.raises(error.Error, match="threads must be at least 1, got 0"):
@@ -110,8 +190,15 @@ def test_neither_threads_nor_neighbours_change_a_row() -> None:
 @each("name", CASES)
 def test_a_reset_gives_each_environment_its_instance(name: str) -> None:
     vector = gym.make_vec(name, num_envs=3)
-    for chosen, expected in (([5, 6, 7], [5, 6, 7]), (np.array([7, 6, 5]), [7, 6, 5]), (9, [9, 9, 9])):
-        assert vector.reset(seed=0, options={"instance": chosen})[1]["instance"].tolist() == expected
+    for chosen, expected in (
+        ([5, 6, 7], [5, 6, 7]),
+        (np.array([7, 6, 5]), [7, 6, 5]),
+        (9, [9, 9, 9]),
+    ):
+        assert (
+            vector.reset(seed=0, options={"instance": chosen})[1]["instance"].tolist()
+            == expected
+        )
     mask = np.array([False, True, False])
     infos = vector.reset(options={"instance": [1, 2, 3], "reset_mask": mask})[1]
     assert infos["instance"][1] == 2
@@ -129,22 +216,35 @@ def test_mistakes_are_named(name: str) -> None:
         vector.reset(options={"reset_mask": np.array([True, False, False])})
     vector.reset(seed=0)
     for chosen, message in (
-        ([1, 2], r"instance must be one number or 3, one for each environment, got \[1, 2\]"),
-        (np.zeros((3, 1)), r"instance must be one number or 3, one for each environment, got array"),
+        (
+            [1, 2],
+            r"instance must be one number or 3, one for each environment, got \[1, 2\]",
+        ),
+        (
+            np.zeros((3, 1)),
+            r"instance must be one number or 3, one for each environment, got array",
+        ),
         ([1, 2, 30_000], "instance must lie in 0 to 19999, got 30000"),
     ):
         with pytest.raises(error.Error, match=message):
             vector.reset(options={"instance": chosen})
     with pytest.raises(error.Error, match="reset_mask must be 3 booleans"):
         vector.reset(options={"reset_mask": [1, 0]})
-    with pytest.raises(error.InvalidAction, match=r"actions must have shape \(3, 9\), got \(2, 9\)"):
+    with pytest.raises(
+        error.InvalidAction, match=r"actions must have shape \(3, 9\), got \(2, 9\)"
+    ):
         vector.step(np.zeros((2, 9)))
     with pytest.raises(error.InvalidAction, match="actions must be finite"):
         vector.step(np.full((3, 9), np.nan))
-    with pytest.raises(error.Error, match="option of reset must be .* got 'reset_masks'; did you mean 'reset_mask'"):
+    with pytest.raises(
+        error.Error,
+        match="option of reset must be .* got 'reset_masks'; did you mean 'reset_mask'",
+    ):
         vector.reset(options={"reset_masks": np.array([True, False, False])})
     for mode in (AutoresetMode.DISABLED, "same"):
-        with pytest.raises(error.Error, match="autoreset_mode must be one of NextStep, SameStep, got "):
+        with pytest.raises(
+            error.Error, match="autoreset_mode must be one of NextStep, SameStep, got "
+        ):
             gym.make_vec(name, num_envs=3, autoreset_mode=mode)
     with pytest.raises(error.Error, match="num_envs must be at least 1, got 0"):
         gym.make_vec(name, num_envs=0)
@@ -154,9 +254,14 @@ def test_mistakes_are_named(name: str) -> None:
 
 @each(
     ("name", "arguments"),
-    [("posefit/FitImage-v0", {"max_evaluations": 3}), ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3})],
+    [
+        ("posefit/FitImage-v0", {"max_evaluations": 3}),
+        ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
+    ],
 )
-def test_stable_baselines3_gets_the_last_observation_of_an_episode(name: str, arguments: dict[str, Any]) -> None:
+def test_stable_baselines3_gets_the_last_observation_of_an_episode(
+    name: str, arguments: dict[str, Any]
+) -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     adapted = to_sb3_vec_env(gym.make_vec(name, num_envs=2, instance=3, **arguments))
     single = gym.make(name, instance=3, **arguments)
@@ -185,18 +290,27 @@ def test_stable_baselines3_chooses_environments_by_indices() -> None:
     assert adapted.get_attr("world", indices=[0, 2]) == [vector.unwrapped.world] * 2  # type: ignore[attr-defined]
     adapted.set_attr("note", "common")
     assert adapted.get_attr("note") == ["common"] * 3
-    for call in (lambda: adapted.set_attr("note", "own", indices=1), lambda: adapted.env_method("close", indices=[1])):
-        with pytest.raises(error.Error, match=r"indices must be all of the 3 environments, got \[1\]"):
+    for call in (
+        lambda: adapted.set_attr("note", "own", indices=1),
+        lambda: adapted.env_method("close", indices=[1]),
+    ):
+        with pytest.raises(
+            error.Error, match=r"indices must be all of the 3 environments, got \[1\]"
+        ):
             call()
     adapted.close()
-    same = gym.make_vec("CartPole-v1", 2, "sync", {"autoreset_mode": AutoresetMode.SAME_STEP})
+    same = gym.make_vec(
+        "CartPole-v1", 2, "sync", {"autoreset_mode": AutoresetMode.SAME_STEP}
+    )
     with pytest.raises(error.Error, match="autoreset_mode must be NEXT_STEP, got"):
         to_sb3_vec_env(same)
 
 
 def test_the_package_is_light_to_import() -> None:
     script = "import sys, posefit_envs; print([m for m in ('numba', 'cv2', 'scipy', 'pygame') if m in sys.modules])"
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    ran = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
     assert ran.stdout.strip() == "[]"
     assert set(dir(posefit_envs)) >= {"__all__"}
 
@@ -207,9 +321,18 @@ def test_the_truth_comes_with_a_training_instance_alone() -> None:
     assert infos["_truth"].tolist() == [True, False, True]
     assert not infos["truth"][1].any()
     single = gym.make("posefit/FitImage-v0", max_evaluations=2)
-    np.testing.assert_array_equal(single.reset(options={"instance": 6})[1]["truth"], infos["truth"][2])
+    np.testing.assert_array_equal(
+        single.reset(options={"instance": 6})[1]["truth"], infos["truth"][2]
+    )
     assert "truth" not in single.reset(options={"instance": 10_005})[1]
     cost = single.unwrapped.step(np.zeros(9))[-1]["cost"]
     for arguments in ({"errors": False}, {"split": "test"}):
-        assert "truth" not in gym.make("posefit/FitImage-v0", **arguments).reset(seed=0)[1]
-    assert vector.step(np.where(infos["_truth"][:, None], infos["truth"], 0.0))[-1]["cost"][1] == cost
+        assert (
+            "truth" not in gym.make("posefit/FitImage-v0", **arguments).reset(seed=0)[1]
+        )
+    assert (
+        vector.step(np.where(infos["_truth"][:, None], infos["truth"], 0.0))[-1][
+            "cost"
+        ][1]
+        == cost
+    )

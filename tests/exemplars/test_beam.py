@@ -30,9 +30,16 @@ STEP = Step(SECONDS, 0.03, np.radians(8.0), 0.008)
 MOST = 4000
 
 
-def beam(states: list[int], yaws: list[float], totals: list[float] | None = None, places: Array | None = None) -> Beam:
+def beam(
+    states: list[int],
+    yaws: list[float],
+    totals: list[float] | None = None,
+    places: Array | None = None,
+) -> Beam:
     where = np.zeros((len(states), 3)) if places is None else places
-    return Beam(np.array(states), np.array(yaws), np.array(totals or [0.0] * len(states)), where)
+    return Beam(
+        np.array(states), np.array(yaws), np.array(totals or [0.0] * len(states)), where
+    )
 
 
 def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Array:
@@ -43,17 +50,29 @@ def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Ar
             code, _, way = exemplars.continuation(np.array([state]), SECONDS * speed)
             pace = 0.0
             if root is not None:
-                off = before.places[row] + about_vertical(way, before.yaws[row : row + 1])[0] - root
+                off = (
+                    before.places[row]
+                    + about_vertical(way, before.yaws[row : row + 1])[0]
+                    - root
+                )
                 pace = np.log1p(off @ off / 2.0 / STEP.known_root**2)
             for pose in range(len(exemplars)):
-                away = ((code[0] - exemplars.codes[pose]) ** 2).sum() / (2.0 * STEP.pose**2)
+                away = ((code[0] - exemplars.codes[pose]) ** 2).sum() / (
+                    2.0 * STEP.pose**2
+                )
                 costs[row, pose] = min(costs[row, pose], away + min(pace, JUMP_COST))
     return costs
 
 
 @each("root", [None, np.array([0.0, 0.0, 0.05])])
-def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | None) -> None:
-    places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 5.0]]) if root is None else None
+def test_next_states_are_those_of_the_slow_twin(
+    small: Exemplars, root: Array | None
+) -> None:
+    places = (
+        np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 5.0]])
+        if root is None
+        else None
+    )
     before = beam([3, 11, 25], [0.1, 0.1, 2.0], [0.0, 2.5, 1.0], places)
     beams = next_states(small, before, STEP, MOST, root)
     steps = costs_of_steps(small, before, root) + before.totals[:, None]
@@ -64,22 +83,36 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | 
             for turn in (-CANDIDATE_TURN, 0.0, CANDIDATE_TURN):
                 facing = np.array([before.yaws[row] + turned[row] + turn])
                 key = state, int(yaw_bins(facing)[0])
-                twin[key] = min(twin.get(key, np.inf), steps[row, state] + 0.5 * (turn / STEP.turn) ** 2)
+                twin[key] = min(
+                    twin.get(key, np.inf),
+                    steps[row, state] + 0.5 * (turn / STEP.turn) ** 2,
+                )
     keys = zip(beams.states.tolist(), yaw_bins(beams.yaws).tolist(), strict=True)
     totals = dict(zip(keys, beams.totals, strict=True))
     assert len(totals) == len(beams)
     for key, total in totals.items():
         assert total == pytest.approx(twin[key], rel=1e-4, abs=1e-3)
     assert min(totals.values()) == pytest.approx(min(twin.values()), abs=1e-3)
-    highest = before.totals.min() + JUMP_COST + MAX_EXCESS_COST + 0.5 * (CANDIDATE_TURN / STEP.turn) ** 2
+    highest = (
+        before.totals.min()
+        + JUMP_COST
+        + MAX_EXCESS_COST
+        + 0.5 * (CANDIDATE_TURN / STEP.turn) ** 2
+    )
     assert beams.totals.max() < highest
     for row in range(3):  # the next pose of each clip is among them
-        assert int(squared_distances(codes[row : row + 1], small.codes).argmin()) in beams.states
+        assert (
+            int(squared_distances(codes[row : row + 1], small.codes).argmin())
+            in beams.states
+        )
     expected = before.places + about_vertical(ways, before.yaws)
     turns = np.array([-CANDIDATE_TURN, 0.0, CANDIDATE_TURN])
-    yaws_off = np.abs(wrapped(beams.yaws[:, None, None] - (before.yaws + turned)[:, None] - turns))
+    yaws_off = np.abs(
+        wrapped(beams.yaws[:, None, None] - (before.yaws + turned)[:, None] - turns)
+    )
     places_off = np.linalg.norm(beams.places[:, None] - expected, axis=2)[:, :, None]
-    np.testing.assert_allclose((yaws_off + places_off).min(axis=(1, 2)), 0.0, atol=1e-9)  # both of the same parent
+    # both of the same parent
+    np.testing.assert_allclose((yaws_off + places_off).min(axis=(1, 2)), 0.0, atol=1e-9)
 
 
 def test_a_beam_is_limited_and_each_yaw_has_its_share(small: Exemplars) -> None:
@@ -94,10 +127,20 @@ def test_a_beam_is_limited_and_each_yaw_has_its_share(small: Exemplars) -> None:
 
 def test_only_the_best_few_of_similar_states_are_kept(small: Exemplars) -> None:
     rng = np.random.default_rng(1)
-    many = beam(rng.integers(0, len(small), 300).tolist(), rng.uniform(-4.0, 4.0, 300).tolist())
-    totals, most = rng.random(300), 2 * BEAM_SHARES
-    kinds = list(zip(small.coarse_groups[many.states].tolist(), yaw_bins(many.yaws).tolist(), strict=True))
-    twin, counts = [], dict.fromkeys(kinds, 0)
+    many = beam(
+        rng.integers(0, len(small), 300).tolist(), rng.uniform(-4.0, 4.0, 300).tolist()
+    )
+    totals = rng.random(300)
+    most = 2 * BEAM_SHARES
+    kinds = list(
+        zip(
+            small.coarse_groups[many.states].tolist(),
+            yaw_bins(many.yaws).tolist(),
+            strict=True,
+        )
+    )
+    twin = []
+    counts = dict.fromkeys(kinds, 0)
     for row in np.argsort(totals):
         counts[kinds[row]] += 1
         if counts[kinds[row]] <= 2:
@@ -106,17 +149,23 @@ def test_only_the_best_few_of_similar_states_are_kept(small: Exemplars) -> None:
 
 
 def test_a_root_strays_more_easily_along_the_line_of_sight() -> None:
-    camera, place = np.zeros(3), np.array([[0.0, 0.0, 5.0]])
-    along, across = np.array([[0.0, 0.0, 5.03]]), np.array([[0.01, 0.0, 5.0]])
+    camera = np.zeros(3)
+    place = np.array([[0.0, 0.0, 5.0]])
+    along = np.array([[0.0, 0.0, 5.03]])
+    across = np.array([[0.01, 0.0, 5.0]])
     # a standard deviation either way costs log(1 + 1 / 2); without a line of sight the first is 3 of them
     expected = np.stack([along, across, place])
     costs = root_deviation_costs(place, expected, camera)[:, 0]
     np.testing.assert_allclose(costs, [np.log(1.5), np.log(1.5), 0.0], rtol=1e-6)
-    assert root_deviation_costs(place, along, None)[0] == pytest.approx(np.log(1.0 + 4.5))
+    assert root_deviation_costs(place, along, None)[0] == pytest.approx(
+        np.log(1.0 + 4.5)
+    )
 
 
 def test_turns_beyond_the_fastest_cost_more_than_a_jump(small: Exemplars) -> None:
     after = beam([30] * 4, [0.0, 0.2, 0.3, np.pi + 0.1])
-    costs = transition_costs(small, beam([3], [0.0]), after, STEP._replace(max_turn=0.25))[0]
+    costs = transition_costs(
+        small, beam([3], [0.0]), after, STEP._replace(max_turn=0.25)
+    )[0]
     excess = np.array([0.0, 0.0, 0.05, np.pi - 0.35])
     np.testing.assert_allclose(costs, JUMP_COST + FAST_TURN_COST * excess, rtol=1e-9)

@@ -21,25 +21,45 @@ from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
 
 def recalibration(cost: float, usable: bool = True) -> Recalibration:
-    frame_costs: Any = SimpleNamespace(skeleton=average_skeleton(), camera_count=1, usable=usable)
-    samples = Posterior(0.1 * np.random.default_rng(0).standard_normal((24, 66)), np.zeros((24, 3)), np.ones(24))
+    frame_costs: Any = SimpleNamespace(
+        skeleton=average_skeleton(), camera_count=1, usable=usable
+    )
+    samples = Posterior(
+        0.1 * np.random.default_rng(0).standard_normal((24, 66)),
+        np.zeros((24, 3)),
+        np.ones(24),
+    )
     return recalibrated(samples, np.zeros(66), cost, frame_costs).recalibration
 
 
-def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> None:
-    good, bad = recalibration(2.0), recalibration(20.0)
+def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> (
+    None
+):
+    good = recalibration(2.0)
+    bad = recalibration(20.0)
     assert (bad.joint_spreads[1:] > good.joint_spreads[1:]).all()
-    greatest = math.exp(stored_calibration().range[1]) * stored_calibration().joint_spreads
+    greatest = (
+        math.exp(stored_calibration().range[1]) * stored_calibration().joint_spreads
+    )
     for cost in (0.0, 5.0):
-        np.testing.assert_allclose(recalibration(cost, usable=False).joint_spreads, greatest)
+        np.testing.assert_allclose(
+            recalibration(cost, usable=False).joint_spreads, greatest
+        )
 
 
 @each("views", [(45.0,), (45.0, 135.0)])
-def test_mirror_costs_are_those_of_the_mirrored_and_each_reflected_pose(views: tuple[float, ...]) -> None:
+def test_mirror_costs_are_those_of_the_mirrored_and_each_reflected_pose(
+    views: tuple[float, ...],
+) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1), views)
-    frame_costs, skeleton = FrameCosts(walk.task, walk.observations[0]), walk.motion.skeleton
-    pose, place = walk.motion.poses[0], walk.motion.translations[0]
-    reflected = [reflected_poses(skeleton, pose[None], facing(camera, place)) for camera in walk.task.cameras]
+    frame_costs = FrameCosts(walk.task, walk.observations[0])
+    skeleton = walk.motion.skeleton
+    pose = walk.motion.poses[0]
+    place = walk.motion.translations[0]
+    reflected = [
+        reflected_poses(skeleton, pose[None], facing(camera, place))
+        for camera in walk.task.cameras
+    ]
     images = [mirrored_poses(skeleton, pose[None]), *reflected]
     expected = [frame_costs.cost_and_areas(image[0], place)[0] for image in images]
     np.testing.assert_allclose(frame_costs.mirror_costs(pose, place), expected)
@@ -47,23 +67,36 @@ def test_mirror_costs_are_those_of_the_mirrored_and_each_reflected_pose(views: t
 
 def test_a_mirror_image_of_an_aligned_pose_is_aligned_too() -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1)).aligned()
-    frame_costs, pose = FrameCosts(walk.task, walk.observations[0]), walk.motion.poses[0]
-    place = walk.motion.translations[0] + [0.02, -0.01, 0.0]  # as if smoothing had moved it
-    poses = np.concatenate([pose[None], mirrored_poses(walk.motion.skeleton, pose[None])])
+    frame_costs = FrameCosts(walk.task, walk.observations[0])
+    pose = walk.motion.poses[0]
+    # as if smoothing had moved it
+    place = walk.motion.translations[0] + [0.02, -0.01, 0.0]
+    poses = np.concatenate(
+        [pose[None], mirrored_poses(walk.motion.skeleton, pose[None])]
+    )
     placed = frame_costs.aligned(poses, np.repeat(place[None], 2, axis=0))
     moved = placed[1] + place - placed[0]
-    assert frame_costs.mirror_costs(pose, place)[0] == pytest.approx(frame_costs.cost_and_areas(poses[1], moved)[0])
+    assert frame_costs.mirror_costs(pose, place)[0] == pytest.approx(
+        frame_costs.cost_and_areas(poses[1], moved)[0]
+    )
 
 
-def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evaluations(walker: Walk) -> None:
+def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evaluations(
+    walker: Walk,
+) -> None:
     observations = [*walker.observations[:2], Observation(EMPTY, None, usable=False)]
     walk = replace(walker, observations=observations)
-    sampled, others = walk.track(samples=4), walk.track(samples=5)
-    for frame, other, observation in zip(sampled[:2], others, observations, strict=False):
+    sampled = walk.track(samples=4)
+    others = walk.track(samples=5)
+    for frame, other, observation in zip(
+        sampled[:2], others, observations, strict=False
+    ):
         np.testing.assert_array_equal(frame.pose, other.pose)
         assert len(frame.posterior) == 4
         assert frame.posterior.coherent
-        expected = FrameCosts(walk.task, observation).mirror_costs(frame.pose, frame.translation)
+        expected = FrameCosts(walk.task, observation).mirror_costs(
+            frame.pose, frame.translation
+        )
         np.testing.assert_allclose(frame.details["mirror_costs"], expected, atol=1e-9)
     assert len(sampled[2].details["mirror_costs"]) == 0
     assert sampled[2].evaluations == 1
@@ -74,22 +107,32 @@ def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evalua
 def test_the_depth_is_unknown_where_one_camera_alone_shows_the_person() -> None:
     walk = walk_of(built_in.motion("walk", frames=3), (0.0, 90.0))
     (first, second), shown = walk.task.cameras, walk.observations[0].silhouettes
-    unknown = Silhouette.of(np.zeros((120, 160), dtype=bool), np.zeros((120, 160), dtype=bool))
+    unknown = Silhouette.of(
+        np.zeros((120, 160), dtype=bool), np.zeros((120, 160), dtype=bool)
+    )
     for cameras, silhouettes, position in (
         ((first, second), shown, None),
         ((first, second), [unknown, unknown], None),
         ((first, second), [unknown, shown[1]], second.position),
         ((first,), shown[:1], first.position),
     ):
-        task, observation = replace(walk.task, cameras=cameras), replace(walk.observations[0], silhouettes=silhouettes)
-        np.testing.assert_array_equal(FrameCosts(task, observation).camera_position, position)
+        task = replace(walk.task, cameras=cameras)
+        observation = replace(walk.observations[0], silhouettes=silhouettes)
+        np.testing.assert_array_equal(
+            FrameCosts(task, observation).camera_position, position
+        )
 
 
 def test_without_a_contour_a_pose_goes_to_its_mean(walker: Walk) -> None:
-    poses, places = walker.motion.poses[:5], walker.motion.translations[:5]
+    poses = walker.motion.poses[:5]
+    places = walker.motion.translations[:5]
     means = poses + 0.1 * walker.motion.skeleton.free
-    contours = FrameCosts(walker.task, replace(walker.observations[0], silhouettes=EMPTY)).contours(places[0])
+    contours = FrameCosts(
+        walker.task, replace(walker.observations[0], silhouettes=EMPTY)
+    ).contours(places[0])
     precision = precisions(np.radians(8.0), 0.003)
-    moved, shifted = fitted(walker.task.body, contours, (poses, places), means, precision, (0.09,))
+    moved, shifted = fitted(
+        walker.task.body, contours, (poses, places), means, precision, (0.09,)
+    )
     np.testing.assert_allclose(moved, means, atol=1e-9)
     np.testing.assert_allclose(shifted, places, atol=1e-12)

@@ -10,7 +10,13 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import MAX_PART_COST, PARTS, Hypotheses, jump_cost, step_costs
+from posefit_exemplars.hypotheses import (
+    MAX_PART_COST,
+    PARTS,
+    Hypotheses,
+    jump_cost,
+    step_costs,
+)
 from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.exemplars.conftest import Walk, walk_of
@@ -21,8 +27,11 @@ BUDGET = 9760
 def single(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
     """Return a hypothesis one joint of which is so far from the origin, and moves so far a frame, in codes' metres."""
     joints, rates = np.zeros((2, 1, len(JOINTS), 3))
-    joints[0, JOINTS.index(joint), 1], rates[0, JOINTS.index(joint), 1] = np.sqrt(len(JOINTS)) * np.array([code, rate])
-    still, nothing = np.zeros((1, 66)), np.zeros((1, 3))
+    joints[0, JOINTS.index(joint), 1], rates[0, JOINTS.index(joint), 1] = np.sqrt(
+        len(JOINTS)
+    ) * np.array([code, rate])
+    still = np.zeros((1, 66))
+    nothing = np.zeros((1, 3))
     return Hypotheses(still, nothing, joints, still, nothing, rates)
 
 
@@ -32,41 +41,63 @@ def test_every_joint_is_in_one_part() -> None:
 
 def test_what_steps_cost_by_hand() -> None:
     def cost(code: float, rate: float, later: float, later_rate: float) -> float:
-        return float(step_costs(0.03, MAX_PART_COST, single(code, rate), single(later, later_rate))[0, 0])
+        return float(
+            step_costs(
+                0.03, MAX_PART_COST, single(code, rate), single(later, later_rate)
+            )[0, 0]
+        )
 
-    np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-5)  # it goes on as it does
+    # it goes on as it does
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-5)
     np.testing.assert_allclose(cost(0.1, 0.0, 0.1, 0.0), 0.0, atol=1e-5)
-    np.testing.assert_allclose(cost(0.0, 0.06, 0.0, 0.06), 0.3, atol=1e-5)  # it stops for a frame, at speed 0
-    np.testing.assert_allclose(cost(0.0, 0.06, 0.03, 0.06), 0.1, atol=1e-5)  # half as fast
+    # it stops for a frame, at speed 0
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.0, 0.06), 0.3, atol=1e-5)
+    # half as fast
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.03, 0.06), 0.1, atol=1e-5)
     # off by a spread at speed 1, a half; at the speed 1.4 it is off by 0.09 - 0.084, which is 0.02, and 0.15
     np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.17, atol=1e-5)
     # at rest, then at a spread's rate: 0.015 off and the rates a spread apart, an eighth and a half; at speed 0.5,
     # 0.0075 off and half the rates, 1/32 and 1/8, and 0.1
-    np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5)
+    np.testing.assert_allclose(
+        cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5
+    )
     assert cost(0.0, 0.0, 1.0, 0.0) == MAX_PART_COST
     both = single(1.0, 0.0)  # two parts that are far off cost twice as much as one
     both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
-    assert float(step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), both)[0, 0]) == 2.0 * MAX_PART_COST
+    assert (
+        float(step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), both)[0, 0])
+        == 2.0 * MAX_PART_COST
+    )
 
 
 def test_jumps_cost_more_where_masks_are_less_precise() -> None:
-    assert [jump_cost(noise) for noise in (1.0, 1.5, 2.0, 9.0)] == [4.0, 9.0, 12.0, 12.0]
+    assert [jump_cost(noise) for noise in (1.0, 1.5, 2.0, 9.0)] == [
+        4.0,
+        9.0,
+        12.0,
+        12.0,
+    ]
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
     # nobody in the training clips walks with such arms
-    walk, other = built_in.motion("walk-a", frames=12), built_in.motion("jump", frames=40)
+    walk = built_in.motion("walk-a", frames=12)
+    other = built_in.motion("jump", frames=40)
     arms = np.concatenate([angles_of(LIMBS["left arm"]), angles_of(LIMBS["right arm"])])
     poses = walk.poses.copy()
     poses[:, arms] = other.poses[14:26, arms]
     scene = walk_of(replace(walk, name="both", poses=poses), (0.0, 70.0))
-    path, fitted = list[Array](), list[Array]()
+    path = list[Array]()
+    fitted = list[Array]()
     for seed in range(3):
         frames = scene.track(evaluations=2440, seed=seed)
         fitted.append(scene.errors_mm(frames))
         tracker = ExemplarTracker(replace(scene.task, evaluations=2440))
         estimates = tracker._path(scene.observations, np.random.default_rng(seed))
-        frames = [replace(frames[0], pose=estimate.pose, translation=estimate.place) for estimate in estimates]
+        frames = [
+            replace(frames[0], pose=estimate.pose, translation=estimate.place)
+            for estimate in estimates
+        ]
         path.append(scene.errors_mm(frames))
     assert np.mean(fitted) < 0.6 * np.mean(path)
 
@@ -74,60 +105,108 @@ def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
 def estimates(walk: Walk, poses: Array, others: Array) -> Iterator[Estimate]:
     """Yield frames with these poses on the path, and beside each one other hypothesis."""
     places = walk.motion.translations
-    for observation, pose, other, place in zip(walk.observations, poses, others, places, strict=False):
-        yield Estimate(pose, place, FrameCosts(walk.task, observation), 0.0, (other[None], place[None]))
+    for observation, pose, other, place in zip(
+        walk.observations, poses, others, places, strict=False
+    ):
+        yield Estimate(
+            pose,
+            place,
+            FrameCosts(walk.task, observation),
+            0.0,
+            (other[None], place[None]),
+        )
 
 
-def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turned_round(walker: Walk) -> None:
+def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turned_round(
+    walker: Walk,
+) -> None:
     truth = walker.motion.poses[:10]
-    noise = np.random.default_rng(0).normal(0.0, 0.05, truth.shape) * walker.motion.skeleton.free
+    noise = (
+        np.random.default_rng(0).normal(0.0, 0.05, truth.shape)
+        * walker.motion.skeleton.free
+    )
     follower = ExemplarTracker(replace(walker.task, evaluations=BUDGET)).hypotheses
-    frames = list(follower.follow(estimates(walker, turned_poses(truth), truth + noise), np.random.default_rng(0)))
+    frames = list(
+        follower.follow(
+            estimates(walker, turned_poses(truth), truth + noise),
+            np.random.default_rng(0),
+        )
+    )
     skeleton = walker.motion.skeleton
-    apart = skeleton.joints(np.array([frame.pose for frame in frames])) - skeleton.joints(truth)
+    apart = skeleton.joints(
+        np.array([frame.pose for frame in frames])
+    ) - skeleton.joints(truth)
     assert np.median(np.linalg.norm(apart, axis=2).mean(axis=1)) < 0.04
-    assert all(frame.paths is not None and len(frame.paths.poses) == 24 for frame in frames)
+    assert all(
+        frame.paths is not None and len(frame.paths.poses) == 24 for frame in frames
+    )
 
 
-def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs() -> None:
+def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs() -> (
+    None
+):
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
-    truth, arm = walk.motion.poses[:1], angles_of(LIMBS["left arm"])
+    truth = walk.motion.poses[:1]
+    arm = angles_of(LIMBS["left arm"])
     wrong = truth.copy()
     wrong[:, arm] += np.radians(60.0) * walk.motion.skeleton.free[arm]
     follower = ExemplarTracker(walk.task).hypotheses
 
     def tried(frame_costs: FrameCosts) -> Array:
-        estimate = Estimate(truth[0], walk.motion.translations[0], frame_costs, 0.0, (truth[:0], np.empty((0, 3))))
+        estimate = Estimate(
+            truth[0],
+            walk.motion.translations[0],
+            frame_costs,
+            0.0,
+            (truth[:0], np.empty((0, 3))),
+        )
         nothing = np.empty(0, dtype=np.int64)
-        return follower._fresh(estimate, Hypotheses.none(), nothing, np.random.default_rng(0))[0]
+        return follower._fresh(
+            estimate, Hypotheses.none(), nothing, np.random.default_rng(0)
+        )[0]
 
     observation = walk.observations[0]
     alone = tried(FrameCosts(walk.task, observation))
-    earlier = FrameCosts(walk.task, replace(observation, estimate=(wrong[0], walk.motion.translations[0])))
+    earlier = FrameCosts(
+        walk.task,
+        replace(observation, estimate=(wrong[0], walk.motion.translations[0])),
+    )
     *others, same, legs, arms, mended = tried(earlier)
     np.testing.assert_array_equal(others, alone)
     np.testing.assert_array_equal(same, wrong[0])
     for limbs, pose in (("legs", legs), ("arms", arms)):
-        np.testing.assert_array_equal(pose, exchanged_limbs(walk.motion.skeleton, wrong, limbs)[0])
+        np.testing.assert_array_equal(
+            pose, exchanged_limbs(walk.motion.skeleton, wrong, limbs)[0]
+        )
     costs = earlier.full(np.array([same, mended]), walk.motion.translations[[0, 0]])
     assert costs[1] < 0.9 * costs[0]
-    kept = np.setdiff1d(np.arange(66), np.concatenate([angles_of(bones) for bones in LIMBS.values()]))
+    kept = np.setdiff1d(
+        np.arange(66), np.concatenate([angles_of(bones) for bones in LIMBS.values()])
+    )
     np.testing.assert_array_equal(mended[kept], wrong[0, kept])
 
 
 def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views() -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
-    follower, observation, place = ExemplarTracker(walk.task).hypotheses, walk.observations[0], walk.motion.translations
+    follower = ExemplarTracker(walk.task).hypotheses
+    observation = walk.observations[0]
+    place = walk.motion.translations
     poses = walk.motion.poses[[0, 0]]
     poses[1, angles_of(LIMBS["left arm"])] += 0.5
-    hypotheses = Hypotheses.of(walk.task, poses, place[[0, 0]], np.array([-1, -1]), Hypotheses.none())
+    hypotheses = Hypotheses.of(
+        walk.task, poses, place[[0, 0]], np.array([-1, -1]), Hypotheses.none()
+    )
 
     def apart(observation: Observation) -> float:
-        totals = follower._joined(FrameCosts(walk.task, observation), hypotheses, None, 1.0)[0].totals
+        totals = follower._joined(
+            FrameCosts(walk.task, observation), hypotheses, None, 1.0
+        )[0].totals
         return float(totals[1] - totals[0])
 
     off = follower._exemplars.nearest(poses, 1)[1][:, 0] / 0.05**2
     clips = 4.0 * np.log1p(0.5 * off)
     earlier = replace(observation, estimate=(poses[0], place[0]))
-    np.testing.assert_allclose(apart(observation) - apart(earlier), 0.5 * (clips[1] - clips[0]), rtol=1e-6)
+    np.testing.assert_allclose(
+        apart(observation) - apart(earlier), 0.5 * (clips[1] - clips[0]), rtol=1e-6
+    )
     assert clips[1] > clips[0] + 1.0

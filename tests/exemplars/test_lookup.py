@@ -25,11 +25,15 @@ PLACE = np.array([0.0, 0.1, 0.0])
 def camera_at(azimuth: float, elevation: float = 0.0, roll: float = 0.0) -> Camera:
     straight = looking_at(azimuth, elevation)
     rolled = about(2, roll) @ straight.rotation
-    return Camera(160, 160, np.full(2, 200.0), np.full(2, 80.0), rolled, straight.translation)
+    return Camera(
+        160, 160, np.full(2, 200.0), np.full(2, 80.0), rolled, straight.translation
+    )
 
 
 def observed_by(cameras: list[Camera], pose: Array) -> Observation:
-    return Observation([Silhouette.of(project(BODY, camera, pose, PLACE)) for camera in cameras])
+    return Observation(
+        [Silhouette.of(project(BODY, camera, pose, PLACE)) for camera in cameras]
+    )
 
 
 def task_of(cameras: list[Camera], yaw: float | None = None) -> Task:
@@ -53,28 +57,50 @@ def yaws_off(task: Task, observation: Observation, pose: Array) -> Array:
 
 @each("seed", range(12))
 def test_a_mode_faces_as_the_walker_does(seed: int) -> None:
-    pose, cameras = turned(seed), [camera_at(0.4)]
-    assert yaws_off(task_of(cameras), observed_by(cameras, pose), pose)[:3].min() < np.radians(30.0)
+    pose = turned(seed)
+    cameras = [camera_at(0.4)]
+    assert yaws_off(task_of(cameras), observed_by(cameras, pose), pose)[
+        :3
+    ].min() < np.radians(30.0)
 
 
 @each("seed", range(6))
-@each(("elevation", "roll"), [(0.0, 0.0), (np.radians(25.0), 0.0), (0.0, np.radians(90.0))])
-def test_two_cameras_of_any_attitude_decide(seed: int, elevation: float, roll: float) -> None:
-    pose, cameras = turned(seed), [camera_at(0.4, elevation, roll), camera_at(0.4 + np.pi / 2.0, elevation, roll)]
-    assert yaws_off(task_of(cameras), observed_by(cameras, pose), pose)[0] < np.radians(30.0)
+@each(
+    ("elevation", "roll"),
+    [(0.0, 0.0), (np.radians(25.0), 0.0), (0.0, np.radians(90.0))],
+)
+def test_two_cameras_of_any_attitude_decide(
+    seed: int, elevation: float, roll: float
+) -> None:
+    pose = turned(seed)
+    cameras = [
+        camera_at(0.4, elevation, roll),
+        camera_at(0.4 + np.pi / 2.0, elevation, roll),
+    ]
+    assert yaws_off(task_of(cameras), observed_by(cameras, pose), pose)[0] < np.radians(
+        30.0
+    )
 
 
 def test_a_known_yaw_leaves_out_the_others() -> None:
     cameras = [camera_at(0.0)]
     for yaw in (-2.0, 0.3, 1.5):
-        posterior = Lookup(task_of(cameras, yaw)).posterior(observed_by(cameras, turned(0)))
-        assert posterior is None or np.abs(wrapped(posterior.poses[:, 0] - yaw)).max() < np.radians(50.0) + YAW_STEP
+        posterior = Lookup(task_of(cameras, yaw)).posterior(
+            observed_by(cameras, turned(0))
+        )
+        assert (
+            posterior is None
+            or np.abs(wrapped(posterior.poses[:, 0] - yaw)).max()
+            < np.radians(50.0) + YAW_STEP
+        )
 
 
 def test_a_silhouette_like_none_of_the_clips_is_refused() -> None:
     cameras, rows, columns = [camera_at(0.0)], *np.mgrid[:160, :160]
     dog = (np.abs(rows - 80) < 12) & (np.abs(columns - 80) < 50)
-    dog |= (np.abs(rows - 100) < 20) & ((np.abs(columns - 40) < 5) | (np.abs(columns - 115) < 5))
+    dog |= (np.abs(rows - 100) < 20) & (
+        (np.abs(columns - 40) < 5) | (np.abs(columns - 115) < 5)
+    )
     lying = turned(0).copy()
     lying[1] = np.pi / 2.0
     for observation in (Observation([Silhouette.of(dog)]), observed_by(cameras, lying)):
@@ -90,20 +116,38 @@ def test_a_silhouette_that_is_cut_is_refused() -> None:
 
 @each("optimiser", ["sapso", "cma"])
 def test_a_search_that_looks_faces_the_right_way(optimiser: str) -> None:
-    pose, cameras = turned(3), [camera_at(0.4), camera_at(2.0)]
+    pose = turned(3)
+    cameras = [camera_at(0.4), camera_at(2.0)]
     masks = [mask.mask[None] for mask in observed_by(cameras, pose).silhouettes]
-    options = {"train": TRAINING, "evaluations": 840, "height": BODY.stature, "camera": cameras}
+    options = {
+        "train": TRAINING,
+        "evaluations": 840,
+        "height": BODY.stature,
+        "camera": cameras,
+    }
     fitted = posefit.fit(masks, method=f"{optimiser}@pca", **options)
     assert abs(wrapped(fitted.pose[:1] - pose[:1])[0]) < np.radians(30.0)
 
 
-def test_one_image_leaves_open_where_the_searches_of_its_modes_end_and_a_film_does_not() -> None:
+def test_one_image_leaves_open_where_the_searches_of_its_modes_end_and_a_film_does_not() -> (
+    None
+):
     camera = camera_at(0.0)
-    masks = np.array([observed_by([camera], turned(k)).silhouettes[0].mask for k in (3, 4)])
-    options = {"train": TRAINING, "evaluations": 400, "height": BODY.stature, "camera": camera, "method": "sapso@pca"}
+    masks = np.array(
+        [observed_by([camera], turned(k)).silhouettes[0].mask for k in (3, 4)]
+    )
+    options = {
+        "train": TRAINING,
+        "evaluations": 400,
+        "height": BODY.stature,
+        "camera": camera,
+        "method": "sapso@pca",
+    }
     fitted = posefit.fit(masks[0], **options)
     modes = fitted.frame.modes
     assert sum(mode.weight for mode in modes) == pytest.approx(1.0)
     assert modes[0].weight == max(mode.weight for mode in modes)
     assert fitted.summary["modes"] == [round(mode.weight, 6) for mode in modes]
-    assert not any(frame.modes for frame in posefit.track(masks, body_frames=0, **options).frames)
+    assert not any(
+        frame.modes for frame in posefit.track(masks, body_frames=0, **options).frames
+    )

@@ -7,14 +7,20 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit_exemplars.markov import SampledPaths, frame_states, mean_near, state_weights
+from posefit_exemplars.markov import (
+    SampledPaths,
+    frame_states,
+    mean_near,
+    state_weights,
+)
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
 from posefit_exemplars.tracker import state_distances
 from tests.cases import each
 
 
 def test_weights_are_finite_where_a_jump_costs_a_thousand() -> None:
-    frames, jumps = [frame_states(np.array([0.0, 2000.0]))], np.full((2, 2), 1000.0)
+    frames = [frame_states(np.array([0.0, 2000.0]))]
+    jumps = np.full((2, 2), 1000.0)
     for costs in ([2000.0, 0.0], [0.0, 2000.0]):
         frames.append(frame_states(np.array(costs), frames[-1], jumps))
     for count in (1, 2, 3):
@@ -23,14 +29,22 @@ def test_weights_are_finite_where_a_jump_costs_a_thousand() -> None:
         assert weights.sum() == pytest.approx(1.0)
 
 
-def test_sampled_paths_similar_to_the_likeliest_are_moved_to_the_reported_pose() -> None:
-    poses, places = np.zeros((3, 66)), np.arange(9.0).reshape(3, 3)
+def test_sampled_paths_similar_to_the_likeliest_are_moved_to_the_reported_pose() -> (
+    None
+):
+    poses = np.zeros((3, 66))
+    places = np.arange(9.0).reshape(3, 3)
     poses[:, 0] = [0.1, 0.3, 3.0]
-    pose, place = np.full(66, 0.5), np.array([1.0, 1.0, 1.0])
-    posterior = SampledPaths(poses, places, np.array([True, True, False])).about(pose, place)
+    pose = np.full(66, 0.5)
+    place = np.array([1.0, 1.0, 1.0])
+    posterior = SampledPaths(poses, places, np.array([True, True, False])).about(
+        pose, place
+    )
     np.testing.assert_allclose(posterior.poses[:2].mean(axis=0), pose)
     assert posterior.poses[1, 0] - posterior.poses[0, 0] == pytest.approx(0.2)
-    np.testing.assert_allclose(posterior.translations[:2], [[-0.5, -0.5, -0.5], [2.5, 2.5, 2.5]])
+    np.testing.assert_allclose(
+        posterior.translations[:2], [[-0.5, -0.5, -0.5], [2.5, 2.5, 2.5]]
+    )
     np.testing.assert_array_equal(posterior.poses[2], poses[2])
     np.testing.assert_array_equal(posterior.translations[2], places[2])
     assert posterior.coherent
@@ -58,19 +72,27 @@ def test_a_steady_movement_stays_in_its_order(ahead: int) -> None:
 
 
 def test_means_of_yaws_go_the_short_way_round() -> None:
-    poses, places, codes = np.zeros((2, 66)), np.zeros((2, 3)), np.zeros((2, 1), dtype=np.float32)
+    poses = np.zeros((2, 66))
+    places = np.zeros((2, 3))
+    codes = np.zeros((2, 1), dtype=np.float32)
     poses[:, 0] = np.radians([179.0, -179.0])
     squares = state_distances(codes, codes[0], poses[:, 0] - poses[0, 0])
     pose, _ = mean_near(0, np.array([0.5, 0.5]), squares, poses, places)
     other = np.exp(-0.5 * 0.1**2)  # two degrees away, a tenth of a standard deviation
     assert np.degrees(pose[0]) == pytest.approx(179.0 + 2.0 * other / (1.0 + other))
     poses = np.insert(poses, 1, np.pi * np.eye(66)[0], axis=0)
-    assert np.cos(smoothed_pose(poses, np.zeros((3, 3)), 1, 1.5)[0][0]) == pytest.approx(-1.0)
+    assert np.cos(
+        smoothed_pose(poses, np.zeros((3, 3)), 1, 1.5)[0][0]
+    ) == pytest.approx(-1.0)
 
 
-def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_always() -> None:
+def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_always() -> (
+    None
+):
     rng = np.random.default_rng(0)
-    rough = [estimate(rng.normal(size=66), rng.normal(size=3), np.zeros(3)) for _ in range(6)]
+    rough = [
+        estimate(rng.normal(size=66), rng.normal(size=3), np.zeros(3)) for _ in range(6)
+    ]
     for spread, ahead in ((2.0, 0), (0.0, 3), (2.0, 2)):
         for before, frame in zip(rough, smoothed(rough, spread, ahead), strict=True):
             np.testing.assert_array_equal(frame.place, before.place)

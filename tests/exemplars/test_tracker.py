@@ -14,7 +14,12 @@ from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
 from posefit.plugin import Array, check_tracker
 from posefit_exemplars import tracker
-from posefit_exemplars.tracker import MIN_EVALUATIONS, WRONG_YAW_COST, ExemplarTracker, yaw_costs
+from posefit_exemplars.tracker import (
+    MIN_EVALUATIONS,
+    WRONG_YAW_COST,
+    ExemplarTracker,
+    yaw_costs,
+)
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
@@ -27,14 +32,20 @@ def test_the_kit_passes() -> None:
 
 
 def test_an_unknown_walker_is_followed(seed: int) -> None:
-    track = posefit.track("02_01", train=OTHERS, method="exemplars", frames=(0, 30), seed=seed)
-    assert track.measures.mpjpe_mm < 60.0  # a swarm in nine components of the same library is 200 mm off
+    track = posefit.track(
+        "02_01", train=OTHERS, method="exemplars", frames=(0, 30), seed=seed
+    )
+    # a swarm in nine components of the same library is 200 mm off
+    assert track.measures.mpjpe_mm < 60.0
     assert (track.measures.lost_rate, track.measures.swap_rate) == (0.0, 0.0)
 
 
 def test_a_recorded_clip_is_recognised() -> None:
-    copy = replace(recorded.clip("16_15").motion(), name="copy")  # a clip of the same name would be left out
-    track = posefit.track(copy, train=["library:16"], method="exemplars", frames=(0, 20))
+    # a clip of the same name would be left out
+    copy = replace(recorded.clip("16_15").motion(), name="copy")
+    track = posefit.track(
+        copy, train=["library:16"], method="exemplars", frames=(0, 20)
+    )
     assert track.measures.mpjpe_mm < 15.0
 
 
@@ -60,13 +71,19 @@ def test_a_track_begins_at_the_first_pose(seed: int) -> None:
     # from the side one frame does not distinguish left from right, and no later frame is used
     motion = built_in.motion("walk-a", frames=4)
     walk = walk_of(motion, (90.0,))
-    errors = walk.errors_mm(walk.track(first_pose=motion.poses[0, 3:], seed=seed, lag=0))
+    errors = walk.errors_mm(
+        walk.track(first_pose=motion.poses[0, 3:], seed=seed, lag=0)
+    )
     assert errors.max() < 80.0  # without it some frame may be 200 mm off
 
 
 def test_an_interrupted_track_is_continued(walker: Walk, seed: int) -> None:
     frames = walker.track(0, 12, seed=seed)
-    known = {"yaw": float(frames[-1].pose[0]), "first_pose": frames[-1].pose[3:], "before": tuple(frames)}
+    known = {
+        "yaw": float(frames[-1].pose[0]),
+        "first_pose": frames[-1].pose[3:],
+        "before": tuple(frames),
+    }
     rest = walker.track(12, seed=seed + 1, **known)
     assert len(rest) == 12
     assert walker.errors_mm(rest, 12).max() < 100.0
@@ -82,26 +99,48 @@ def test_a_pose_is_reported_lag_frames_later(walker: Walk, lag: int) -> None:
             taken += 1
             yield observation
 
-    tracker = ExemplarTracker(replace(walker.task, evaluations=MIN_EVALUATIONS), lag=lag)
-    late = [taken - reported for reported, _ in enumerate(tracker.track(stream(), np.random.default_rng(0)), 1)]
+    tracker = ExemplarTracker(
+        replace(walker.task, evaluations=MIN_EVALUATIONS), lag=lag
+    )
+    late = [
+        taken - reported
+        for reported, _ in enumerate(
+            tracker.track(stream(), np.random.default_rng(0)), 1
+        )
+    ]
     count = len(walker.observations)
     assert late == [min(lag, count - reported) for reported in range(1, count + 1)]
 
 
 @each(("aligned", "most"), [(False, 90.0), (True, 130.0)])
-def test_frames_without_the_person_are_bridged(walker: Walk, aligned: bool, most: float) -> None:
+def test_frames_without_the_person_are_bridged(
+    walker: Walk, aligned: bool, most: float
+) -> None:
     walk = walker.aligned() if aligned else walker
-    unusable = [replace(shown, usable=not 8 <= k < 14) for k, shown in enumerate(walk.observations)]
+    unusable = [
+        replace(shown, usable=not 8 <= k < 14)
+        for k, shown in enumerate(walk.observations)
+    ]
     frames = replace(walk, observations=unusable).track(evaluations=2440)
-    assert [k for k, frame in enumerate(frames) if frame.evaluations == 1] == list(range(8, 14))
+    assert [k for k, frame in enumerate(frames) if frame.evaluations == 1] == list(
+        range(8, 14)
+    )
     assert walk.errors_mm(frames)[8:].max() < most
     empty = walk.hidden(8, 14).track(evaluations=2440)
-    np.testing.assert_array_equal([frame.pose for frame in empty], [frame.pose for frame in frames])
+    np.testing.assert_array_equal(
+        [frame.pose for frame in empty], [frame.pose for frame in frames]
+    )
 
 
 @each(("aligned", "usable"), itertools.product([False, True], [False, True]))
-def test_a_person_who_appears_later_is_followed_from_then_on(walker: Walk, aligned: bool, usable: bool) -> None:
-    frames = (walker.aligned() if aligned else walker).hidden(0, 3, usable=usable).track(lag=3)
+def test_a_person_who_appears_later_is_followed_from_then_on(
+    walker: Walk, aligned: bool, usable: bool
+) -> None:
+    frames = (
+        (walker.aligned() if aligned else walker)
+        .hidden(0, 3, usable=usable)
+        .track(lag=3)
+    )
     assert all(np.isfinite(frame.pose).all() for frame in frames)
     assert walker.errors_mm(frames)[10:].max() < 150.0
 
@@ -112,17 +151,27 @@ def test_a_root_may_jump_a_thousand_kilometres(walker: Walk) -> None:
     np.testing.assert_array_equal(frames[1].translation, gone.translation)
 
 
-@each("scene", [((160, 120), (45.0,)), ((60, 45), (45.0,)), ((160, 120), (0.0, 45.0, 90.0, 135.0))])
+@each(
+    "scene",
+    [
+        ((160, 120), (45.0,)),
+        ((60, 45), (45.0,)),
+        ((160, 120), (0.0, 45.0, 90.0, 135.0)),
+    ],
+)
 @each("first", [False, True])
 @each("budget", [MIN_EVALUATIONS, 1000, 2440, 9760])
 def test_the_budget_holds_with_pictures_of_any_size_and_any_number_of_cameras(
     scene: tuple[tuple[int, int], tuple[float, ...]], first: bool, budget: int
 ) -> None:
     size, views = scene
-    motion = built_in.motion("walk-a", frames=10 if len(views) == 1 else 4)  # the first frames search less
-    walk, known = walk_of(motion, views, size), {"first_pose": motion.poses[0, 3:]} if first else {}
+    # the first frames search less
+    motion = built_in.motion("walk-a", frames=10 if len(views) == 1 else 4)
+    walk = walk_of(motion, views, size)
+    known = {"first_pose": motion.poses[0, 3:]} if first else {}
     frames = walk.track(evaluations=budget, **known)
-    used = [frame.evaluations for frame in frames]  # small pictures count by their pixels
+    # small pictures count by their pixels
+    used = [frame.evaluations for frame in frames]
     assert (0.5 if len(views) == 1 else 0.0) * budget < max(used) <= budget
     assert walk.errors_mm(frames).max() < 300.0
 
@@ -131,14 +180,20 @@ QUICK: dict[str, Any] = {"evaluations": 2440, "smoothing": 0.0}
 
 
 def sampled_poses(frames: list[Frame]) -> Array:
-    return np.array([frame.posterior.poses for frame in frames if frame.posterior is not None])
+    return np.array(
+        [frame.posterior.poses for frame in frames if frame.posterior is not None]
+    )
 
 
-def test_a_greater_posterior_temperature_spreads_the_samples(walker: Walk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_greater_posterior_temperature_spreads_the_samples(
+    walker: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
     spreads = []
     for temperature in (0.1, 0.5, 4.0):
         monkeypatch.setattr(tracker, "POSTERIOR_TEMPERATURE", temperature)
-        spreads.append(sampled_poses(walker.track(0, 8, samples=40, **QUICK)).std(axis=1).mean())
+        spreads.append(
+            sampled_poses(walker.track(0, 8, samples=40, **QUICK)).std(axis=1).mean()
+        )
     assert spreads == sorted(set(spreads))
 
 

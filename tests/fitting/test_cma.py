@@ -16,10 +16,14 @@ from tests.cases import each
 def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) -> None:
     d, population = sizes
     rng = np.random.default_rng(d)
-    mean, spread, valley = rng.normal(0.0, 0.1, d), rng.uniform(0.05, 0.5, d), rng.normal(size=(d, d))
+    mean = rng.normal(0.0, 0.1, d)
+    spread = rng.uniform(0.05, 0.5, d)
+    valley = rng.normal(size=(d, d))
     size = float(np.sqrt((spread**2).mean()))
     ours = Strategy(mean, spread, population)
-    theirs = CMA(mean.copy(), size, population_size=population, cov=np.diag((spread / size) ** 2))
+    theirs = CMA(
+        mean.copy(), size, population_size=population, cov=np.diag((spread / size) ** 2)
+    )
     for _ in range(250):
         proposals = ours.sample(rng, population)
         costs = ((proposals @ valley) ** 2).sum(axis=1)
@@ -29,7 +33,9 @@ def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) 
         mine = ours.mean, ours.covariance, ours.step_path, ours.path, ours.sigma
         other = theirs._mean, theirs._C, theirs._p_sigma, theirs._pc, theirs._sigma
         for one, same in zip(mine, other, strict=True):
-            np.testing.assert_allclose(one, same, rtol=1e-9, atol=1e-9 * np.abs(same).max())
+            np.testing.assert_allclose(
+                one, same, rtol=1e-9, atol=1e-9 * np.abs(same).max()
+            )
         assert ours.ended() == theirs.should_stop()
         if ours.ended():
             return
@@ -38,7 +44,9 @@ def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) 
 
 def test_what_leaves_the_box_is_drawn_again_before_it_is_moved_to_its_side() -> None:
     # a tenth of a standard deviation from the side 46.02 % of all draws are beyond it: 54 % of enough are not
-    space = Toy(2, start=Start(np.array([0.99, 0.0]), np.array([0.1, 0.01]), np.zeros(2)))
+    space = Toy(
+        2, start=Start(np.array([0.99, 0.0]), np.array([0.1, 0.01]), np.zeros(2))
+    )
     optimiser = CMAES(space, np.random.default_rng(0), population_size=4000)
     for _ in range(2):
         asked = optimiser.ask()
@@ -72,16 +80,22 @@ def test_settings_out_of_range_are_refused_by_name() -> None:
 def test_a_spread_of_nothing_is_refused() -> None:
     for spread in (np.zeros(4), np.full(4, np.nan), np.array([0.1, -0.1, 0.1, 0.1])):
         space = Toy(4, start=Start(np.zeros(4), spread, np.zeros(4)))
-        with pytest.raises(InputError, match="spread must be above 0 in some coordinate and negative in none, got"):
+        with pytest.raises(
+            InputError,
+            match="spread must be above 0 in some coordinate and negative in none, got",
+        ):
             CMAES(space, np.random.default_rng(0))
-    narrow = Toy(4, start=Start(np.zeros(4), np.array([0.1, 0.0, 0.1, 0.1]), np.zeros(4)))
+    narrow = Toy(
+        4, start=Start(np.zeros(4), np.array([0.1, 0.0, 0.1, 0.1]), np.zeros(4))
+    )
     assert np.abs(CMAES(narrow, np.random.default_rng(0)).ask()[:, 1]).max() < 1e-5
 
 
 def test_what_is_moved_is_moved_towards_the_best_of_the_last_generation() -> None:
     optimiser = CMAES(Toy(3, shell), np.random.default_rng(0), population_size=10)
     for seed in range(3):
-        proposals, costs = optimiser.ask(), np.random.default_rng(seed).random(10)
+        proposals = optimiser.ask()
+        costs = np.random.default_rng(seed).random(10)
         optimiser.tell(proposals, costs)
         np.testing.assert_array_equal(optimiser.home, proposals[costs.argmin()])
 
@@ -90,4 +104,6 @@ def test_an_eigenvalue_that_rounding_makes_negative_becomes_a_small_one() -> Non
     strategy = Strategy(np.zeros(3), np.ones(3), 7)
     strategy.covariance = np.diag([1.0, 1.0, -1e-17])
     strategy.decompose()
-    np.testing.assert_allclose(strategy.covariance, np.diag([1.0, 1.0, 1e-8]), atol=1e-15)
+    np.testing.assert_allclose(
+        strategy.covariance, np.diag([1.0, 1.0, 1e-8]), atol=1e-15
+    )

@@ -8,31 +8,52 @@ import pytest
 from posefit import Camera, Frame, Observation, Silhouette, pose_costs, project
 from posefit.fitting import shape
 from posefit.fitting.problem import align
-from posefit.fitting.shape import COVARIANCE, GIRTHS, LENGTHS, NAMES, PULL, Shape, fit_shape, shaped
+from posefit.fitting.shape import (
+    COVARIANCE,
+    GIRTHS,
+    LENGTHS,
+    NAMES,
+    PULL,
+    Shape,
+    fit_shape,
+    shaped,
+)
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
 
 AVERAGE = Body.of(built_in.average_skeleton())
 WALK = built_in.motion("walk", frames=40).frames(0, 40)
-POSES, PLACES = WALK.poses[::4], WALK.translations[::4]
+POSES = WALK.poses[::4]
+PLACES = WALK.translations[::4]
 
 
 def frames_at(places: Sequence[np.ndarray]) -> list[Frame]:
     nothing = np.zeros((1, 3), np.int64)
-    return [Frame(pose, place, 0.0, nothing, 0) for pose, place in zip(POSES, places, strict=True)]
+    return [
+        Frame(pose, place, 0.0, nothing, 0)
+        for pose, place in zip(POSES, places, strict=True)
+    ]
 
 
 def observed(body: Body, cameras: list[Camera]) -> list[Observation]:
     placed = zip(POSES, PLACES, strict=True)
-    return [Observation([Silhouette.of(project(body, camera, *at)) for camera in cameras]) for at in placed]
+    return [
+        Observation([Silhouette.of(project(body, camera, *at)) for camera in cameras])
+        for at in placed
+    ]
 
 
 def test_every_bone_belongs_to_one_group_of_lengths_and_one_of_girths() -> None:
     for groups in (LENGTHS, GIRTHS):
         plain = [bone for group in groups.values() for bone in group]
         assert len(plain) == len(set(plain))
-        assert {bone for bone in BONES for kind in plain if bone in (kind, f"l{kind}", f"r{kind}")} == set(BONES)
+        assert {
+            bone
+            for bone in BONES
+            for kind in plain
+            if bone in (kind, f"l{kind}", f"r{kind}")
+        } == set(BONES)
 
 
 def test_factors_multiply_what_they_name() -> None:
@@ -47,14 +68,24 @@ def test_factors_multiply_what_they_name() -> None:
 
 
 def test_a_length_that_is_measured_moves_those_that_go_with_it() -> None:
-    thighs, weight, log_length = NAMES.index("thighs length"), 2000.0, 0.08
+    thighs = NAMES.index("thighs length")
+    weight = 2000.0
+    log_length = 0.08
 
     def cost(factors: np.ndarray) -> float:
         return float(weight * (np.log(factors[thighs]) - log_length) ** 2)
 
-    estimate = np.log(shape._search(cost, np.ones(len(NAMES)), np.random.default_rng(0), 0.5, 400))
-    expected = weight * log_length / (weight * COVARIANCE[thighs, thighs] + PULL) * COVARIANCE[thighs]
-    np.testing.assert_allclose(estimate, expected, atol=2e-3)  # the least of the cost and the pull, by hand
+    estimate = np.log(
+        shape._search(cost, np.ones(len(NAMES)), np.random.default_rng(0), 0.5, 400)
+    )
+    expected = (
+        weight
+        * log_length
+        / (weight * COVARIANCE[thighs, thighs] + PULL)
+        * COVARIANCE[thighs]
+    )
+    # the least of the cost and the pull, by hand
+    np.testing.assert_allclose(estimate, expected, atol=2e-3)
     assert estimate[NAMES.index("torso length")] < -0.03
 
 
@@ -69,13 +100,21 @@ def test_varied_people_are_symmetric_and_within_their_percentage() -> None:
 
 def test_a_build_is_estimated_where_the_poses_are_known() -> None:
     true = varied(AVERAGE, 10.0, np.random.default_rng(5)).scaled(1.06, 1.06)
-    middle, rng = WALK.translations.mean(axis=0), np.random.default_rng(0)
-    cameras = [Camera.around(middle, azimuth, 3.5, (320, 240)) for azimuth in (0.0, np.pi / 2)]
-    frames, observations = frames_at(PLACES), observed(true, cameras)
-    shape = fit_shape(AVERAGE, cameras, observations, lambda _: frames, rng, aligned=False)
+    middle = WALK.translations.mean(axis=0)
+    rng = np.random.default_rng(0)
+    cameras = [
+        Camera.around(middle, azimuth, 3.5, (320, 240)) for azimuth in (0.0, np.pi / 2)
+    ]
+    frames = frames_at(PLACES)
+    observations = observed(true, cameras)
+    shape = fit_shape(
+        AVERAGE, cameras, observations, lambda _: frames, rng, aligned=False
+    )
     assert shape.body.stature == pytest.approx(true.stature, rel=0.03)
     limbs = [BONES.index(bone) for bone in ("lfemur", "ltibia", "lhumerus")]
-    assert shape.body.skeleton.lengths[limbs] == pytest.approx(true.skeleton.lengths[limbs], rel=0.06)
+    assert shape.body.skeleton.lengths[limbs] == pytest.approx(
+        true.skeleton.lengths[limbs], rel=0.06
+    )
 
 
 def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
@@ -85,27 +124,49 @@ def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
         align(AVERAGE, [camera], observation.silhouettes, pose[None], place[None])[0]
         for observation, pose, place in zip(observations, POSES, PLACES, strict=True)
     ]
-    frames, rng = frames_at(places), np.random.default_rng(0)
-    shape = fit_shape(AVERAGE, [camera], observations, lambda _: frames, rng, height=1.55)
+    frames = frames_at(places)
+    rng = np.random.default_rng(0)
+    shape = fit_shape(
+        AVERAGE, [camera], observations, lambda _: frames, rng, height=1.55
+    )
     assert shape.body.stature == pytest.approx(1.55)
 
 
-def test_a_camera_that_knows_nothing_does_not_count_and_beta_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_camera_that_knows_nothing_does_not_count_and_beta_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("posefit.fitting.shape.ROUNDS", ((0.5, 1),))
-    cameras = [Camera.around(WALK.translations.mean(axis=0), azimuth, 3.5, (80, 60)) for azimuth in (0.0, np.pi / 2)]
+    cameras = [
+        Camera.around(WALK.translations.mean(axis=0), azimuth, 3.5, (80, 60))
+        for azimuth in (0.0, np.pi / 2)
+    ]
     nothing = Silhouette.of(*np.zeros((2, 60, 80), dtype=bool))
     observations = observed(AVERAGE.scaled(1.2, 1.2), cameras[:1])
-    blind = [Observation([*observation.silhouettes, nothing]) for observation in observations]
+    blind = [
+        Observation([*observation.silhouettes, nothing]) for observation in observations
+    ]
     frames = frames_at(PLACES)
 
     def fit(count: int, observations: list[Observation], **known: float) -> Shape:
         rng = np.random.default_rng(0)
-        return fit_shape(AVERAGE, cameras[:count], observations, lambda _: frames, rng, aligned=False, **known)
+        return fit_shape(
+            AVERAGE,
+            cameras[:count],
+            observations,
+            lambda _: frames,
+            rng,
+            aligned=False,
+            **known,
+        )
 
-    alone, both = fit(1, observations), fit(2, blind)
+    alone = fit(1, observations)
+    both = fit(2, blind)
     assert both.cost == alone.cost < 50.0
     np.testing.assert_array_equal(both.factors, alone.factors)
     missed = fit(1, observations, beta=1.0)
     rows = zip(observations, POSES[:, None], PLACES[:, None], strict=True)
-    costs = [pose_costs(missed.body, cameras[:1], seen.silhouettes, *placed, 1.0)[0] for seen, *placed in rows]
+    costs = [
+        pose_costs(missed.body, cameras[:1], seen.silhouettes, *placed, 1.0)[0]
+        for seen, *placed in rows
+    ]
     assert missed.cost == pytest.approx(np.mean(costs))

@@ -25,9 +25,15 @@ def weighted(rows: list[int], turns: list[float], weights: list[float]) -> Poste
 
 
 def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
-    count, parts = 4000, ((-0.5, 0.02, 0.75), (0.5, 0.05, 0.25))
-    start, other = (Start(np.full(3, mean), np.full(3, spread), np.zeros(3), weight) for mean, spread, weight in parts)
-    drawn = draw_population(Toy(3, start=replace(start, others=[other])), np.random.default_rng(0), count)
+    count = 4000
+    parts = ((-0.5, 0.02, 0.75), (0.5, 0.05, 0.25))
+    start, other = (
+        Start(np.full(3, mean), np.full(3, spread), np.zeros(3), weight)
+        for mean, spread, weight in parts
+    )
+    drawn = draw_population(
+        Toy(3, start=replace(start, others=[other])), np.random.default_rng(0), count
+    )
     first = drawn[:, 0] < 0.0
     # binomial, of standard deviation sqrt(p q / n); a mean's error is spread / sqrt(n), that of a spread over sqrt(2)
     assert abs(first.mean() - 0.75) < 4.0 * np.sqrt(0.75 * 0.25 / count)
@@ -39,28 +45,45 @@ def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
 
 def problem_of(row: int, turn: float) -> PoseProblem:
     """Return the problem whose silhouette is of one of the walker's poses, turned."""
-    body, place = posefit.Body.of(WALK.skeleton), WALK.translations[row]
+    body = posefit.Body.of(WALK.skeleton)
+    place = WALK.translations[row]
     camera = posefit.Camera.around(place, 0.3, 5.0, (160, 120))
     mask = posefit.project(body, camera, WALK.poses[row] + turn * np.eye(66)[0], place)
-    return PoseProblem(body, [camera], [posefit.Silhouette.of(mask)], replace(SPACE, anchor=place))
+    return PoseProblem(
+        body, [camera], [posefit.Silhouette.of(mask)], replace(SPACE, anchor=place)
+    )
 
 
-def test_modes_are_projected_onto_the_latents_of_the_prior_and_weighed_by_their_costs_there() -> None:
-    start = start_in(problem_of(20, 2.5), modes_apart(WALK.skeleton, weighted([5, 20], [0.0, 2.5], [3.0, 1.0])))
+def test_modes_are_projected_onto_the_latents_of_the_prior_and_weighed_by_their_costs_there() -> (
+    None
+):
+    start = start_in(
+        problem_of(20, 2.5),
+        modes_apart(WALK.skeleton, weighted([5, 20], [0.0, 2.5], [3.0, 1.0])),
+    )
     (other,) = start.others
-    assert start.weight > other.weight > 0.0  # the silhouette is that of the mode whose weight was less
+    # the silhouette is that of the mode whose weight was less
+    assert start.weight > other.weight > 0.0
     for mode, row, turn in ((start, 20, 2.5), (other, 5, 0.0)):
         pose = SPACE.decode(mode.mean[None])[0][0]
         np.testing.assert_allclose(np.cos(pose[0] - WALK.poses[row, 0] - turn), 1.0)
-        projected = PRIOR.inverse_transform(PRIOR.transform(WALK.poses[row : row + 1, 3:]))[0]
+        projected = PRIOR.inverse_transform(
+            PRIOR.transform(WALK.poses[row : row + 1, 3:])
+        )[0]
         np.testing.assert_allclose(pose[3:], projected, atol=1e-9)
-        np.testing.assert_array_equal(mode.spread, np.full(SPACE.dimensions, MODE_SPREAD))
+        np.testing.assert_array_equal(
+            mode.spread, np.full(SPACE.dimensions, MODE_SPREAD)
+        )
 
 
 def test_a_mode_is_around_its_pose_that_costs_least() -> None:
-    ((_, mode),) = modes_apart(WALK.skeleton, weighted([5, 5, 5], [0.3, 0.2, 0.0], [5.0, 4.0, 1.0]))
+    ((_, mode),) = modes_apart(
+        WALK.skeleton, weighted([5, 5, 5], [0.3, 0.2, 0.0], [5.0, 4.0, 1.0])
+    )
     start = start_in(problem_of(5, 0.0), [(1.0, mode)])
-    np.testing.assert_allclose(SPACE.decode(start.mean[None])[0][0, 0], WALK.poses[5, 0], atol=1e-9)
+    np.testing.assert_allclose(
+        SPACE.decode(start.mean[None])[0][0, 0], WALK.poses[5, 0], atol=1e-9
+    )
 
 
 def test_nothing_is_guessed_where_the_pose_is_known_or_nothing_shows() -> None:

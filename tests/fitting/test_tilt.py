@@ -25,11 +25,20 @@ NOTHING = Observation([], np.zeros(3))
 def bending(pitch: Array, roll: Array, hip: Array | float = 0.0) -> Motion:
     poses = np.zeros((len(pitch), 66))
     poses[:, 1], poses[:, 2], poses[:, LEFT_HIP] = pitch, roll, hip
-    return Motion("bending", built_in.average_skeleton(), poses, np.zeros((len(pitch), 3)), 30.0)
+    return Motion(
+        "bending", built_in.average_skeleton(), poses, np.zeros((len(pitch), 3)), 30.0
+    )
 
 
 def task_of(*training: Motion, yaw: float | None = 0.3) -> Task:
-    return Task(Body.of(built_in.average_skeleton()), [], 10, yaw, np.zeros(3), training=training)
+    return Task(
+        Body.of(built_in.average_skeleton()),
+        [],
+        10,
+        yaw,
+        np.zeros(3),
+        training=training,
+    )
 
 
 def space_of(tilt: Tilt, reach: float = 1.0) -> SearchSpace:
@@ -38,20 +47,32 @@ def space_of(tilt: Tilt, reach: float = 1.0) -> SearchSpace:
 
 def test_bent_hips_tilt_as_in_training() -> None:
     hip = np.linspace(-1.0, 1.0, 201)
-    tilt = Tilt.of(Line(), [bending(0.2 + 0.9 * hip, -0.1 * hip, hip)], 1.0, 2.0 * DEGREE)
-    poses = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -0.8], [0.0, 0.0, 0.0, 0.8]]))[0]
+    tilt = Tilt.of(
+        Line(), [bending(0.2 + 0.9 * hip, -0.1 * hip, hip)], 1.0, 2.0 * DEGREE
+    )
+    poses = space_of(tilt).decode(
+        np.array([[0.0, 0.0, 0.0, -0.8], [0.0, 0.0, 0.0, 0.8]])
+    )[0]
     # a third of a latent's variance and a ridge of 0.05: slopes come out smaller by 0.333 / 0.383
     shrunk = 0.8 / (1.0 + 0.05 / np.mean(hip**2))
-    np.testing.assert_allclose(poses[:, 1], 0.2 + 0.9 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
-    np.testing.assert_allclose(poses[:, 2], -0.1 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
+    np.testing.assert_allclose(
+        poses[:, 1], 0.2 + 0.9 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        poses[:, 2], -0.1 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9
+    )
     lost = 0.9 * (1.0 - shrunk / 0.8)  # what the ridge leaves to the range
-    np.testing.assert_allclose([tilt.low[0], tilt.high[0]], [-lost - 2.0 * DEGREE, lost + 2.0 * DEGREE])
+    np.testing.assert_allclose(
+        [tilt.low[0], tilt.high[0]], [-lost - 2.0 * DEGREE, lost + 2.0 * DEGREE]
+    )
 
 
 def test_latents_that_training_never_had_tilt_no_farther_than_training() -> None:
     hip = np.linspace(-0.1, 0.1, 50)
     tilt = Tilt.of(Line(), [bending(4.0 * hip, 0.0 * hip, hip)], 1.0, 0.0)
-    pitches = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]]))[0][:, 1]
+    pitches = space_of(tilt).decode(
+        np.array([[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]])
+    )[0][:, 1]
     assert pitches == pytest.approx(tilt.mean[:2, 0])
     assert pitches[1] < 0.4
 
@@ -70,7 +91,8 @@ def test_a_turn_over_in_training_may_be_repeated() -> None:
     predictor = Predictor(task_of(cartwheel), Line(), Prediction())
     space = predictor.space(NOTHING)
     assert space.periodic.tolist() == [False, False, True, False]
-    rolls, proposal = [], np.array([0.0, 0.0, 0.9, 0.0])
+    rolls = []
+    proposal = np.array([0.0, 0.0, 0.9, 0.0])
     for _ in range(50):  # as far as it goes to one side, from frame to frame
         predictor.commit(proposal)
         rolls.append(space.decode(proposal[None])[0][0, 2])
@@ -85,7 +107,10 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
     tilt = Tilt.of(Line(), [rolling], 1.0, 0.0)
     predictor = Predictor(task_of(rolling), Line(), Prediction(), tilt)
     space = predictor.space(NOTHING)
-    np.testing.assert_allclose(space.centre[2] + np.array([-1.0, 1.0]) * space.half[2], [tilt.low[1], tilt.high[1]])
+    np.testing.assert_allclose(
+        space.centre[2] + np.array([-1.0, 1.0]) * space.half[2],
+        [tilt.low[1], tilt.high[1]],
+    )
     centres = []
     for roll in (0.5, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0):
         last = space.coordinates(np.array([0.0, 0.0, roll, 0.0]))
@@ -93,14 +118,18 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
         predictor.commit(np.array([0.0, 0.0, roll, 0.0]))
         space = predictor.space(NOTHING)
         assert space.half[2] == pytest.approx(np.radians(15.0))
-        np.testing.assert_allclose(space.coordinates(space.start.mean), last, atol=1e-12)
+        np.testing.assert_allclose(
+            space.coordinates(space.start.mean), last, atol=1e-12
+        )
         centres.append(space.centre[2])
         assert centres[-1] == pytest.approx(min(moved, tilt.high[1] - np.radians(15.0)))
     assert centres[-1] == pytest.approx(tilt.high[1] - np.radians(15.0))
 
 
 @each("how", [Prediction(), Prediction(tilt="box")])
-def test_nothing_to_learn_from_or_a_box_is_a_box_around_upright(how: Prediction) -> None:
+def test_nothing_to_learn_from_or_a_box_is_a_box_around_upright(
+    how: Prediction,
+) -> None:
     training = [bending(np.full(9, 0.8), np.zeros(9))] if how.tilt == "box" else []
     predictor = Predictor(task_of(*training), Line(), how)
     space = predictor.space(NOTHING)
@@ -117,7 +146,9 @@ def test_a_first_pose_that_is_given_begins_with_the_tilt_that_goes_with_it() -> 
     task = replace(task_of(lying), first_pose=np.eye(63)[0] * 0.4)
     space = Predictor(task, Line(), Prediction()).space(NOTHING)
     assert space.centre[1] != 0.0
-    np.testing.assert_allclose(space.coordinates(space.start.mean), [0.3, 0.0, 0.0, 0.4], atol=1e-12)
+    np.testing.assert_allclose(
+        space.coordinates(space.start.mean), [0.3, 0.0, 0.0, 0.4], atol=1e-12
+    )
 
 
 def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
@@ -127,14 +158,35 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     def tilt(choice: TrackOptions) -> Tilt | None:
         tracker = prepare(choice, task).build(task)
         assert isinstance(tracker, SynthesisTracker)
-        return Predictor(task, learned, tracker.prediction, tracker.tilt).space(NOTHING).tilt
+        return (
+            Predictor(task, learned, tracker.prediction, tracker.tilt)
+            .space(NOTHING)
+            .tilt
+        )
 
     before = Tilt.of(Line(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
-    assert Predictor(task_of(), Line(), Prediction(), before).space(NOTHING).tilt is before
+    assert (
+        Predictor(task_of(), Line(), Prediction(), before).space(NOTHING).tilt is before
+    )
     assert tilt(TrackOptions(method="@pca")) is not None
     assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
     assert tilt(TrackOptions(method=("annealed", learned))) is None
-    assert tilt(TrackOptions(method=("annealed", learned), settings={"tracker.tilt": "learned"})) is not None
-    assert tilt(TrackOptions(method="@pca", settings={"tracker.variant": "paper"})) is None
-    with pytest.raises(ValueError, match="tilt must be"):  # what is set wins: it is not quietly a box
-        tilt(TrackOptions(method="@pca", settings={"tracker.variant": "paper", "tracker.tilt": "learned"}))
+    assert (
+        tilt(
+            TrackOptions(
+                method=("annealed", learned), settings={"tracker.tilt": "learned"}
+            )
+        )
+        is not None
+    )
+    assert (
+        tilt(TrackOptions(method="@pca", settings={"tracker.variant": "paper"})) is None
+    )
+    # what is set wins: it is not quietly a box
+    with pytest.raises(ValueError, match="tilt must be"):
+        tilt(
+            TrackOptions(
+                method="@pca",
+                settings={"tracker.variant": "paper", "tracker.tilt": "learned"},
+            )
+        )

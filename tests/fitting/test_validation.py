@@ -38,30 +38,56 @@ def exits() -> None:
 
 def test_a_broken_rule_is_named_with_the_plugin() -> None:
     rows: list[Any] = [
-        (np.zeros((40, 8)), r"ask must return an array of shape \(n, 9\), got shape \(40, 8\)"),
+        (
+            np.zeros((40, 8)),
+            r"ask must return an array of shape \(n, 9\), got shape \(40, 8\)",
+        ),
         (np.zeros(9), r"ask must return an array of shape \(n, 9\), got shape \(9,\)"),
         ([[0.0] * 9], r"ask must return an array of shape \(n, 9\), got list"),
-        (np.zeros((4, 9)).view(np.matrix), r"ask must return an array of shape \(n, 9\), got matrix"),
-        (np.ma.zeros((4, 9)), r"ask must return an array of shape \(n, 9\), got MaskedArray"),
+        (
+            np.zeros((4, 9)).view(np.matrix),
+            r"ask must return an array of shape \(n, 9\), got matrix",
+        ),
+        (
+            np.ma.zeros((4, 9)),
+            r"ask must return an array of shape \(n, 9\), got MaskedArray",
+        ),
         (None, r"ask must return an array of shape \(n, 9\), got NoneType"),
-        (np.zeros((4, 9), dtype=int), "ask must return numbers of type float64, got int64"),
+        (
+            np.zeros((4, 9), dtype=int),
+            "ask must return numbers of type float64, got int64",
+        ),
         (np.full((4, 9), 1.5), r"ask must return proposals in \[-1, 1\], got 1.5"),
         (np.full((4, 9), -np.inf), r"ask must return proposals in \[-1, 1\], got -inf"),
         (np.full((4, 9), np.nan), "ask must return finite proposals, got nan"),
-        (np.full((4, 9), 0.25), r"tell must not fail, got KeyError: 'lost' \(test_validation.py:[0-9]+\)"),
-        (fails, r"ask must not fail, got ZeroDivisionError: division by zero \(test_validation.py:[0-9]+\)"),
+        (
+            np.full((4, 9), 0.25),
+            r"tell must not fail, got KeyError: 'lost' \(test_validation.py:[0-9]+\)",
+        ),
+        (
+            fails,
+            r"ask must not fail, got ZeroDivisionError: division by zero \(test_validation.py:[0-9]+\)",
+        ),
         (peeks, "ask must leave evaluations to the search, got 40 of its own"),
         (exits, "ask must not end the program, got SystemExit: 0"),
     ]
     for answer, rule in rows:
-        checked = CheckedOptimiser(Answers(answer), Toy(9), "optimiser 'bad' of posefit-bad 1.0")
-        with pytest.raises(BrokenRuleError, match=rf"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
+        checked = CheckedOptimiser(
+            Answers(answer), Toy(9), "optimiser 'bad' of posefit-bad 1.0"
+        )
+        with pytest.raises(
+            BrokenRuleError, match=rf"^optimiser 'bad' of posefit-bad 1.0: {rule}$"
+        ):
             minimise(sphere, checked, 40)
-    with pytest.raises(BrokenRuleError, match="advance must not fail, got AttributeError"):
+    with pytest.raises(
+        BrokenRuleError, match="advance must not fail, got AttributeError"
+    ):
         CheckedOptimiser(Answers(np.zeros((4, 9))), Toy(9), "it").advance(Toy(9))
 
 
-def test_an_empty_population_ends_a_search_and_is_a_mistake_where_it_is_the_first_of_a_frame() -> None:
+def test_an_empty_population_ends_a_search_and_is_a_mistake_where_it_is_the_first_of_a_frame() -> (
+    None
+):
     class Filter(Answers):
         def advance(self, space: Any) -> None: ...
 
@@ -72,5 +98,8 @@ def test_an_empty_population_ends_a_search_and_is_a_mistake_where_it_is_the_firs
     assert checked.ask().shape == (0, 9)
     checked.advance(Toy(9))
     for first in (checked, CheckedOptimiser(answers, Toy(9), "it")):
-        with pytest.raises(BrokenRuleError, match="it: ask must return a first population of one proposal or more"):
+        with pytest.raises(
+            BrokenRuleError,
+            match="it: ask must return a first population of one proposal or more",
+        ):
             first.ask()

@@ -22,7 +22,9 @@ Film = tuple[Path, list[Any]]  # a video and the true mask of each frame
 SIZE = (160, 120)
 NOBODY = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
 ALL = (None, None)  # frames
-EMPTY, FRAMES = 12, 48  # frames without a person, then frames of a walk across
+# frames without a person, then frames of a walk across
+EMPTY = 12
+FRAMES = 48
 
 
 def iou(first: Any, second: Any) -> float:
@@ -63,7 +65,9 @@ def encoded(path: Path, images: Iterable[Any], codec: str = "MJPG") -> Path:
 def film(path: Path, masks: list[Any], others: Iterable[Any] = ()) -> Path:
     """Write a video of a person, and of another in other clothes, before a still, noisy background."""
     rng = np.random.default_rng(0)
-    background = cv2.GaussianBlur(rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0)
+    background = cv2.GaussianBlur(
+        rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0
+    )
     background = (background - background.mean()) * 4.0 + 150.0
     images = []
     for mask, other in zip_longest(masks, others, fillvalue=NOBODY):
@@ -95,21 +99,35 @@ class Box:
     """Reports a box on the left as the person; from its second picture on, their facing and a landmark, too."""
 
     def __init__(self, footage: Any, *, wrong: str = "") -> None:
-        self.footage, self.wrong, self.facing, self.landmarks = footage, wrong, np.nan, None
-        self.count, self.first, self.pictures = len(footage), next(iter(footage.frames())), 0
+        self.footage = footage
+        self.wrong = wrong
+        self.facing = np.nan
+        self.landmarks = None
+        self.count, self.first, self.pictures = (
+            len(footage),
+            next(iter(footage.frames())),
+            0,
+        )
 
     def segment(self, image: Any) -> Any:
         if self.wrong == "fails":
             raise KeyError("lost")
         if self.pictures:
-            self.facing, self.landmarks = 0.5, np.zeros((len(JOINTS), 2 if self.wrong == "landmarks" else 3))
+            self.facing, self.landmarks = (
+                0.5,
+                np.zeros((len(JOINTS), 2 if self.wrong == "landmarks" else 3)),
+            )
             self.landmarks[0] = [5.0, 7.0, 0.5][: self.landmarks.shape[1]]
         self.pictures += 1
         mask = np.zeros(image.shape[:2], dtype=bool)
         mask[20:90, 5 : 5 + image.shape[1] // 6] = True
         if self.wrong == "shape":
             return mask[1:], mask
-        return (mask.astype(np.uint8), mask) if self.wrong == "type" else (mask, np.zeros_like(mask))
+        return (
+            (mask.astype(np.uint8), mask)
+            if self.wrong == "type"
+            else (mask, np.zeros_like(mask))
+        )
 
 
 @pytest.fixture
@@ -120,7 +138,10 @@ def segmenter(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     def register(name: str, factory: Any, **more: Any) -> None:
         offer = Offer("segmenter", name, factory, "its-maker", "1.0", **more)
         changed = SimpleNamespace(
-            offers=registry.offers, offer=lambda kind, other: offer if other == name else registry.offer(kind, other)
+            offers=registry.offers,
+            offer=lambda kind, other: (
+                offer if other == name else registry.offer(kind, other)
+            ),
         )
         monkeypatch.setattr(segmentation, "registry", lambda: changed)
 

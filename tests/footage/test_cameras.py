@@ -16,7 +16,17 @@ from posefit.geometry.units import METRES, UNIT_NAMES
 from posefit.silhouette.cost import project
 from tests.cases import each
 from tests.commands import error_of, printed
-from tests.footage.conftest import EMPTY, FRAMES, NOBODY, SIZE, camera, film, stack, truth, walk
+from tests.footage.conftest import (
+    EMPTY,
+    FRAMES,
+    NOBODY,
+    SIZE,
+    camera,
+    film,
+    stack,
+    truth,
+    walk,
+)
 from tests.footage.test_footage import toml
 
 AZIMUTHS = (np.pi / 2, 0.6)
@@ -27,30 +37,46 @@ def calibration(path: Path, metres: float, azimuths: Any = AZIMUTHS) -> Path:
     placed = [camera(azimuth) for azimuth in azimuths]
     text = toml(path, *placed).read_text()
     for one in placed:
-        text = text.replace(str(one.translation.tolist()), str((one.translation / metres).tolist()))
+        text = text.replace(
+            str(one.translation.tolist()), str((one.translation / metres).tolist())
+        )
     path.write_text(text)
     return path
 
 
 def views(tmp_path: Path) -> list[Path]:
     named = zip("ab", AZIMUTHS, strict=True)
-    return [stack(tmp_path / f"{name}.npz", truth(azimuth)[8:14], fps=25.0) for name, azimuth in named]
+    return [
+        stack(tmp_path / f"{name}.npz", truth(azimuth)[8:14], fps=25.0)
+        for name, azimuth in named
+    ]
 
 
 @each("unit", ["m", "cm", "mm", "inch"])
-def test_the_unit_of_calibrations_is_recognised_by_the_persons_height(tmp_path: Path, unit: Any) -> None:
+def test_the_unit_of_calibrations_is_recognised_by_the_persons_height(
+    tmp_path: Path, unit: Any
+) -> None:
     path = calibration(tmp_path / "two.toml", METRES[unit])
     for stated in (None, unit):
-        scene = scene_of(views(tmp_path), camera=[path], up="y", unit=stated, height=1.74)
+        scene = scene_of(
+            views(tmp_path), camera=[path], up="y", unit=stated, height=1.74
+        )
         assert np.linalg.norm(scene.anchor - walk().translations[8]) < 0.3
         np.testing.assert_allclose([one.position for one in scene.cameras], [camera(a).position for a in AZIMUTHS], atol=1e-6)  # fmt: skip
-        assert list(scene.guesses) == ([] if stated else [f"the calibration is in {UNIT_NAMES[unit]}"])
-    with pytest.raises(ValueError, match="got .*: the masks show .* or the calibrations are in another order or unit"):
+        assert list(scene.guesses) == (
+            [] if stated else [f"the calibration is in {UNIT_NAMES[unit]}"]
+        )
+    with pytest.raises(
+        ValueError,
+        match="got .*: the masks show .* or the calibrations are in another order or unit",
+    ):
         scene_of(views(tmp_path), camera=[path], up="y", unit="foot", height=1.74)
 
 
 @each("unit", ["m", "mm", "cm"])
-def test_the_unit_of_one_camera_is_recognised_by_its_distance(tmp_path: Path, unit: Any) -> None:
+def test_the_unit_of_one_camera_is_recognised_by_its_distance(
+    tmp_path: Path, unit: Any
+) -> None:
     path = calibration(tmp_path / "one.toml", METRES[unit], AZIMUTHS[:1])
     scene = scene_of(views(tmp_path)[:1], camera=[path], up="y", height=1.74)
     assert list(scene.guesses) == [f"the calibration is in {UNIT_NAMES[unit]}"]
@@ -58,23 +84,45 @@ def test_the_unit_of_one_camera_is_recognised_by_its_distance(tmp_path: Path, un
     drawn = scene_of(["walk"], camera=[path], up="y", frames=(0, 2))
     assert drawn.observations[0].silhouettes[0].mask.any()
     assert drawn.guesses == scene.guesses
-    words = ["--camera", path, "--up", "y", "--frames", "0:2", "--method", "random", "--evaluations", "40"]
+    words = [
+        "--camera",
+        path,
+        "--up",
+        "y",
+        "--frames",
+        "0:2",
+        "--method",
+        "random",
+        "--evaluations",
+        "40",
+    ]
     assert printed("track", "walk", *words)["guesses"] == list(scene.guesses)
 
 
 def test_a_height_half_or_twice_the_usual_is_no_other_unit() -> None:
     assert [unit_of_heights(ratio) for ratio in (0.5, 1.0, 1.9)] == ["m"] * 3
-    assert [unit_of_heights(ratio) for ratio in (1.9e3, 150.0, 45.0)] == ["mm", "cm", "inch"]
+    assert [unit_of_heights(ratio) for ratio in (1.9e3, 150.0, 45.0)] == [
+        "mm",
+        "cm",
+        "inch",
+    ]
 
 
 def test_one_of_several_cameras_is_chosen_by_name(tmp_path: Path) -> None:
-    path, source = calibration(tmp_path / "two.toml", 1.0), views(tmp_path)[0]
+    path = calibration(tmp_path / "two.toml", 1.0)
+    source = views(tmp_path)[0]
     scene = scene_of([source], camera=[f"{path}:cam0"], up="y")
-    np.testing.assert_allclose(scene.cameras[0].position, camera(AZIMUTHS[0]).position, atol=1e-6)
+    np.testing.assert_allclose(
+        scene.cameras[0].position, camera(AZIMUTHS[0]).position, atol=1e-6
+    )
     error = error_of("track", source, "--camera", path, "--out", tmp_path / "out")
-    assert "camera must be given for each view, 1, got 2: cam0, cam1; FILE:NAME is one of a file" in error
-    assert "unit must be given for calibrations and files of motions only, got 'mm' for masks" in error_of(
-        "track", source, "--unit", "mm"
+    assert (
+        "camera must be given for each view, 1, got 2: cam0, cam1; FILE:NAME is one of a file"
+        in error
+    )
+    assert (
+        "unit must be given for calibrations and files of motions only, got 'mm' for masks"
+        in error_of("track", source, "--unit", "mm")
     )
 
 
@@ -84,37 +132,63 @@ def apart() -> tuple[list[Any], Any]:
 
     One camera sees the second person later, and the other the first.
     """
-    cameras = [replace(camera(azimuth), focal=0.8 * camera(azimuth).focal) for azimuth in AZIMUTHS]
-    motion, shown = walk(), np.zeros((2, 2, FRAMES, *SIZE[::-1]), dtype=bool)
+    cameras = [
+        replace(camera(azimuth), focal=0.8 * camera(azimuth).focal)
+        for azimuth in AZIMUTHS
+    ]
+    motion = walk()
+    shown = np.zeros((2, 2, FRAMES, *SIZE[::-1]), dtype=bool)
     body = posefit.Body.of(motion.skeleton)
     for view, person in product(range(2), range(2)):
         for k in range(0 if view == person else 20, FRAMES):
             aside = 0.45 - 0.9 * person
             place = motion.translations[k] * [1.0, 1.0, 0.5] + [aside, 0.0, -aside]
-            shown[view, person, k] = project(body, cameras[view], motion.poses[k], place)
+            shown[view, person, k] = project(
+                body, cameras[view], motion.poses[k], place
+            )
     return cameras, shown
 
 
-@each(("kind", "person"), [("masks", None), ("masks", 1), ("masks", 2), ("video", None), ("video", 2)])
+@each(
+    ("kind", "person"),
+    [("masks", None), ("masks", 1), ("masks", 2), ("video", None), ("video", 2)],
+)
 def test_every_camera_follows_the_person_whom_the_first_one_follows(
     apart: tuple[list[Any], Any], kind: str, person: int | None, tmp_path: Path
 ) -> None:
     cameras, shown = apart
-    sources = [tmp_path / f"{name}.{'npz' if kind == 'masks' else 'avi'}" for name in "ab"]
+    sources = [
+        tmp_path / f"{name}.{'npz' if kind == 'masks' else 'avi'}" for name in "ab"
+    ]
     for source, people in zip(sources, shown, strict=True):
         if kind == "masks":
             np.savez(source, masks=people.any(axis=0).astype(np.uint8), fps=25.0)
         else:
-            film(source, [NOBODY] * EMPTY + [*people[0]], [NOBODY] * EMPTY + [*people[1]])
-    path, how = toml(tmp_path / "two.toml", *cameras), Extraction(background=f"0:{EMPTY}")
-    view: dict[str, Any] = {"frames": (EMPTY, None), "extraction": how} if kind == "video" else {}
+            film(
+                source, [NOBODY] * EMPTY + [*people[0]], [NOBODY] * EMPTY + [*people[1]]
+            )
+    path = toml(tmp_path / "two.toml", *cameras)
+    how = Extraction(background=f"0:{EMPTY}")
+    view: dict[str, Any] = (
+        {"frames": (EMPTY, None), "extraction": how} if kind == "video" else {}
+    )
     scene = scene_of(sources, camera=[path], up="y", height=1.74, person=person, **view)
     followed = 0 if person is None else person - 1
-    for silhouette, people in zip(scene.observations[FRAMES - 5].silhouettes, shown, strict=True):
+    for silhouette, people in zip(
+        scene.observations[FRAMES - 5].silhouettes, shown, strict=True
+    ):
         assert silhouette.mask.any()
-        assert (silhouette.mask & people[followed, FRAMES - 5]).sum() > 0.75 * silhouette.mask.sum()
-    assert any(f"person {followed + 1} is followed, --person N another" in warning for warning in scene.warnings)
-    assert any(f"person {2 - followed} is followed, as by the first camera" in warning for warning in scene.warnings)
+        assert (
+            silhouette.mask & people[followed, FRAMES - 5]
+        ).sum() > 0.75 * silhouette.mask.sum()
+    assert any(
+        f"person {followed + 1} is followed, --person N another" in warning
+        for warning in scene.warnings
+    )
+    assert any(
+        f"person {2 - followed} is followed, as by the first camera" in warning
+        for warning in scene.warnings
+    )
 
 
 def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
@@ -130,5 +204,7 @@ def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
         "the calibration is for pictures of this size, which it does not state",
     ]
     bare.write_text("K: [[200, 0, 79.5], [0, 200, 259.5], [0, 0, 1]]\n")
-    with pytest.raises(ValueError, match="camera 'bare' must be of 160x120, got a centre of 79.5x259.5"):
+    with pytest.raises(
+        ValueError, match="camera 'bare' must be of 160x120, got a centre of 79.5x259.5"
+    ):
         scene_of([source], camera=[bare])

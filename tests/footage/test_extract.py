@@ -18,22 +18,52 @@ from posefit.silhouette.foreground import Still, mean_background, people
 from tests.cases import each
 from tests.commands import error_of, printed, run
 from tests.files import arrays, csv_rows
-from tests.footage.conftest import ALL, EMPTY, FRAMES, NOBODY, SIZE, Box, Film, encoded, iou, stack, truth
+from tests.footage.conftest import (
+    ALL,
+    EMPTY,
+    FRAMES,
+    NOBODY,
+    SIZE,
+    Box,
+    Film,
+    encoded,
+    iou,
+    stack,
+    truth,
+)
 from tests.footage.matroska import write_matroska
 
 
-@each(("method", "background"), [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")])
-def test_each_method_finds_the_person(filmed: Film, tmp_path: Path, method: Any, background: Any) -> None:
+@each(
+    ("method", "background"),
+    [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")],
+)
+def test_each_method_finds_the_person(
+    filmed: Film, tmp_path: Path, method: Any, background: Any
+) -> None:
     path, masks = filmed
-    result = extract(path, tmp_path / "out", Extraction(method, background), frames=(EMPTY, None))
+    result = extract(
+        path, tmp_path / "out", Extraction(method, background), frames=(EMPTY, None)
+    )
     assert result["frames"] == FRAMES
     assert result["usable"] > 0.8 * FRAMES
     stored = arrays(tmp_path / "out" / "masks.npz")
     assert stored["masks"].shape == stored["valid"].shape == (FRAMES, SIZE[1], SIZE[0])
     assert stored["fps"] == 25.0
-    overlaps = [iou(a > 0, b) for a, b, ok in zip(stored["masks"], masks[EMPTY:], stored["usable"], strict=True) if ok]
-    assert np.mean(overlaps) > 0.8  # a person of 900 pixels: half a pixel all along the edge costs 0.15
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"masks.npz", "preview.mp4", "quality.csv"}
+    overlaps = [
+        iou(a > 0, b)
+        for a, b, ok in zip(
+            stored["masks"], masks[EMPTY:], stored["usable"], strict=True
+        )
+        if ok
+    ]
+    # a person of 900 pixels: half a pixel all along the edge costs 0.15
+    assert np.mean(overlaps) > 0.8
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "masks.npz",
+        "preview.mp4",
+        "quality.csv",
+    }
     rows = csv_rows(tmp_path / "out" / "quality.csv")
     assert [int(row["frame"]) for row in rows] == list(range(EMPTY, EMPTY + FRAMES))
     assert sum(int(row["usable"]) for row in rows) == result["usable"]
@@ -41,25 +71,43 @@ def test_each_method_finds_the_person(filmed: Film, tmp_path: Path, method: Any,
 
 def test_a_video_of_masks_is_taken_as_it_is(tmp_path: Path) -> None:
     masks = truth()[8:20]
-    images = [255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks]
-    result = extract(encoded(tmp_path / "a.avi", images, "FFV1"), tmp_path / "out", Extraction("masks"))
+    images = [
+        255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks
+    ]
+    result = extract(
+        encoded(tmp_path / "a.avi", images, "FFV1"),
+        tmp_path / "out",
+        Extraction("masks"),
+    )
     assert result["usable"] == 12
     stored = arrays(tmp_path / "out" / "masks.npz")
-    assert np.mean([iou(a > 0, b) for a, b in zip(stored["masks"], masks, strict=True)]) > 0.95
+    assert (
+        np.mean([iou(a > 0, b) for a, b in zip(stored["masks"], masks, strict=True)])
+        > 0.95
+    )
     assert stored["valid"].all()
 
 
-def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(filmed: Film, tmp_path: Path) -> None:
+def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
+    filmed: Film, tmp_path: Path
+) -> None:
     path, _ = filmed
     hidden = np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)
     hidden[:, 70:80] = 255
     cv2.imwrite(str(tmp_path / "tree.png"), hidden)
-    extract(path, tmp_path / "out", Extraction(ignore=tmp_path / "tree.png"), frames=(EMPTY + 5, EMPTY + 40))
+    extract(
+        path,
+        tmp_path / "out",
+        Extraction(ignore=tmp_path / "tree.png"),
+        frames=(EMPTY + 5, EMPTY + 40),
+    )
     masks = tmp_path / "out" / "masks.npz"
     silhouette = read_masks(masks, ALL).silhouette(15)
     assert not silhouette.valid[:, 70:80].any()
     assert not silhouette.mask[:, 70:80].any()
-    result = posefit.track(masks, method="@loose", frames=(5, 9), view_degrees=90, evaluations=400)
+    result = posefit.track(
+        masks, method="@loose", frames=(5, 9), view_degrees=90, evaluations=400
+    )
     assert result.summary["iou"] > 0.4
 
 
@@ -73,15 +121,22 @@ def test_a_mean_background_is_the_mean_and_its_spread() -> None:
 
 
 def test_a_shadow_is_darker_but_has_the_grounds_colour() -> None:
-    still = Still(np.full((1, 4, 3), (80.0, 120.0, 160.0), dtype=np.float32), np.zeros((1, 4), dtype=np.float32))
+    still = Still(
+        np.full((1, 4, 3), (80.0, 120.0, 160.0), dtype=np.float32),
+        np.zeros((1, 4), dtype=np.float32),
+    )
     # the ground; its shadow at 60 %; another colour; far darker than any shadow
-    image = np.array([[[80, 120, 160], [48, 72, 96], [160, 60, 40], [8, 12, 16]]], dtype=np.uint8)
+    image = np.array(
+        [[[80, 120, 160], [48, 72, 96], [160, 60, 40], [8, 12, 16]]], dtype=np.uint8
+    )
     foreground, shadow = still.segment(image)
     assert foreground.tolist() == [[False, False, True, True]]
     assert shadow.tolist() == [[False, True, False, False]]
 
 
-def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_filled() -> None:
+def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_filled() -> (
+    None
+):
     foreground, empty = np.zeros((2, 250, 250), dtype=bool)
     foreground[50:200, 100:140] = True  # the person
     foreground[100:106, 115:121] = False  # a small hole in it
@@ -105,29 +160,59 @@ def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_fil
 def test_the_command_prints_a_summary(filmed: Film, tmp_path: Path) -> None:
     words = ["extract", filmed[0], "--frames", "20:40", "--out"]
     summary = printed(*words, tmp_path / "out")
-    assert (summary["frames"], summary["size"], summary["guesses"]) == (20, [160, 120], [])
-    assert "20 frames" in run(*words, tmp_path / "two", "--width", "80", "--roi", "0,0,160,120").stdout
+    assert (summary["frames"], summary["size"], summary["guesses"]) == (
+        20,
+        [160, 120],
+        [],
+    )
+    assert (
+        "20 frames"
+        in run(*words, tmp_path / "two", "--width", "80", "--roi", "0,0,160,120").stdout
+    )
     assert arrays(tmp_path / "two" / "masks.npz")["masks"].shape == (20, 60, 80)
 
 
 @each(
     ("words", "message"),
     [
-        (["--extraction", "magic"], "segmenter must be one of masks, mean, median, mediapipe, mixture, got 'magic'"),
-        (["--extraction", "mean"], "background must be frames A:B or an image for the method mean, got none"),
-        (["--extraction", "mixture", "--background", "0:5"], "for the method mean only, got '0:5' with mixture"),
-        (["--background", "nothing.png"], "background must be frames A:B or an image, got 'nothing.png'"),
-        (["--set", "mixture.colour=3"], "a setting of mixture must be one of history, threshold, got 'colour'"),
+        (
+            ["--extraction", "magic"],
+            "segmenter must be one of masks, mean, median, mediapipe, mixture, got 'magic'",
+        ),
+        (
+            ["--extraction", "mean"],
+            "background must be frames A:B or an image for the method mean, got none",
+        ),
+        (
+            ["--extraction", "mixture", "--background", "0:5"],
+            "for the method mean only, got '0:5' with mixture",
+        ),
+        (
+            ["--background", "nothing.png"],
+            "background must be frames A:B or an image, got 'nothing.png'",
+        ),
+        (
+            ["--set", "mixture.colour=3"],
+            "a setting of mixture must be one of history, threshold, got 'colour'",
+        ),
         (["--set", "threshold=-1"], "threshold must be above 0, got -1"),
         (["--frames", "90:"], "frames must choose some of the 60 frames, got 90:"),
         (["--roi", "1,2,3"], "expected X,Y,WIDTH,HEIGHT in pixels"),
         (["--roi", "100,0,100,100"], "roi must lie within the video's 160x120 pixels"),
-        (["--ignore", "nothing.png"], "nothing.png: expected an image of what to ignore"),
+        (
+            ["--ignore", "nothing.png"],
+            "nothing.png: expected an image of what to ignore",
+        ),
         (["--width", "3"], "width must lie in 36 to 8192 pixels, got 3"),
-        (["--frames", "0:8", "--background", "0:12"], "expected a person who moves before a still background"),
+        (
+            ["--frames", "0:8", "--background", "0:12"],
+            "expected a person who moves before a still background",
+        ),
     ],
 )
-def test_a_mistake_leaves_one_line(filmed: Film, tmp_path: Path, words: list[str], message: str) -> None:
+def test_a_mistake_leaves_one_line(
+    filmed: Film, tmp_path: Path, words: list[str], message: str
+) -> None:
     assert message in error_of("extract", filmed[0], "--out", tmp_path / "out", *words)
     assert not list(tmp_path.iterdir())
 
@@ -140,9 +225,13 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
         ("text.mp4", "expected a video that OpenCV can read"),
         ("empty.mp4", "expected a video that OpenCV can read"),
     ):
-        assert message in error_of("extract", tmp_path / name, "--out", tmp_path / "out")
+        assert message in error_of(
+            "extract", tmp_path / name, "--out", tmp_path / "out"
+        )
     (tmp_path / "out").mkdir()
-    assert "got one that exists" in error_of("extract", tmp_path / "text.mp4", "--out", tmp_path / "out")
+    assert "got one that exists" in error_of(
+        "extract", tmp_path / "text.mp4", "--out", tmp_path / "out"
+    )
 
 
 def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
@@ -151,15 +240,26 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     masks = truth()[10:22]
     masks[6] = NOBODY
     path = stack(tmp_path / "a.npz", masks, usable=usable)
-    result = posefit.track(path, method="sapso", view_degrees=90, evaluations=400, smooth=False, out=tmp_path / "out")
-    assert [result.summary[name] for name in ("frames", "held_frames", "evaluations")] == [12, 3, 9 * 400]
+    result = posefit.track(
+        path,
+        method="sapso",
+        view_degrees=90,
+        evaluations=400,
+        smooth=False,
+        out=tmp_path / "out",
+    )
+    assert [
+        result.summary[name] for name in ("frames", "held_frames", "evaluations")
+    ] == [12, 3, 9 * 400]
     assert result.table["usable"].tolist() == usable.astype(float).tolist()
     poses = result.motion.poses
     np.testing.assert_array_equal(poses[5], poses[4])
     np.testing.assert_array_equal(poses[6], poses[4])
     assert (poses[7] != poses[6]).any()
     assert result.summary["iou"] == pytest.approx(result.table["iou"][usable].mean())
-    carried = posefit.track(path, method="annealed", view_degrees=90, evaluations=400).summary
+    carried = posefit.track(
+        path, method="annealed", view_degrees=90, evaluations=400
+    ).summary
     assert carried["evaluations"] == 9 * 400
 
 
@@ -170,24 +270,37 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
             {"valid": np.ones((12, 5, 5), dtype=bool)},
             r"valid must have the masks' shape \(12, 120, 160\), got \(12, 5",
         ),
-        ({"usable": np.ones(5, dtype=bool)}, r"usable must be 12 booleans, got \(5,\) bool"),
+        (
+            {"usable": np.ones(5, dtype=bool)},
+            r"usable must be 12 booleans, got \(5,\) bool",
+        ),
         ({"usable": np.ones(12)}, r"usable must be 12 booleans, got \(12,\) float64"),
-        ({"usable": np.zeros(12, dtype=bool)}, "expected a frame that is usable, got none from 0 to 12"),
+        (
+            {"usable": np.zeros(12, dtype=bool)},
+            "expected a frame that is usable, got none from 0 to 12",
+        ),
         ({"fps": np.array(0.0)}, "fps must be a number up to 1000, got 0"),
     ],
 )
-def test_masks_that_contradict_themselves_are_named(tmp_path: Path, more: dict[str, Any], message: str) -> None:
+def test_masks_that_contradict_themselves_are_named(
+    tmp_path: Path, more: dict[str, Any], message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         posefit.track(stack(tmp_path / "a.npz", truth()[10:22], **more))
 
 
 def frame_numbers(video: Video, *chosen: Any) -> list[int]:
     """Return the numbers of the frames, which are as grey as their number says."""
-    return [round(float(image.mean()) / 20.0) for image in video.frames(*(chosen or (0, None)), video.size)]
+    return [
+        round(float(image.mean()) / 20.0)
+        for image in video.frames(*(chosen or (0, None)), video.size)
+    ]
 
 
 def grey(path: Path, milliseconds: list[int]) -> Video:
-    images = [np.full((48, 64, 3), 20 * k, dtype=np.uint8) for k in range(len(milliseconds))]
+    images = [
+        np.full((48, 64, 3), 20 * k, dtype=np.uint8) for k in range(len(milliseconds))
+    ]
     return Video.of(write_matroska(path, images, milliseconds))
 
 
@@ -203,12 +316,19 @@ def test_a_moment_that_was_not_filmed_shows_the_nearest_frame(tmp_path: Path) ->
     assert [k for k in range(12) if not video.is_filmed(k)] == [4, 7, 8]
     (warning,) = video.warnings
     assert "its frames come at uneven times; it is sampled 30" in warning
-    assert "so that 3 of 12 frames stand for moments without a filmed one, and are held" in warning
+    assert (
+        "so that 3 of 12 frames stand for moments without a filmed one, and are held"
+        in warning
+    )
 
 
 def test_even_times_leave_a_video_as_it_was(tmp_path: Path) -> None:
     # rounded, and by a telephone's clock
-    for milliseconds in ([0, 33, 67, 100, 133, 167], [0, 35, 64, 103, 131, 168], [0, 40, 80, 120, 160, 200]):
+    for milliseconds in (
+        [0, 33, 67, 100, 133, 167],
+        [0, 35, 64, 103, 131, 168],
+        [0, 40, 80, 120, 160, 200],
+    ):
         video = grey(tmp_path / "a.mkv", milliseconds)
         assert frame_numbers(video) == [0, 1, 2, 3, 4, 5]
         assert video.warnings == []
@@ -220,7 +340,9 @@ def test_a_very_short_frame_does_not_make_thousands(tmp_path: Path) -> None:
     assert video.count() <= 4 * 7
 
 
-def test_an_unstated_rate_is_guessed_aloud(filmed: Film, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unstated_rate_is_guessed_aloud(
+    filmed: Film, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     opened = cv2.VideoCapture
 
     class Timeless:
@@ -228,21 +350,30 @@ def test_an_unstated_rate_is_guessed_aloud(filmed: Film, tmp_path: Path, monkeyp
             self.file = opened(name)
 
         def get(self, key: int) -> float:
-            return 0.0 if key in (cv2.CAP_PROP_FPS, cv2.CAP_PROP_POS_MSEC) else float(self.file.get(key))
+            return (
+                0.0
+                if key in (cv2.CAP_PROP_FPS, cv2.CAP_PROP_POS_MSEC)
+                else float(self.file.get(key))
+            )
 
         def __getattr__(self, name: str) -> Any:
             return getattr(self.file, name)
 
     monkeypatch.setattr(cv2, "VideoCapture", Timeless)
     result = run("extract", filmed[0], "--frames", "20:40", "--out", tmp_path / "out")
-    assert f"guessed: {filmed[0]}: 30 frames a second, which the file does not state" in result.stderr
+    assert (
+        f"guessed: {filmed[0]}: 30 frames a second, which the file does not state"
+        in result.stderr
+    )
     assert arrays(tmp_path / "out" / "masks.npz")["fps"] == 30.0
 
 
 def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: Film, tmp_path: Path) -> None:
     pictures = list(Video.of(filmed[0]).frames(0, None, SIZE))
     taken = [k for k in range(len(pictures)) if k % 10 not in (3, 4, 7)]
-    path = write_matroska(tmp_path / "a.mkv", [pictures[k] for k in taken], [40 * k for k in taken])
+    path = write_matroska(
+        tmp_path / "a.mkv", [pictures[k] for k in taken], [40 * k for k in taken]
+    )
     out = tmp_path / "out"
     result = run("extract", path, "--out", out, "--frames", f"{EMPTY + 6}:{EMPTY + 40}")
     assert result.exit_code == 0, result.stderr
@@ -253,20 +384,41 @@ def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: Film, tmp_path: Path) -
     held = np.array([k % 10 in (3, 4, 7) for k in range(EMPTY + 6, EMPTY + 40)])
     assert not stored["usable"][held].any()
     assert stored["usable"][~held].mean() > 0.8
-    middles = np.array([np.flatnonzero(mask.any(axis=0)).mean() for mask in stored["masks"]])
-    true = np.array([np.flatnonzero(mask.any(axis=0)).mean() for mask in filmed[1][EMPTY + 6 : EMPTY + 40]])
-    assert np.abs(middles - true)[stored["usable"]].max() < 3.0  # pixels: the frame at its own time
+    middles = np.array(
+        [np.flatnonzero(mask.any(axis=0)).mean() for mask in stored["masks"]]
+    )
+    true = np.array(
+        [
+            np.flatnonzero(mask.any(axis=0)).mean()
+            for mask in filmed[1][EMPTY + 6 : EMPTY + 40]
+        ]
+    )
+    # pixels: the frame at its own time
+    assert np.abs(middles - true)[stored["usable"]].max() < 3.0
 
 
-def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_there(filmed: Film, segmenter: Any) -> None:
+def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_there(
+    filmed: Film, segmenter: Any
+) -> None:
     segmenter("box", Box)
-    masks = Segmentation(Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)).read().masks
+    masks = (
+        Segmentation(
+            Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)
+        )
+        .read()
+        .masks
+    )
     assert masks.landmarks is not None
     assert masks.landmarks.shape == (3, len(JOINTS), 3)
     assert not masks.landmarks[0, :, 2].any()
     np.testing.assert_array_equal(masks.landmarks[1:, 0], [[25.0, 17.0, 0.5]] * 2)
-    rows, columns = (np.flatnonzero(masks.silhouette(0).mask.any(axis=axis)) for axis in (1, 0))
-    assert (rows[0], columns[0], columns[-1]) == (30, 25, 44)  # of a part 120 pixels wide a sixth is marked
+    rows, columns = (
+        np.flatnonzero(masks.silhouette(0).mask.any(axis=axis)) for axis in (1, 0)
+    )
+    # of a part 120 pixels wide a sixth is marked
+    assert (rows[0], columns[0], columns[-1]) == (30, 25, 44)
     how = Extraction("box", settings={"wrong": "landmarks"})
-    with pytest.raises(BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"):
+    with pytest.raises(
+        BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"
+    ):
         Segmentation(Video.of(filmed[0]), how, (0, 3)).read()

@@ -24,7 +24,18 @@ from tests.cases import each
 from tests.commands import error_of, run
 from tests.footage.conftest import ALL, NOBODY, SIZE, camera, stack
 
-QUICK = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
+QUICK = [
+    "--method",
+    "@loose",
+    "--evaluations",
+    "200",
+    "--restarts",
+    "1",
+    "--body-frames",
+    "0",
+    "--view-degrees",
+    "90",
+]
 
 
 def folder(path: Path, images: Sequence[Any], suffix: str = ".png") -> Path:
@@ -38,7 +49,9 @@ def read(path: Path, label: int | None = None) -> tuple[PackedMasks, list[str]]:
     return cleaned(read_masks(path, ALL, label), path, holes=0.0)
 
 
-def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> tuple[PackedMasks, list[str]]:
+def check(
+    path: Path, wanted: Sequence[Any], label: int | None = None
+) -> tuple[PackedMasks, list[str]]:
     masks, warnings = read(path, label)
     assert len(masks) == len(wanted)
     for k, mask in enumerate(wanted):
@@ -46,16 +59,22 @@ def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> tuple[
     return masks, warnings
 
 
-def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]], **how: Any) -> None:
+def indexed(
+    path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]], **how: Any
+) -> None:
     """Write a PNG with a palette, as tools for annotation do; OpenCV writes none."""
-    image = images.Image.frombytes("P", numbers.shape[::-1], numbers.astype(np.uint8).tobytes())
+    image = images.Image.frombytes(
+        "P", numbers.shape[::-1], numbers.astype(np.uint8).tobytes()
+    )
     image.putpalette([value for colour in colours for value in colour])
     image.save(path, **how)
 
 
 @each("kind", [np.uint8, np.uint16])
 @each("values", [(0, 1), (0, 255), (0, 38), (64, 192)])
-def test_any_two_values_are_a_mask(walk: list[Any], tmp_path: Path, kind: Any, values: tuple[int, int]) -> None:
+def test_any_two_values_are_a_mask(
+    walk: list[Any], tmp_path: Path, kind: Any, values: tuple[int, int]
+) -> None:
     images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
     assert check(folder(tmp_path / "a", images), walk)[1] == []
     check(stack(tmp_path / "a.npz", images), walk)
@@ -66,21 +85,39 @@ def softened(mask: Any) -> Any:
     return cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) * 0.97
 
 
-@each(("kind", "full"), [(np.uint8, 255), (np.uint16, 65_535), (np.float32, 1.0), (np.float64, 255)])
-def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path, kind: Any, full: float) -> None:
+@each(
+    ("kind", "full"),
+    [(np.uint8, 255), (np.uint16, 65_535), (np.float32, 1.0), (np.float64, 255)],
+)
+def test_soft_masks_are_cut_half_way(
+    walk: list[Any], tmp_path: Path, kind: Any, full: float
+) -> None:
     soft = [(softened(mask) * full).astype(kind) for mask in walk]
-    soft[2] = (soft[2] * 0.3).astype(kind)  # no person for the network; the frame's own scale would show one
+    # no person for the network; the frame's own scale would show one
+    soft[2] = (soft[2] * 0.3).astype(kind)
     wanted = [mask > (full // 2 if full > 1 else 0.5) for mask in soft]
     assert not check(stack(tmp_path / "a.npz", soft), wanted)[0].usable[2]
     if np.issubdtype(kind, np.integer):
         check(folder(tmp_path / "a", soft), wanted)
 
 
-def test_the_alpha_of_a_person_cut_out_is_the_mask(walk: list[Any], tmp_path: Path) -> None:
+def test_the_alpha_of_a_person_cut_out_is_the_mask(
+    walk: list[Any], tmp_path: Path
+) -> None:
     rng = np.random.default_rng(0)
-    cut = [np.dstack([rng.integers(0, 255, (*mask.shape, 3)), 255 * softened(mask)]).astype(np.uint8) for mask in walk]
-    assert check(folder(tmp_path / "a", cut), [one[..., 3] > 127 for one in cut])[1] == []
-    opaque = [np.dstack([*[255 * mask] * 3, np.full(mask.shape, 255)]).astype(np.uint8) for mask in walk]
+    cut = [
+        np.dstack(
+            [rng.integers(0, 255, (*mask.shape, 3)), 255 * softened(mask)]
+        ).astype(np.uint8)
+        for mask in walk
+    ]
+    assert (
+        check(folder(tmp_path / "a", cut), [one[..., 3] > 127 for one in cut])[1] == []
+    )
+    opaque = [
+        np.dstack([*[255 * mask] * 3, np.full(mask.shape, 255)]).astype(np.uint8)
+        for mask in walk
+    ]
     check(folder(tmp_path / "b", opaque), walk)
 
 
@@ -100,8 +137,12 @@ def labelled(walk: list[Any]) -> list[Any]:
 
 
 @each("kind", ["palette", "grey", "colours", "npz"])
-def test_one_of_several_labels_is_chosen(walk: list[Any], tmp_path: Path, kind: str) -> None:
-    images, path, label = labelled(walk), tmp_path / "masks", 2
+def test_one_of_several_labels_is_chosen(
+    walk: list[Any], tmp_path: Path, kind: str
+) -> None:
+    images = labelled(walk)
+    path = tmp_path / "masks"
+    label = 2
     if kind == "palette":
         path.mkdir()
         for k, numbers in enumerate(images):
@@ -110,7 +151,13 @@ def test_one_of_several_labels_is_chosen(walk: list[Any], tmp_path: Path, kind: 
         folder(path, images)
     elif kind == "colours":
         label = 0x008000
-        folder(path, [np.array(PALETTE, dtype=np.uint8)[numbers][..., ::-1] for numbers in images])
+        folder(
+            path,
+            [
+                np.array(PALETTE, dtype=np.uint8)[numbers][..., ::-1]
+                for numbers in images
+            ],
+        )
     else:
         path = stack(tmp_path / "masks.npz", np.stack(images).astype(np.int32))
     check(path, walk, label)
@@ -123,18 +170,30 @@ def test_one_of_several_labels_is_chosen(walk: list[Any], tmp_path: Path, kind: 
     assert "label must be one of those that are there, " in error
     assert error.endswith(", got 9")
     assert not (tmp_path / "out").exists()
-    assert run("track", path, "--out", tmp_path / "out", "--label", hex(label), *QUICK).exit_code == 0
+    assert (
+        run(
+            "track", path, "--out", tmp_path / "out", "--label", hex(label), *QUICK
+        ).exit_code
+        == 0
+    )
 
 
-def test_a_palette_of_one_colour_and_one_of_greys_need_no_label(walk: list[Any], tmp_path: Path) -> None:
-    for name, colours, value in (("one", PALETTE, 1), ("grey", [(k, k, k) for k in range(256)], 255)):
+def test_a_palette_of_one_colour_and_one_of_greys_need_no_label(
+    walk: list[Any], tmp_path: Path
+) -> None:
+    for name, colours, value in (
+        ("one", PALETTE, 1),
+        ("grey", [(k, k, k) for k in range(256)], 255),
+    ):
         (tmp_path / name).mkdir()
         for k, mask in enumerate(walk):
             indexed(tmp_path / name / f"{k}.png", np.where(mask, value, 0), colours)
         check(tmp_path / name, walk)
 
 
-def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path) -> None:
+def test_an_edge_between_two_values_is_no_label(
+    walk: list[Any], tmp_path: Path
+) -> None:
     images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
     large = [cv2.resize(one, (480, 360), interpolation=0) for one in images]
     smooth = [cv2.resize(one, SIZE, interpolation=cv2.INTER_AREA) for one in large]
@@ -145,11 +204,26 @@ def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path)
 @each(
     ("words", "message"),
     [
-        (["MASKS", "--label", "person"], "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'"),
-        (["MASKS", "--holes", "2"], "holes must lie in 0 to 1, a share of the person's area, got 2.0"),
-        (["walk", "--label", "1"], "label must be given for masks only, got 1 for a motion"),
-        (["SOFT", "--label", "1"], "label must be given for masks whose values are labels, PNG or whole numbers"),
-        (["PHOTOS"], "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel"),
+        (
+            ["MASKS", "--label", "person"],
+            "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'",
+        ),
+        (
+            ["MASKS", "--holes", "2"],
+            "holes must lie in 0 to 1, a share of the person's area, got 2.0",
+        ),
+        (
+            ["walk", "--label", "1"],
+            "label must be given for masks only, got 1 for a motion",
+        ),
+        (
+            ["SOFT", "--label", "1"],
+            "label must be given for masks whose values are labels, PNG or whole numbers",
+        ),
+        (
+            ["PHOTOS"],
+            "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel",
+        ),
         (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
         (
             ["EMPTY"],
@@ -158,21 +232,32 @@ def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path)
         (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
     ],
 )
-def test_a_mistake_with_masks_leaves_one_line(walk: list[Any], tmp_path: Path, words: list[str], message: str) -> None:
+def test_a_mistake_with_masks_leaves_one_line(
+    walk: list[Any], tmp_path: Path, words: list[str], message: str
+) -> None:
     inputs = tmp_path / "in"
     inputs.mkdir()
     images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
-    photo = [np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)]
+    photo = [
+        np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)
+    ]
     folders = {
         "MASKS": folder(inputs / "masks", images),
         "SOFT": folder(inputs / "soft", images, ".jpg"),
         "PHOTOS": folder(inputs / "photos", photo, ".jpg"),
         "PICTURES": folder(inputs / "pictures", photo),
         "EMPTY": folder(inputs / "empty", [np.zeros_like(image) for image in images]),
-        "SIZES": folder(inputs / "sizes", [images[0], images[1][::2, ::2], *images[2:]]),
+        "SIZES": folder(
+            inputs / "sizes", [images[0], images[1][::2, ::2], *images[2:]]
+        ),
     }
     words = [str(folders.get(word, word)) for word in words]
-    assert message in run("track", *words, "--out", tmp_path / "out", *QUICK).stderr.splitlines()[-1]
+    assert (
+        message
+        in run("track", *words, "--out", tmp_path / "out", *QUICK).stderr.splitlines()[
+            -1
+        ]
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["in"]
 
 
@@ -180,15 +265,24 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
     path = tmp_path / "a"
     path.mkdir()
     for k in (2, 10, 1, 100):
-        cv2.imwrite(str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8))
+        cv2.imwrite(
+            str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8)
+        )
     (path / "._mask1.png").write_bytes(b"what a Mac puts beside it")
-    assert [Path(name).name for name in read_masks(path, ALL).names] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
+    assert [Path(name).name for name in read_masks(path, ALL).names] == [
+        f"mask{k}.png" for k in (1, 2, 10, 100)
+    ]
 
 
-def test_inverted_masks_are_turned_round_with_a_warning(walk: list[Any], tmp_path: Path) -> None:
+def test_inverted_masks_are_turned_round_with_a_warning(
+    walk: list[Any], tmp_path: Path
+) -> None:
     path = stack(tmp_path / "a.npz", [~mask for mask in walk])
     (warning,) = check(path, walk)[1]
-    assert warning == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
+    assert (
+        warning
+        == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
+    )
 
 
 def test_a_person_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:
@@ -197,42 +291,58 @@ def test_a_person_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:
     assert check(stack(tmp_path / "a.npz", [near] * 3), [near] * 3)[1] == []
 
 
-def test_empty_and_full_masks_are_held_and_counted(walk: list[Any], tmp_path: Path) -> None:
+def test_empty_and_full_masks_are_held_and_counted(
+    walk: list[Any], tmp_path: Path
+) -> None:
     masks = [NOBODY, walk[1], walk[2], NOBODY, ~NOBODY, walk[5]]
     path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in masks])
     packed, _ = check(path, masks)
     assert packed.usable.tolist() == [False, True, True, False, False, True]
     result = run("track", path, "--out", tmp_path / "out", *QUICK)
     assert result.exit_code == 0, result.stderr
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["held_frames"] == 3
+    assert (
+        json.loads((tmp_path / "out" / "summary.json").read_text())["held_frames"] == 3
+    )
 
 
 def blob(*middles: tuple[int, int], wide: int = 16, tall: int = 60) -> Any:
     mask = np.zeros((120, 200), dtype=bool)
     for x, y in middles:
-        mask[max(0, y - tall // 2) : y + tall // 2, max(0, x - wide // 2) : x + wide // 2] = True
+        mask[
+            max(0, y - tall // 2) : y + tall // 2, max(0, x - wide // 2) : x + wide // 2
+        ] = True
     return mask
 
 
 def test_a_frame_that_the_edge_leaves_little_of_is_not_usable(tmp_path: Path) -> None:
     masks = np.zeros((5, 40, 60), dtype=bool)
-    for k, left in enumerate((30, 40, 52, 55, 57)):  # ten columns wide: 10, 10, 8, 5 and 3 of them in the picture
+    # ten columns wide: 10, 10, 8, 5 and 3 of them in the picture
+    for k, left in enumerate((30, 40, 52, 55, 57)):
         masks[k, 10:34, left : left + 10] = True
     read_, _ = read(folder(tmp_path / "out", 255 * masks.astype(np.uint8)))
     assert read_.usable.tolist() == [True, True, True, True, False]
-    bust = np.pad(masks[:, 10:34], ((0, 0), (16, 0), (0, 0)))  # cut by the lower edge in all of them
+    # cut by the lower edge in all of them
+    bust = np.pad(masks[:, 10:34], ((0, 0), (16, 0), (0, 0)))
     read_, _ = read(folder(tmp_path / "bust", 255 * bust.astype(np.uint8)))
     assert read_.usable.all()
 
 
-def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Path) -> None:
-    walker, stander = [(40 + 4 * k, 60) for k in range(25)], (100, 58)
-    masks = [blob(place, tall=64) | blob(stander) for place in walker]  # they touch for a while
+def test_of_several_people_the_nearest_to_the_last_one_is_followed(
+    tmp_path: Path,
+) -> None:
+    walker = [(40 + 4 * k, 60) for k in range(25)]
+    stander = (100, 58)
+    # they touch for a while
+    masks = [blob(place, tall=64) | blob(stander) for place in walker]
     followed, (warning,) = read(stack(tmp_path / "a.npz", masks))
     for k in (*range(10), *range(20, 25)):
-        np.testing.assert_array_equal(followed.silhouette(k).mask, blob(walker[k], tall=64), err_msg=str(k))
+        np.testing.assert_array_equal(
+            followed.silhouette(k).mask, blob(walker[k], tall=64), err_msg=str(k)
+        )
     places = "1 at 40,60 in a.npz[0]; 2 at 100,58 in a.npz[0]"
-    assert warning.endswith(f": 2 people: {places}; person 1 is followed, --person N another")
+    assert warning.endswith(
+        f": 2 people: {places}; person 1 is followed, --person N another"
+    )
     first = followed.silhouette(0)
     assert not first.valid[blob(stander)].any()  # the other's pixels are unknown
     assert first.valid[~blob(stander)].all()
@@ -240,14 +350,26 @@ def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Pat
     np.testing.assert_array_equal(hidden.valid, hidden.mask | ~masks[15])
 
 
-@each(("words", "followed"), [((), (180, 60)), (("2",), (40, 60)), (("38,70",), (40, 60)), (("170,60",), (180, 60))])
+@each(
+    ("words", "followed"),
+    [
+        ((), (180, 60)),
+        (("2",), (40, 60)),
+        (("38,70",), (40, 60)),
+        (("170,60",), (180, 60)),
+    ],
+)
 def test_who_is_in_the_film_longest_is_followed_or_who_is_chosen(
     words: Sequence[str], followed: tuple[int, int], tmp_path: Path
 ) -> None:
     masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60))] * 2
     path = stack(tmp_path / "a.npz", masks)
-    clean, _ = cleaned(read_masks(path, ALL), path, choice=text_person(*words) if words else None)
-    np.testing.assert_array_equal(clean.silhouette(0).mask, blob(followed, tall=64 if followed[0] == 40 else 60))
+    clean, _ = cleaned(
+        read_masks(path, ALL), path, choice=text_person(*words) if words else None
+    )
+    np.testing.assert_array_equal(
+        clean.silhouette(0).mask, blob(followed, tall=64 if followed[0] == 40 else 60)
+    )
     assert clean.usable.tolist() == [True] * 3 + [followed[0] == 180] * 2
 
 
@@ -256,14 +378,17 @@ def test_nobody_of_a_number_is_one_line(tmp_path: Path) -> None:
     path = stack(tmp_path / "a.npz", masks)
     error = error_of("track", path, "--person", "3", *QUICK)
     assert "person must be 1 to 2, as many people as there are, got 3" in error
-    assert "person must be given for footage only" in error_of("track", "walk", "--person", "2")
+    assert "person must be given for footage only" in error_of(
+        "track", "walk", "--person", "2"
+    )
     for text in ("left", "1,2,3"):
         words = f"expected a number such as 2, or X,Y in pixels, got '{text}'"
         assert words in error_of("track", path, "--person", text)
 
 
 def test_a_person_in_pieces_is_one_and_specks_are_none(tmp_path: Path) -> None:
-    tree, table = blob((60, 60)), blob((60, 60))
+    tree = blob((60, 60))
+    table = blob((60, 60))
     tree[:, 59:61] = False
     table[50:62] = False
     speck = blob((60, 60)) | blob((150, 30), wide=6, tall=6)
@@ -272,7 +397,10 @@ def test_a_person_in_pieces_is_one_and_specks_are_none(tmp_path: Path) -> None:
     known = np.ones_like(tree)
     hidden = blob((60, 60), wide=60)
     known[:, 45:75] = False
-    check(stack(tmp_path / "b.npz", [hidden & known] * 3, valid=[known] * 3), [hidden & known] * 3)
+    check(
+        stack(tmp_path / "b.npz", [hidden & known] * 3, valid=[known] * 3),
+        [hidden & known] * 3,
+    )
 
 
 def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
@@ -291,13 +419,23 @@ def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
     np.testing.assert_array_equal(filled(1.0), mask)
 
 
-def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[Any], tmp_path: Path) -> None:
+def test_views_of_other_frames_or_another_rate_are_refused_by_name(
+    walk: list[Any], tmp_path: Path
+) -> None:
     cameras = [camera(np.pi / 2), camera(0.6)]
     files = (("a", 6, 30.0), ("b", 4, 30.0), ("c", 6, 60.0))
-    a, b, c = (stack(tmp_path / f"{name}.npz", walk[:count], fps=fps) for name, count, fps in files)
-    with pytest.raises(ValueError, match=rf"views must have the same frames, got 6 of {a} and 4 of {b}"):
+    a, b, c = (
+        stack(tmp_path / f"{name}.npz", walk[:count], fps=fps)
+        for name, count, fps in files
+    )
+    with pytest.raises(
+        ValueError, match=rf"views must have the same frames, got 6 of {a} and 4 of {b}"
+    ):
         scene_of([a, b], camera=cameras)
-    with pytest.raises(ValueError, match=rf"views must have one frame rate.*, got 30 of {a} and 60 of {c}"):
+    with pytest.raises(
+        ValueError,
+        match=rf"views must have one frame rate.*, got 30 of {a} and 60 of {c}",
+    ):
         scene_of([a, c], camera=cameras)
 
 
@@ -306,35 +444,68 @@ def test_views_of_videos_end_with_the_shortest(walk: list[Any], tmp_path: Path) 
     for name, count in (("a", 6), ("b", 4)):
         masks, _ = read(stack(tmp_path / f"{name}.npz", walk[:count]))
         views.append(CameraView(masks, [], f"{name}.mp4", filmed=SIZE))
-    scene = combined(views, "a", body_of(None, None)[0], [camera(np.pi / 2), camera(np.pi / 2)], None, None)
+    scene = combined(
+        views,
+        "a",
+        body_of(None, None)[0],
+        [camera(np.pi / 2), camera(np.pi / 2)],
+        None,
+        None,
+    )
     assert len(scene.observations) == 4
-    assert scene.warnings == ["the videos differ in length; the first 4 frames are used of a.mp4 6, b.mp4 4"]
+    assert scene.warnings == [
+        "the videos differ in length; the first 4 frames are used of a.mp4 6, b.mp4 4"
+    ]
 
 
-def test_masks_beyond_the_memory_are_refused(walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_masks_beyond_the_memory_are_refused(
+    walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = stack(tmp_path / "a.npz", walk)
-    monkeypatch.setattr("posefit.footage.masks.allowed_bytes", lambda: 6 * SIZE[0] * SIZE[1] // 8 - 1)
-    with pytest.raises(ValueError, match="frames must be so few that their masks fit in .* got 6 of 160x120 pixels"):
+    monkeypatch.setattr(
+        "posefit.footage.masks.allowed_bytes", lambda: 6 * SIZE[0] * SIZE[1] // 8 - 1
+    )
+    with pytest.raises(
+        ValueError,
+        match="frames must be so few that their masks fit in .* got 6 of 160x120 pixels",
+    ):
         read(path)
 
 
 def chunk(kind: bytes, content: bytes) -> bytes:
     """Return a part of a PNG file."""
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+    return (
+        struct.pack(">I", len(content))
+        + kind
+        + content
+        + struct.pack(">I", zlib.crc32(kind + content))
+    )
 
 
 def bomb(path: Path, side: int) -> None:
     """Write a PNG file whose header states a size and whose pixels are not there."""
     head = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
-    parts = chunk(b"IHDR", head), chunk(b"IDAT", zlib.compress(bytes(100))), chunk(b"IEND", b"")
+    parts = (
+        chunk(b"IHDR", head),
+        chunk(b"IDAT", zlib.compress(bytes(100))),
+        chunk(b"IEND", b""),
+    )
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
 
 
-def test_a_picture_of_too_many_pixels_is_never_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_picture_of_too_many_pixels_is_never_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(images.Image.Image, "convert", None)
-    for side, came in ((8_000, "8000x8000"), (12_000, "12000x12000"), (30_000, "far more")):
+    for side, came in (
+        (8_000, "8000x8000"),
+        (12_000, "12000x12000"),
+        (30_000, "far more"),
+    ):
         bomb(tmp_path / "a.png", side)
-        with pytest.raises(ValueError, match=f"a.png: expected at most 50 million pixels, got {came}"):
+        with pytest.raises(
+            ValueError, match=f"a.png: expected at most 50 million pixels, got {came}"
+        ):
             read_masks(tmp_path, ALL)
 
 
@@ -348,24 +519,40 @@ def test_a_chunk_that_says_it_has_more_than_the_file_is_refused(tmp_path: Path) 
 def tiff(fields: Sequence[tuple[int, int, int]]) -> bytes:
     """Return a TIFF file of 8 bits a pixel, all 0, that has these fields (tag, type, value) for its size."""
     data = zlib.compress(bytes(10_000))
-    others = [(258, 3, 8), (259, 3, 8), (262, 3, 1), (273, 4, -1), (277, 3, 1), (278, 4, 60_000), (279, 4, len(data))]
+    others = [
+        (258, 3, 8),
+        (259, 3, 8),
+        (262, 3, 1),
+        (273, 4, -1),
+        (277, 3, 1),
+        (278, 4, 60_000),
+        (279, 4, len(data)),
+    ]
     entries = [*fields, *others]
     start = 8 + 2 + 12 * len(entries) + 4
-    packed = b"".join(struct.pack("<HHII", tag, kind, 1, start if value < 0 else value) for tag, kind, value in entries)
+    packed = b"".join(
+        struct.pack("<HHII", tag, kind, 1, start if value < 0 else value)
+        for tag, kind, value in entries
+    )
     return b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed + bytes(4) + data
 
 
 @each(
     ("suffix", "content"),
     [
-        (".tif", tiff([(256, 3, 100), (256, 4, 60_000), (257, 4, 60_000)])),  # a width that stands twice
+        # a width that stands twice
+        (".tif", tiff([(256, 3, 100), (256, 4, 60_000), (257, 4, 60_000)])),
         (".tif", tiff([(256, 4, 60_000), (256, 3, 100), (257, 4, 60_000)])),
-        (".tif", tiff([(256, 16, 60_000), (257, 4, 60_000)])),  # of a type that has eight bytes
-        (".pgm", b"P4\n#x\r60000 60000\n5 5\n" + bytes(1000)),  # a comment that ends at a carriage return
+        # of a type that has eight bytes
+        (".tif", tiff([(256, 16, 60_000), (257, 4, 60_000)])),
+        # a comment that ends at a carriage return
+        (".pgm", b"P4\n#x\r60000 60000\n5 5\n" + bytes(1000)),
         (".pgm", b"P4\n#x\r5 5\n60000 60000\n" + bytes(1000)),
     ],
 )
-def test_no_more_pixels_are_decoded_than_were_counted(tmp_path: Path, suffix: str, content: bytes) -> None:
+def test_no_more_pixels_are_decoded_than_were_counted(
+    tmp_path: Path, suffix: str, content: bytes
+) -> None:
     path = tmp_path / f"a{suffix}"
     path.write_bytes(content)
     try:
@@ -380,23 +567,37 @@ def test_a_palette_is_the_files_own(tmp_path: Path) -> None:
     note = PngInfo()
     note.add_text("a", "PLTE")  # which stands before the palette
     indexed(tmp_path / "a.png", np.eye(9), [(0, 0, 0), (200, 0, 0)], pnginfo=note)
-    np.testing.assert_array_equal(read_masks(tmp_path, ALL).silhouette(0).mask, np.eye(9, dtype=bool))
+    np.testing.assert_array_equal(
+        read_masks(tmp_path, ALL).silhouette(0).mask, np.eye(9, dtype=bool)
+    )
 
 
-def test_masks_that_unpack_to_too_much_are_refused_by_shape(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_masks_that_unpack_to_too_much_are_refused_by_shape(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     masks = np.zeros((4, 20, 30), dtype=np.uint8)
     masks[:, 5:9] = 255
     pictures = folder(tmp_path / "masks", masks)
     np.save(tmp_path / "a.npy", masks)
     np.savez_compressed(tmp_path / "a.npz", masks=masks)
     for path in (pictures, tmp_path / "a.npz", tmp_path / "a.npy"):
-        monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{masks.nbytes / 1e9 - 1e-9:.9f}")
-        with pytest.raises(ValueError, match=f"{path.name}: expected masks that unpack to at most .* GB, got "):
+        monkeypatch.setenv(
+            "POSEFIT_DECODED_GIGABYTES", f"{masks.nbytes / 1e9 - 1e-9:.9f}"
+        )
+        with pytest.raises(
+            ValueError,
+            match=f"{path.name}: expected masks that unpack to at most .* GB, got ",
+        ):
             read_masks(path, ALL)
         monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{masks.nbytes / 1e9:.9f}")
         assert len(read_masks(path, ALL)) == 4
     monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", "lots")
-    with pytest.raises(ValueError, match="POSEFIT_DECODED_GIGABYTES must be a number, got 'lots'"):
+    with pytest.raises(
+        ValueError, match="POSEFIT_DECODED_GIGABYTES must be a number, got 'lots'"
+    ):
         read_masks(pictures, ALL)
-    with pytest.raises(ValueError, match="masks: expected at most 50 million pixels a frame, got 10000x6000"):
+    with pytest.raises(
+        ValueError,
+        match="masks: expected at most 50 million pixels a frame, got 10000x6000",
+    ):
         read_masks(np.broadcast_to(np.False_, (1, 6_000, 10_000)), ALL)

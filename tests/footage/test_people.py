@@ -21,7 +21,8 @@ from posefit.silhouette.mask import Silhouette
 from tests.cases import each
 from tests.footage.conftest import EMPTY, NOBODY, film, iou
 
-SIZE, FRAMES = (160, 120), 60
+SIZE = (160, 120)
+FRAMES = 60
 WALKS = ("walk", "walk-a", "walk-b", "walk-c")
 
 
@@ -29,13 +30,17 @@ def crossing(seed: int) -> Iterator[tuple[Any, list[Any], Any]]:
     """Yield of each frame a picture, and what shows of each of two people who cross, the first as the nearer one."""
     rng = np.random.default_rng(seed)
     camera = posefit.Camera.around(np.array([0.0, 1.0, 0.0]), np.pi / 2, 5.5, SIZE)
-    colours, ways = rng.uniform(10.0, 90.0, (2, 3)), [1.0, -1.0]
+    colours = rng.uniform(10.0, 90.0, (2, 3))
+    ways = [1.0, -1.0]
     motions = []
     for way, depth in zip(ways, (rng.uniform(0.3, 0.8), 0.0), strict=True):
         motion = built_in.motion(str(rng.choice(WALKS)), frames=FRAMES)
-        places, poses = motion.translations.copy(), motion.poses.copy()
+        places = motion.translations.copy()
+        poses = motion.poses.copy()
         places[:, 0] = depth
-        places[:, 2] = way * rng.uniform(0.8, 1.1) * np.linspace(-1.2, 1.2, FRAMES) + rng.uniform(-0.2, 0.2)
+        places[:, 2] = way * rng.uniform(0.8, 1.1) * np.linspace(
+            -1.2, 1.2, FRAMES
+        ) + rng.uniform(-0.2, 0.2)
         poses[:, 0] += 0.0 if way > 0.0 else np.pi
         motions.append(replace(motion, poses=poses, translations=places))
     bodies = [posefit.Body.of(motion.skeleton) for motion in motions]
@@ -51,7 +56,8 @@ def crossing(seed: int) -> Iterator[tuple[Any, list[Any], Any]]:
 
 @each("seed", range(10))
 def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) -> None:
-    people, true = People(30.0), []
+    people = People(30.0)
+    true = []
     for image, shown, together in crossing(seed):
         people.add(people_in(Silhouette.of(together)) if together.any() else [], image)
         true.append(shown)
@@ -59,7 +65,9 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     shares = []
     for k, shown in enumerate(true):
         mask, valid = planes_of(followed, other, k, np.ones(SIZE[::-1], dtype=bool))
-        shares.append([float((mask & part).sum()) / max(1, mask.sum()) for part in shown])
+        shares.append(
+            [float((mask & part).sum()) / max(1, mask.sum()) for part in shown]
+        )
         outside = ~(shown[0] | shown[1])
         assert valid[outside].all()
         assert not mask[outside].any()
@@ -81,7 +89,11 @@ class GoesOver:
     over = EMPTY + 20
 
     def __init__(self, footage: object) -> None:
-        self.pairs, self.landmarks, self.facing = enumerate(pairs()), np.ones((len(JOINTS), 3)), 0.5
+        self.pairs, self.landmarks, self.facing = (
+            enumerate(pairs()),
+            np.ones((len(JOINTS), 3)),
+            0.5,
+        )
 
     def segment(self, image: Any) -> tuple[Any, Any]:
         k, pair = next(self.pairs)
@@ -103,18 +115,32 @@ class Prefers(GoesOver):
 @each("factory", [GoesOver, Prefers])
 @pytest.mark.parametrize(("person", "followed"), [(1, 0), (2, 1), (None, None)])
 def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followed(
-    tmp_path: Path, segmenter: Callable[..., None], factory: Any, person: int | None, followed: int | None
+    tmp_path: Path,
+    segmenter: Callable[..., None],
+    factory: Any,
+    person: int | None,
+    followed: int | None,
 ) -> None:
     if followed is None:  # the first, unless the segmenter shows mostly the second
         followed = int(factory is GoesOver)
-    video, frames = Video.of(film(tmp_path / "two.avi", *zip(*pairs(), strict=True))), np.arange(len(pairs()))
+    video = Video.of(film(tmp_path / "two.avi", *zip(*pairs(), strict=True)))
+    frames = np.arange(len(pairs()))
     segmenter("one", factory, still_background=False)
-    alone, among = Extraction("one", person=person), Extraction(background=f"0:{EMPTY}", person=person)
+    alone = Extraction("one", person=person)
+    among = Extraction(background=f"0:{EMPTY}", person=person)
     masks = Segmentation(video, alone, (None, None), among).read().masks
-    shares = np.array([[iou(masks.silhouette(k).mask, each) for each in pair] for k, pair in enumerate(pairs())])
-    assert (shares[masks.usable, followed] < shares[masks.usable, 1 - followed]).mean() <= 0.02
+    shares = np.array(
+        [
+            [iou(masks.silhouette(k).mask, each) for each in pair]
+            for k, pair in enumerate(pairs())
+        ]
+    )
+    assert (
+        shares[masks.usable, followed] < shares[masks.usable, 1 - followed]
+    ).mean() <= 0.02
     assert masks.landmarks is not None
-    given, right = masks.landmarks[:, 0, 2] > 0.0, frames >= EMPTY
+    given = masks.landmarks[:, 0, 2] > 0.0
+    right = frames >= EMPTY
     if factory is GoesOver:
         right &= (frames >= GoesOver.over) == followed
     assert not given[~right].any()
@@ -122,35 +148,70 @@ def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followe
     assert np.median(shares[given, followed]) > 0.8
 
 
-def test_the_person_of_a_mask_is_whom_it_covers_or_else_that_of_the_mask_before() -> None:
-    people, sides = People(30.0), np.zeros((3, *SIZE[::-1]), dtype=bool)
+def test_the_person_of_a_mask_is_whom_it_covers_or_else_that_of_the_mask_before() -> (
+    None
+):
+    people = People(30.0)
+    sides = np.zeros((3, *SIZE[::-1]), dtype=bool)
     sides[0, 20:100, 20:50] = sides[1, 30:100, 115:145] = sides[2, 20:100, 70:90] = True
     left, right, beside = sides
     for k in range(12):
         people.add([right] if k in (0, 2) else [left] if k == 5 else [left, right])
-    masks = [beside, left, beside, right, left | right, beside, np.zeros_like(left), right | beside, beside]
+    masks = [
+        beside,
+        left,
+        beside,
+        right,
+        left | right,
+        beside,
+        np.zeros_like(left),
+        right | beside,
+        beside,
+    ]
     # the last one shows somebody else: the one before is elsewhere
-    assert person_indices(people.persons(), masks) == [0, 0, 0, 1, None, 1, None, 1, None]
+    assert person_indices(people.persons(), masks) == [
+        0,
+        0,
+        0,
+        1,
+        None,
+        1,
+        None,
+        1,
+        None,
+    ]
     assert person_indices(people.persons(), [beside] * 2) == [None] * 2
-    assert person_indices(people.persons(), [left, left | right, left | right]) == [None] * 3  # they are parts of one
+    # they are parts of one
+    assert (
+        person_indices(people.persons(), [left, left | right, left | right])
+        == [None] * 3
+    )
 
 
 def test_parts_that_take_turns_are_no_time_apart() -> None:
-    people, sides = People(30.0), np.zeros((2, *SIZE[::-1]), dtype=bool)
+    people = People(30.0)
+    sides = np.zeros((2, *SIZE[::-1]), dtype=bool)
     sides[0, 20:100, 20:50] = sides[1, 20:100, 115:145] = True
-    for k in range(50):  # the other part begins in frame 2, thirty frames before the first one ends
-        people.add(people_in(Silhouette.of(sides[int(k % 3 == 2 if k < 32 else k > 32)])), None)
+    # the other part begins in frame 2, thirty frames before the first one ends
+    for k in range(50):
+        people.add(
+            people_in(Silhouette.of(sides[int(k % 3 == 2 if k < 32 else k > 32)])), None
+        )
     assert [len(person) for person in people.persons()] == [2]
 
 
 def test_memory_of_noise_is_given_back() -> None:
-    people, rng = People(10.0), np.random.default_rng(0)
+    people = People(10.0)
+    rng = np.random.default_rng(0)
     for _ in range(60):
         mask = np.zeros((60, 80), dtype=bool)
-        row, column = rng.integers(0, 50), rng.integers(0, 70)
+        row = rng.integers(0, 50)
+        column = rng.integers(0, 70)
         mask[row : row + 6, column : column + 4] = True
         people.add([mask])
     assert len(people.tracklets) > 20
     assert len(people.active) < 20
-    assert sum(tracklet.latest.mask.size > 0 for tracklet in people.tracklets) == len(people.active)
+    assert sum(tracklet.latest.mask.size > 0 for tracklet in people.tracklets) == len(
+        people.active
+    )
     assert people.chosen(None, str)[1] == ""

@@ -43,12 +43,17 @@ def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) 
     check((tmp_path / name,), walk)
     check(tmp_path, walk)
     masks = read_masks((tmp_path / name,), (2, 4))
-    assert [Path(path).name for path in masks.names] == [f"{name}, page 2", f"{name}, page 3"]
+    assert [Path(path).name for path in masks.names] == [
+        f"{name}, page 2",
+        f"{name}, page 3",
+    ]
     np.testing.assert_array_equal(masks.silhouette(1).mask, walk[3])
 
 
 @each("suffix", [".gif", ".webp", ".tif"])
-def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(walk: list[Any], tmp_path: Path, suffix: str) -> None:
+def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(
+    walk: list[Any], tmp_path: Path, suffix: str
+) -> None:
     for k, image in enumerate(drawn(walk)):
         image.save(tmp_path / f"{k:03}{suffix}")
     wanted = [read_by_pillow(tmp_path / f"{k:03}{suffix}") for k in range(len(walk))]
@@ -59,18 +64,36 @@ def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(walk: list[Any], tm
 def test_an_animated_png_is_refused(walk: list[Any], tmp_path: Path) -> None:
     first, *others = drawn(walk)
     first.save(tmp_path / "a.png", save_all=True, append_images=others)
-    with pytest.raises(ValueError, match="a.png: expected one picture, got an animation"):
+    with pytest.raises(
+        ValueError, match="a.png: expected one picture, got an animation"
+    ):
         read_masks(tmp_path, ALL)
 
 
-def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(walk: list[Any], tmp_path: Path) -> None:
+def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
+    walk: list[Any], tmp_path: Path
+) -> None:
     for number, image in zip((7, 8, 10, 11, 14, 15), drawn(walk), strict=True):
         image.save(tmp_path / f"mask_{number}.png")
     masks = read_masks(tmp_path, ALL)
-    assert masks.usable.tolist() == [True, True, False, True, True, False, False, True, True]
-    assert [bool(masks.silhouette(k).valid.any()) for k in range(9)] == masks.usable.tolist()
+    assert masks.usable.tolist() == [
+        True,
+        True,
+        False,
+        True,
+        True,
+        False,
+        False,
+        True,
+        True,
+    ]
+    assert [
+        bool(masks.silhouette(k).valid.any()) for k in range(9)
+    ] == masks.usable.tolist()
     np.testing.assert_array_equal(masks.silhouette(7).mask, walk[4])
-    assert masks.guesses == [f"{tmp_path}: 3 of the frames 7 to 15 are missing, and are held"]
+    assert masks.guesses == [
+        f"{tmp_path}: 3 of the frames 7 to 15 are missing, and are held"
+    ]
     assert len(read_masks(tmp_path, (3, 7))) == 4
     clean, warnings = cleaned(masks, tmp_path)
     assert (clean.usable.tolist(), warnings) == (masks.usable.tolist(), [])
@@ -85,16 +108,34 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(walk: lis
     ("names", "count", "guess"),
     [
         (["f0.png", "f5.png", "f10.png"], 3, "every 5th number is a frame"),
-        (["f0.png", "f5.png", "f15.png"], 4, "1 of the frames 0 to 15 are missing, and are held"),
-        (["f3.png", "f1.png", "f2.png"], 3, "the frames come as listed, not as numbered"),
-        (["f1.png", "f900001.png", "f900002.png"], 3, "the numbers from 1 to 900002 do not count frames"),
-        (["a-1-1.png", "a-1-2.png", "a-2-1.png"], 3, "the frames come as listed, not as numbered"),
+        (
+            ["f0.png", "f5.png", "f15.png"],
+            4,
+            "1 of the frames 0 to 15 are missing, and are held",
+        ),
+        (
+            ["f3.png", "f1.png", "f2.png"],
+            3,
+            "the frames come as listed, not as numbered",
+        ),
+        (
+            ["f1.png", "f900001.png", "f900002.png"],
+            3,
+            "the numbers from 1 to 900002 do not count frames",
+        ),
+        (
+            ["a-1-1.png", "a-1-2.png", "a-2-1.png"],
+            3,
+            "the frames come as listed, not as numbered",
+        ),
         (["a.png", "b.png"], 2, None),
         (["1.png", "2.png", "3.png"], 3, None),
         (["only9.png"], 1, None),
     ],
 )
-def test_what_numbers_in_names_mean_is_reported(names: list[str], count: int, guess: str | None) -> None:
+def test_what_numbers_in_names_mean_is_reported(
+    names: list[str], count: int, guess: str | None
+) -> None:
     frames, guesses = numbered([Path(name) for name in names], "masks")
     assert len(frames) == count
     assert sum(frame is not None for frame in frames) == len(names)
@@ -105,54 +146,90 @@ def test_what_numbers_in_names_mean_is_reported(names: list[str], count: int, gu
 @each(
     ("names", "message"),
     [
-        (["0.png", "0_rgb.jpg", "1.png", "1_rgb.jpg"], "expected images of one kind, got 2 .png and 2 .jpg"),
-        (["m7.png", "m8.png", "m8.jpg"], "expected images of one kind, got 2 .png and 1 .jpg"),
-        (["0.png", "0_grey.png", "1.png", "1_grey.png"], "expected one image a frame, got 0.png and 0_grey.png"),
-        (["img_3.png", "img_4.png", "mask_3.png"], "expected one image a frame, got img_3.png and mask_3.png"),
+        (
+            ["0.png", "0_rgb.jpg", "1.png", "1_rgb.jpg"],
+            "expected images of one kind, got 2 .png and 2 .jpg",
+        ),
+        (
+            ["m7.png", "m8.png", "m8.jpg"],
+            "expected images of one kind, got 2 .png and 1 .jpg",
+        ),
+        (
+            ["0.png", "0_grey.png", "1.png", "1_grey.png"],
+            "expected one image a frame, got 0.png and 0_grey.png",
+        ),
+        (
+            ["img_3.png", "img_4.png", "mask_3.png"],
+            "expected one image a frame, got img_3.png and mask_3.png",
+        ),
     ],
 )
-def test_other_pictures_with_masks_are_refused(walk: list[Any], tmp_path: Path, names: list[str], message: str) -> None:
+def test_other_pictures_with_masks_are_refused(
+    walk: list[Any], tmp_path: Path, names: list[str], message: str
+) -> None:
     for name in names:
         drawn(walk)[0].save(tmp_path / name)
     with pytest.raises(ValueError, match=message):
         read_masks(tmp_path, ALL)
 
 
-def test_a_photo_among_jpegs_is_refused_by_name(walk: list[Any], tmp_path: Path) -> None:
+def test_a_photo_among_jpegs_is_refused_by_name(
+    walk: list[Any], tmp_path: Path
+) -> None:
     for k, image in enumerate(drawn(walk)):
         image.convert("RGB").save(tmp_path / f"{k}.jpg")
     check(tmp_path, [read_by_pillow(tmp_path / f"{k}.jpg") for k in range(len(walk))])
-    colours = np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)
+    colours = np.random.default_rng(0).integers(
+        0, 255, (*walk[0].shape, 3), dtype=np.uint8
+    )
     Image.fromarray(colours).save(tmp_path / "3.jpg")
-    with pytest.raises(ValueError, match="3.jpg: expected masks, got pictures in many colours"):
+    with pytest.raises(
+        ValueError, match="3.jpg: expected masks, got pictures in many colours"
+    ):
         read_masks(tmp_path, ALL)
 
 
 @each("values", [(0.0, 0.3), (0.0, 2.0), (-3.0, 3.0), (0.0, 1.0), (-1.0, 0.0)])
-def test_any_two_fractions_are_a_mask(walk: list[Any], tmp_path: Path, values: tuple[float, float]) -> None:
-    np.save(tmp_path / "a.npy", np.where(np.stack(walk), values[1], values[0]).astype(np.float32))
+def test_any_two_fractions_are_a_mask(
+    walk: list[Any], tmp_path: Path, values: tuple[float, float]
+) -> None:
+    np.save(
+        tmp_path / "a.npy",
+        np.where(np.stack(walk), values[1], values[0]).astype(np.float32),
+    )
     guesses = check(tmp_path / "a.npy", walk)
     usual = values == (0.0, 1.0)
     assert guesses == ([] if usual else [f"{tmp_path / 'a.npy'}: masks of values from {min(values):g} to {max(values):g}: the person is the higher of two"])  # fmt: skip
 
 
-def test_labels_may_be_whole_numbers_held_as_fractions(walk: list[Any], tmp_path: Path) -> None:
+def test_labels_may_be_whole_numbers_held_as_fractions(
+    walk: list[Any], tmp_path: Path
+) -> None:
     labels = np.stack(walk).astype(np.float32)
     labels[:, :30, :30] = 2.0
     np.save(tmp_path / "a.npy", labels)
     with pytest.raises(ValueError, match="got the labels 1, 2; --label N chooses one"):
         read_masks(tmp_path / "a.npy", ALL)
-    np.testing.assert_array_equal(read_masks(tmp_path / "a.npy", ALL, 1).silhouette(0).mask, walk[0])
+    np.testing.assert_array_equal(
+        read_masks(tmp_path / "a.npy", ALL, 1).silhouette(0).mask, walk[0]
+    )
 
 
-def test_logits_are_cut_at_zero_and_degrees_half_way(walk: list[Any], tmp_path: Path) -> None:
-    soft = np.stack([cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) for mask in walk])
+def test_logits_are_cut_at_zero_and_degrees_half_way(
+    walk: list[Any], tmp_path: Path
+) -> None:
+    soft = np.stack(
+        [cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) for mask in walk]
+    )
     logits = 30.0 * soft - 20.0  # as SAM gives them
     np.save(tmp_path / "a.npy", logits)
     (guess,) = check(tmp_path / "a.npy", list(logits > 0.0))
-    assert guess.endswith("masks of values from -20 to 10 are logits: the person is above 0")
+    assert guess.endswith(
+        "masks of values from -20 to 10 are logits: the person is above 0"
+    )
     for scale, half in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0), (10.0, None)):
-        degrees = soft * scale - 0.02 * scale  # a little below 0, as bicubic scaling makes them
+        # a little below 0, as bicubic scaling makes them
+        degrees = soft * scale - 0.02 * scale
         threshold = half or 0.5 * float(degrees.max())
         np.save(tmp_path / "a.npy", degrees)
         (guess,) = check(tmp_path / "a.npy", list(degrees > threshold))
@@ -165,18 +242,27 @@ def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) 
     for name in ("a.npz", "b.npz"):
         check(tmp_path / name, walk)
     np.savez(tmp_path / "c.npz", np.stack(walk), np.stack(walk))
-    with pytest.raises(ValueError, match="c.npz: expected an .npz file with the key masks, got none"):
+    with pytest.raises(
+        ValueError, match="c.npz: expected an .npz file with the key masks, got none"
+    ):
         read_masks(tmp_path / "c.npz", ALL)
 
 
-def test_a_person_who_touches_the_border_in_all_masks_is_followed(walk: list[Any], tmp_path: Path) -> None:
+def test_a_person_who_touches_the_border_in_all_masks_is_followed(
+    walk: list[Any], tmp_path: Path
+) -> None:
     for k, mask in enumerate(walk):  # cut to the person, as silhouettes of gait are
-        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        cut = 255 * mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.uint8)
+        rows = np.flatnonzero(mask.any(axis=1))
+        columns = np.flatnonzero(mask.any(axis=0))
+        cut = 255 * mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(
+            np.uint8
+        )
         large = cv2.resize(cut, (88, 128), interpolation=cv2.INTER_NEAREST)
         Image.fromarray(large).save(tmp_path / f"{k:03}.gif")
     scene = scene_of([tmp_path])
-    assert [scene.observations[k].usable for k in range(len(walk))] == [True] * len(walk)
+    assert [scene.observations[k].usable for k in range(len(walk))] == [True] * len(
+        walk
+    )
 
 
 def test_an_image_of_numbers_that_are_none_is_refused(tmp_path: Path) -> None:
@@ -186,5 +272,7 @@ def test_an_image_of_numbers_that_are_none_is_refused(tmp_path: Path) -> None:
     assert read_masks(tmp_path, ALL).silhouette(0).mask.sum() == 24
     values[0, 0] = np.nan
     Image.fromarray(values).save(tmp_path / "a.tif")
-    with pytest.raises(ValueError, match="a.tif: masks must be finite, got nan or infinity"):
+    with pytest.raises(
+        ValueError, match="a.tif: masks must be finite, got nan or infinity"
+    ):
         read_masks(tmp_path, ALL)

@@ -15,7 +15,12 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.cameras import yaws_of
 from posefit.footage.quality import FrameQuality, verdict
-from posefit.footage.segmentation import Extraction, Segmentation, Segmented, facings_on_the_spot
+from posefit.footage.segmentation import (
+    Extraction,
+    Segmentation,
+    Segmented,
+    facings_on_the_spot,
+)
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.camera import Camera
@@ -27,24 +32,36 @@ from tests.footage.composites import DEMO, Kind, backgrounds, composed
 from tests.footage.conftest import Box, camera, iou, truth
 
 ALWAYS: tuple[Kind, ...] = ("jumping", "waving", "standing")
-mediapipe = pytest.mark.skipif(find_spec("mediapipe") is None, reason="without mediapipe")
+mediapipe = pytest.mark.skipif(
+    find_spec("mediapipe") is None, reason="without mediapipe"
+)
 
 
 @pytest.fixture(scope="module")
-def films(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, list[Any]]]:
-    folder, places = tmp_path_factory.mktemp("films"), backgrounds()
+def films(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> dict[str, tuple[Path, list[Any]]]:
+    folder = tmp_path_factory.mktemp("films")
+    places = backgrounds()
     cv2.imwrite(str(folder / "empty.png"), places[0])
-    return {kind: composed(folder / f"{kind}.avi", kind, places) for kind in ("passing", "leaving", *ALWAYS)}
+    return {
+        kind: composed(folder / f"{kind}.avi", kind, places)
+        for kind in ("passing", "leaving", *ALWAYS)
+    }
 
 
-def segmented(path: Path, how: Extraction, frames: Any = (None, None)) -> tuple[Segmented, list[Any]]:
+def segmented(
+    path: Path, how: Extraction, frames: Any = (None, None)
+) -> tuple[Segmented, list[Any]]:
     result = Segmentation(Video.of(path), how, frames).read()
     return result, [result.masks.silhouette(k).mask for k in range(len(result.masks))]
 
 
 def overlap(masks: list[Any], true: list[Any]) -> float:
     """Return the mean IoU of masks with the true ones, where the whole person is in the picture."""
-    whole = [k for k, mask in enumerate(true) if mask.any() and not mask[:, [0, -1]].any()]
+    whole = [
+        k for k, mask in enumerate(true) if mask.any() and not mask[:, [0, -1]].any()
+    ]
     return float(np.mean([iou(masks[k], true[k]) for k in whole]))
 
 
@@ -53,7 +70,9 @@ def overlap(masks: list[Any], true: list[Any]) -> float:
 def test_a_person_who_is_always_there_is_refused_before_any_tracking(
     films: dict[str, Any], tmp_path: Path, method: str, kind: Kind
 ) -> None:
-    error = error_of("track", films[kind][0], "--extraction", method, "--out", tmp_path / "out")
+    error = error_of(
+        "track", films[kind][0], "--extraction", method, "--out", tmp_path / "out"
+    )
     assert f"{kind}.avi: the person seems to stand in the background" in error
     assert "give --background with an empty picture, or --extraction mediapipe" in error
     assert list(tmp_path.iterdir()) == []
@@ -70,7 +89,12 @@ def test_a_person_who_is_always_there_is_refused_before_any_tracking(
     ],
 )
 def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_the_person_out(
-    films: dict[str, Any], kind: Kind, cameras: int, network: str, used: str | None, monkeypatch: pytest.MonkeyPatch
+    films: dict[str, Any],
+    kind: Kind,
+    cameras: int,
+    network: str,
+    used: str | None,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path, true = films[kind]
 
@@ -83,35 +107,53 @@ def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_th
             return mask, np.zeros_like(mask)
 
     plugins = registry().plugins
-    offer = replace(registry().offers["segmenter"]["mediapipe"], factory=Network, needs=None)
+    offer = replace(
+        registry().offers["segmenter"]["mediapipe"], factory=Network, needs=None
+    )
     installed = Registry((*plugins, plugins[0]._replace(offers=(offer,))))
     monkeypatch.setattr("posefit.footage.segmentation.registry", lambda: installed)
     target = np.array([0.0, 0.9, 0.0])
-    around = [Camera.around(target, 0.5 * k, 4.0, Video.of(path).size) for k in range(cameras)]
+    around = [
+        Camera.around(target, 0.5 * k, 4.0, Video.of(path).size) for k in range(cameras)
+    ]
     view: dict[str, Any] = {"camera": around if cameras > 1 else (), "height": 1.7}
     if used is None:
-        with pytest.raises(InputError, match="the person seems to stand in the background"):
+        with pytest.raises(
+            InputError, match="the person seems to stand in the background"
+        ):
             scene_of([path] * cameras, **view)
         return
     scene = scene_of([path] * cameras, **view)
     masks = [observation.silhouettes[0].mask for observation in scene.observations]
     assert (overlap(masks, true) > 0.95) == (used == "mediapipe")
-    first, second = ("mediapipe", "mixture") if cameras == 1 else ("mixture", "mediapipe")
-    exchanged = any(f"{second} took the person out, instead of {first}: " in text for text in scene.warnings)
+    first, second = (
+        ("mediapipe", "mixture") if cameras == 1 else ("mixture", "mediapipe")
+    )
+    exchanged = any(
+        f"{second} took the person out, instead of {first}: " in text
+        for text in scene.warnings
+    )
     assert exchanged == (used == second)
 
 
 @each("kind", ["passing", "leaving", *ALWAYS])
-def test_with_an_empty_picture_the_person_is_segmented_whatever_they_do(films: dict[str, Any], kind: Kind) -> None:
+def test_with_an_empty_picture_the_person_is_segmented_whatever_they_do(
+    films: dict[str, Any], kind: Kind
+) -> None:
     path, true = films[kind]
-    segmentation, masks = segmented(path, Extraction(background=str(path.with_name("empty.png"))))
+    segmentation, masks = segmented(
+        path, Extraction(background=str(path.with_name("empty.png")))
+    )
     assert overlap(masks, true) > 0.8
     assert segmentation.verdict is None
-    assert segmentation.masks.usable.sum() >= 49  # of 60; a person who leaves is not whole in the last 11
+    # of 60; a person who leaves is not whole in the last 11
+    assert segmentation.masks.usable.sum() >= 49
 
 
 @each("method", ["mixture", "median"])
-def test_a_person_who_passes_by_causes_no_warning(films: dict[str, Any], method: str) -> None:
+def test_a_person_who_passes_by_causes_no_warning(
+    films: dict[str, Any], method: str
+) -> None:
     path, true = films["passing"]
     segmentation, masks = segmented(path, Extraction(method))
     assert overlap(masks, true) > 0.8
@@ -130,20 +172,38 @@ def test_mediapipe_needs_no_background(films: dict[str, Any], kind: Kind) -> Non
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DEMO.is_file(), reason=f"no video at {DEMO}")
-def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_is_refused() -> None:
-    walker, jumper = ((0, 420, 1520, 532), (55, 166)), ((380, 0, 600, 450), (0, 160))
+def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_is_refused() -> (
+    None
+):
+    walker = ((0, 420, 1520, 532), (55, 166))
+    jumper = ((380, 0, 600, 450), (0, 160))
     segmentation, masks = segmented(DEMO, Extraction(roi=walker[0]), walker[1])
     assert segmentation.warnings == []
     assert segmentation.masks.usable.sum() >= 110
-    assert segmented(DEMO, Extraction("median", roi=walker[0]), walker[1])[0].warnings == []
+    assert (
+        segmented(DEMO, Extraction("median", roi=walker[0]), walker[1])[0].warnings
+        == []
+    )
     verdict = segmented(DEMO, Extraction(roi=jumper[0]), jumper[1])[0].verdict
     assert verdict is not None
     assert verdict.refused
     if find_spec("mediapipe"):
-        segmentation, others = segmented(DEMO, Extraction("mediapipe", roi=walker[0]), walker[1])
+        segmentation, others = segmented(
+            DEMO, Extraction("mediapipe", roi=walker[0]), walker[1]
+        )
         assert segmentation.warnings == []
-        assert np.mean([iou(first, second) for first, second in zip(masks, others, strict=True)]) > 0.75
-        segmentation, _ = segmented(DEMO, Extraction("mediapipe", roi=jumper[0]), jumper[1])
+        assert (
+            np.mean(
+                [
+                    iou(first, second)
+                    for first, second in zip(masks, others, strict=True)
+                ]
+            )
+            > 0.75
+        )
+        segmentation, _ = segmented(
+            DEMO, Extraction("mediapipe", roi=jumper[0]), jumper[1]
+        )
         assert segmentation.verdict is None
         assert segmentation.masks.usable.sum() > 150
 
@@ -170,7 +230,10 @@ def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
         return part
 
     quality = FrameQuality(30.0)
-    rows = [quality.row(image, of(arm(mask)), k) for k, (image, mask) in enumerate(figure(6 * k) for k in range(8))]
+    rows = [
+        quality.row(image, of(arm(mask)), k)
+        for k, (image, mask) in enumerate(figure(6 * k) for k in range(8))
+    ]
     assert min(row["beside"] for row in rows[4:]) > 0.5
     assert not any(row["usable"] for row in rows[4:])
 
@@ -178,10 +241,17 @@ def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
 def test_before_a_camera_that_pans_masks_that_need_no_still_background_are_usable(
     tmp_path: Path, segmenter: Callable[..., None]
 ) -> None:
-    rng, path = np.random.default_rng(0), tmp_path / "pan.avi"
-    wide = cv2.resize(rng.integers(0, 255, (30, 160, 3), dtype=np.uint8), (640, 120), interpolation=cv2.INTER_NEAREST)
+    rng = np.random.default_rng(0)
+    path = tmp_path / "pan.avi"
+    wide = cv2.resize(
+        rng.integers(0, 255, (30, 160, 3), dtype=np.uint8),
+        (640, 120),
+        interpolation=cv2.INTER_NEAREST,
+    )
     image, mask = figure()
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (160, 120))
+    writer = cv2.VideoWriter(
+        str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (160, 120)
+    )
     for k in range(24):
         writer.write(np.where(mask[..., None], image, wide[:, 12 * k : 12 * k + 160]))
     writer.release()
@@ -210,24 +280,44 @@ def test_what_has_no_persons_shape_is_not_usable() -> None:
 def test_a_place_that_the_person_has_left_is_a_ghost() -> None:
     with_person, mask = figure()
     empty = np.full_like(with_person, 120)
-    assert FrameQuality(30.0, background=with_person).row(empty, of(mask), 0)["ghost"] == 1
-    assert FrameQuality(30.0, background=empty).row(with_person, of(mask), 0)["ghost"] == 0
+    assert (
+        FrameQuality(30.0, background=with_person).row(empty, of(mask), 0)["ghost"] == 1
+    )
+    assert (
+        FrameQuality(30.0, background=empty).row(with_person, of(mask), 0)["ghost"] == 0
+    )
     assert FrameQuality(30.0).row(empty, of(mask), 0)["ghost"] == 0
 
 
-def test_one_mask_twice_as_large_as_the_others_is_not_usable_but_a_person_who_stays_so_is() -> None:
+def test_one_mask_twice_as_large_as_the_others_is_not_usable_but_a_person_who_stays_so_is() -> (
+    None
+):
     quality = FrameQuality(30.0)
     sizes = [18] * 6 + [29] + [18] * 6 + [29] * 16
-    rows = [quality.row(image, of(mask), k) for k, (image, mask) in enumerate(figure(0, 60, wide) for wide in sizes)]
+    rows = [
+        quality.row(image, of(mask), k)
+        for k, (image, mask) in enumerate(figure(0, 60, wide) for wide in sizes)
+    ]
     assert [row["usable"] for row in rows[:13]] == [1] * 6 + [0] + [1] * 6
     assert rows[-1]["usable"] == 1
 
 
 def rows(
-    beside: float = 0.0, areas: tuple[int, ...] = (100, 100), ghost: int = 0, usable: int = 1, pieces: int = 1
+    beside: float = 0.0,
+    areas: tuple[int, ...] = (100, 100),
+    ghost: int = 0,
+    usable: int = 1,
+    pieces: int = 1,
 ) -> list[dict[str, Any]]:
     return [
-        {"frame": k, "area": areas[k % 2], "longer_side": 10, "touches_border": 0, "beside": beside, "ghost": ghost}
+        {
+            "frame": k,
+            "area": areas[k % 2],
+            "longer_side": 10,
+            "touches_border": 0,
+            "beside": beside,
+            "ghost": ghost,
+        }
         | {"usable": usable, "pieces": pieces}
         for k in range(20)
     ]
@@ -246,16 +336,56 @@ def rows(
             "got one at its edge in 20 of 20 frames",
         ),
         (rows(pieces=2), "median", True, None, ""),
-        (rows(0.6, (100, 150)), "mixture", True, True, "in the background: 60% of what moves lies outside the masks"),
-        (rows(0.0, (100, 150)), "mean", False, False, "parts of the person seem to be missing; --extraction mediapipe"),
-        (rows(0.6), "mean", False, False, "60% of what moves near the person lies outside"),
-        (rows(0.16, (100, 150), pieces=2), "median", True, True, "from frame to frame and are in pieces in 100%"),
-        (rows(ghost=1), "median", True, True, "100% of the masks show a place that is empty now"),
-        (rows(usable=0)[:4], "mediapipe", True, True, "got none in any of 4 frames; --roi says where to look"),
+        (
+            rows(0.6, (100, 150)),
+            "mixture",
+            True,
+            True,
+            "in the background: 60% of what moves lies outside the masks",
+        ),
+        (
+            rows(0.0, (100, 150)),
+            "mean",
+            False,
+            False,
+            "parts of the person seem to be missing; --extraction mediapipe",
+        ),
+        (
+            rows(0.6),
+            "mean",
+            False,
+            False,
+            "60% of what moves near the person lies outside",
+        ),
+        (
+            rows(0.16, (100, 150), pieces=2),
+            "median",
+            True,
+            True,
+            "from frame to frame and are in pieces in 100%",
+        ),
+        (
+            rows(ghost=1),
+            "median",
+            True,
+            True,
+            "100% of the masks show a place that is empty now",
+        ),
+        (
+            rows(usable=0)[:4],
+            "mediapipe",
+            True,
+            True,
+            "got none in any of 4 frames; --roi says where to look",
+        ),
     ],
 )
 def test_the_verdict_follows_from_all_frames(
-    rows: list[dict[str, Any]], method: str, learned: bool, refused: bool | None, text: str
+    rows: list[dict[str, Any]],
+    method: str,
+    learned: bool,
+    refused: bool | None,
+    text: str,
 ) -> None:
     result = verdict(rows, method, learned=learned)
     assert (None if result is None else result.refused) is refused
@@ -263,13 +393,25 @@ def test_the_verdict_follows_from_all_frames(
 
 
 def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None:
-    azimuths, sources = (np.pi / 2, 0.6), [tmp_path / "a.npz", tmp_path / "b.npz"]
-    cameras, masks = [camera(azimuth) for azimuth in azimuths], [truth(azimuth)[8:16] for azimuth in azimuths]
-    heads = [[mask & (np.cumsum(mask.any(axis=1)) < 25)[:, None] for mask in shown] for shown in masks]
-    moved = [cameras[0], replace(cameras[1], translation=cameras[1].translation + [0.0, 1.5, 0.0])]
+    azimuths = (np.pi / 2, 0.6)
+    sources = [tmp_path / "a.npz", tmp_path / "b.npz"]
+    cameras = [camera(azimuth) for azimuth in azimuths]
+    masks = [truth(azimuth)[8:16] for azimuth in azimuths]
+    heads = [
+        [mask & (np.cumsum(mask.any(axis=1)) < 25)[:, None] for mask in shown]
+        for shown in masks
+    ]
+    moved = [
+        cameras[0],
+        replace(cameras[1], translation=cameras[1].translation + [0.0, 1.5, 0.0]),
+    ]
     for shown, placed, message in (
         (heads, cameras, "expected a person of 1.75 m, got masks 0."),
-        (masks, moved, "expected cameras that see one person, got views that pass each other by 1.5 m"),
+        (
+            masks,
+            moved,
+            "expected cameras that see one person, got views that pass each other by 1.5 m",
+        ),
     ):
         for path, part in zip(sources, shown, strict=True):
             np.savez(path, masks=part)
@@ -282,8 +424,14 @@ def test_a_segmenter_that_breaks_a_rule_is_named(
 ) -> None:
     segmenter("box", Box)
     for wrong, message in [
-        ("shape", r"segment must return two boolean masks of shape \(120, 160\), got \(119, 160\) bool"),
-        ("type", r"segmenter 'box': segment must return two boolean masks .* got \(120, 160\) uint8"),
+        (
+            "shape",
+            r"segment must return two boolean masks of shape \(120, 160\), got \(119, 160\) bool",
+        ),
+        (
+            "type",
+            r"segmenter 'box': segment must return two boolean masks .* got \(120, 160\) uint8",
+        ),
         ("fails", "segmenter 'box': segment must not fail, got KeyError: 'lost'"),
     ]:
         with pytest.raises(BrokenRuleError, match=message):
@@ -292,12 +440,17 @@ def test_a_segmenter_that_breaks_a_rule_is_named(
 
 MIDDLE = np.array([0.0, 1.0, 0.0])
 # one that looks along -z, which a person with yaw 0 faces, and one that looks along -x, at the person's left side
-FRONT, LEFT = (Camera.around(MIDDLE, azimuth, 5.0, (160, 120)) for azimuth in (0.0, np.pi / 2))
+FRONT, LEFT = (
+    Camera.around(MIDDLE, azimuth, 5.0, (160, 120)) for azimuth in (0.0, np.pi / 2)
+)
 FPS = 4.0  # two frames to either side count
 
 
 def degrees(facings: list[float], camera: Camera = FRONT) -> list[float]:
-    return [round(float(yaw), 6) for yaw in np.degrees(yaws_of(np.radians(facings), camera, FPS))]
+    return [
+        round(float(yaw), 6)
+        for yaw in np.degrees(yaws_of(np.radians(facings), camera, FPS))
+    ]
 
 
 def test_a_facing_is_turned_by_where_the_camera_stands() -> None:
@@ -319,16 +472,24 @@ def test_no_report_or_contradicting_ones_give_no_yaw() -> None:
 
 
 def test_facings_of_a_person_who_goes_along_are_dropped() -> None:
-    still, going = [50.0] * 5, [50.0 + 20.0 * k for k in range(5)]
+    still = [50.0] * 5
+    going = [50.0 + 20.0 * k for k in range(5)]
     sides = [100.0] * 5
-    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 5, still, sides, FPS), [0.5] * 5)
+    np.testing.assert_array_equal(
+        facings_on_the_spot([0.5] * 5, still, sides, FPS), [0.5] * 5
+    )
     # two seconds to either side count, so all five frames: 80 pixels, where 35 are too far
     assert np.isnan(facings_on_the_spot([0.5] * 5, going, sides, FPS)).all()
-    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 5, going, [250.0] * 5, FPS), [0.5] * 5)  # 87.5 are not
+    # 87.5 are not
+    np.testing.assert_array_equal(
+        facings_on_the_spot([0.5] * 5, going, [250.0] * 5, FPS), [0.5] * 5
+    )
     # a person who sets out with frame 21 is 40 pixels away in frame 22, which is two seconds after frame 14
     later = facings_on_the_spot([0.5] * 25, [50.0] * 20 + going, [100.0] * 25, FPS)
     assert np.flatnonzero(np.isnan(later)).tolist() == list(range(14, 25))
-    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 2, [np.nan] * 2, [0.0] * 2, FPS), [0.5] * 2)
+    np.testing.assert_array_equal(
+        facings_on_the_spot([0.5] * 2, [np.nan] * 2, [0.0] * 2, FPS), [0.5] * 2
+    )
 
 
 def test_a_scene_has_the_yaws_that_a_segmenter_reports(
@@ -336,8 +497,12 @@ def test_a_scene_has_the_yaws_that_a_segmenter_reports(
 ) -> None:
     segmenter("box", Box)
     camera = Camera.around(MIDDLE, 0.25, 5.0, (160, 120))
-    scene = scene_of([filmed[0]], camera=(camera,), frames=(0, 6), extraction=Extraction("box"))
-    assert [observation.yaw for observation in scene.observations] == pytest.approx([0.75] * 6)
+    scene = scene_of(
+        [filmed[0]], camera=(camera,), frames=(0, 6), extraction=Extraction("box")
+    )
+    assert [observation.yaw for observation in scene.observations] == pytest.approx(
+        [0.75] * 6
+    )
     assert scene.yaw == pytest.approx(0.75)
     assert scene_of([filmed[0]], camera=(camera,)).yaw is None
 
@@ -349,8 +514,11 @@ def test_mediapipe_reports_the_facing_of_shoulders_and_hips() -> None:
     from posefit_mediapipe.segmenter import _facing
 
     def landmarks(x: float, z: float) -> Any:
-        left, right = SimpleNamespace(x=x, z=z), SimpleNamespace(x=-x, z=-z)
-        return SimpleNamespace(landmark={**dict.fromkeys(LEFTS, left), **dict.fromkeys(RIGHTS, right)})
+        left = SimpleNamespace(x=x, z=z)
+        right = SimpleNamespace(x=-x, z=-z)
+        return SimpleNamespace(
+            landmark={**dict.fromkeys(LEFTS, left), **dict.fromkeys(RIGHTS, right)}
+        )
 
     # the left of a person who faces the camera is on the picture's right; of one who turns to its right, farther away
     assert _facing(landmarks(0.2, 0.0)) == 0.0

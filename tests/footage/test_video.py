@@ -21,35 +21,62 @@ from tests.footage.matroska import write_matroska
 
 def test_frames_that_are_all_the_same_are_refused(tmp_path: Path) -> None:
     # OpenCV 5.0 returns what the memory held where frames are interlaced
-    path = write_matroska(tmp_path / "a.mkv", [np.full((48, 64, 3), 90, np.uint8)] * 5, range(0, 200, 40))
-    with pytest.raises(ValueError, match="a.mkv: expected a film, got the same picture in all frames; if it is int"):
+    path = write_matroska(
+        tmp_path / "a.mkv", [np.full((48, 64, 3), 90, np.uint8)] * 5, range(0, 200, 40)
+    )
+    with pytest.raises(
+        ValueError,
+        match="a.mkv: expected a film, got the same picture in all frames; if it is int",
+    ):
         Video.of(path)
 
 
 def test_pixels_that_are_not_square_are_reported(tmp_path: Path) -> None:
     images = [np.full((48, 64, 3), 20 * k, np.uint8) for k in range(5)]
-    (warning,) = Video.of(write_matroska(tmp_path / "a.mkv", images, range(0, 200, 40), wide=93)).warnings
-    assert "a.mkv: its pixels are 1.45 times as wide as high, which is not corrected" in warning
+    (warning,) = Video.of(
+        write_matroska(tmp_path / "a.mkv", images, range(0, 200, 40), wide=93)
+    ).warnings
+    assert (
+        "a.mkv: its pixels are 1.45 times as wide as high, which is not corrected"
+        in warning
+    )
 
 
-@each("text", ["ffconcat version 1.0\nfile 'secret.mp4'\n", "#EXTM3U\n#EXTINF:1,\nsecret.ts\n\0", "v=0\nm=video 1 RTP"])
-def test_a_text_that_would_open_other_files_is_refused(tmp_path: Path, text: str) -> None:
+@each(
+    "text",
+    [
+        "ffconcat version 1.0\nfile 'secret.mp4'\n",
+        "#EXTM3U\n#EXTINF:1,\nsecret.ts\n\0",
+        "v=0\nm=video 1 RTP",
+    ],
+)
+def test_a_text_that_would_open_other_files_is_refused(
+    tmp_path: Path, text: str
+) -> None:
     film(tmp_path / "secret.avi", truth()[:4])
     (tmp_path / "a.mp4").write_text(text.replace("secret.mp4", "secret.avi"))
-    with pytest.raises(ValueError, match="a.mp4: expected a video that OpenCV can read, got a text"):
+    with pytest.raises(
+        ValueError, match="a.mp4: expected a video that OpenCV can read, got a text"
+    ):
         Video.of(tmp_path / "a.mp4")
 
 
-def test_a_relative_name_with_a_colon_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_relative_name_with_a_colon_is_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     film(tmp_path / "walk.avi", truth()[:4]).rename(tmp_path / "run-10:30.avi")
     monkeypatch.chdir(tmp_path)
     assert Video.of("run-10:30.avi").count() == 4
     assert opencv_name("run-10:30") == str(tmp_path / "run-10:30")
 
 
-def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Path) -> None:
-    strange, out = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"), tmp_path / "out"
-    path, _ = film(tmp_path / "walk.avi", truth()[:4]), stack(Path(f"{strange}.npz"), truth()[:4])
+def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(
+    tmp_path: Path,
+) -> None:
+    strange = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9")
+    out = tmp_path / "out"
+    path = film(tmp_path / "walk.avi", truth()[:4])
+    _ = stack(Path(f"{strange}.npz"), truth()[:4])
     shutil.copy(path, f"{strange}.avi")
     before = sorted(tmp_path.iterdir())
     for words in (
@@ -59,15 +86,26 @@ def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Pat
         ("track", "--live", strange),
         ("extract", path, "--out", strange),
     ):
-        assert "expected a name in UTF-8, got one that is not" in error_of(*words), words
+        assert "expected a name in UTF-8, got one that is not" in error_of(*words), (
+            words
+        )
         assert sorted(tmp_path.iterdir()) == before, words
 
 
-def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(tmp_path: Path) -> None:
+def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(
+    tmp_path: Path,
+) -> None:
     film(tmp_path / "walk.avi", truth()[:4]).rename(tmp_path / "café.avi")
     script = f"from posefit.footage.video import Video\nVideo.of(b'{tmp_path}/caf\\xc3\\xa9.avi'.decode('ascii', 'surrogateescape'))"
-    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PATH": os.environ["PATH"]}
-    done = subprocess.run([sys.executable, "-c", script], env=plain, capture_output=True, check=False)
+    plain = {
+        "LC_ALL": "C",
+        "PYTHONUTF8": "0",
+        "PYTHONCOERCECLOCALE": "0",
+        "PATH": os.environ["PATH"],
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=plain, capture_output=True, check=False
+    )
     assert done.returncode == 1
     assert b"expected a name in UTF-8" in done.stderr.splitlines()[-1]
 
@@ -75,7 +113,9 @@ def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(
 def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:
     """Write the frames of a film as pictures with these numbers, and return their folder."""
     folder.mkdir()
-    for number, image in zip(numbers, Video.of(path).frames(0, None, SIZE), strict=False):
+    for number, image in zip(
+        numbers, Video.of(path).frames(0, None, SIZE), strict=False
+    ):
         assert cv2.imwrite(str(folder / f"frame{number}{suffix}"), image)
     return folder
 
@@ -85,10 +125,16 @@ def test_pictures_are_a_film(filmed: Film, tmp_path: Path, suffix: str) -> None:
     path, masks = filmed
     folder = written(tmp_path / "a", path, suffix, list(range(len(masks))))
     assert kind_of(folder) == "pictures"
-    assert kind_of((folder / f"frame0{suffix}",)) == "masks"  # a single one, which is refused there
-    scene, other = (scene_of([source], fps=fps) for source, fps in ((folder, 25.0), (path, None)))
+    # a single one, which is refused there
+    assert kind_of((folder / f"frame0{suffix}",)) == "masks"
+    scene, other = (
+        scene_of([source], fps=fps) for source, fps in ((folder, 25.0), (path, None))
+    )
     assert (scene.count, scene.fps) == (len(masks), 25.0)
-    views = [[one.observations[k].silhouettes[0].mask for k in range(EMPTY + 12, EMPTY + 30)] for one in (scene, other)]
+    views = [
+        [one.observations[k].silhouettes[0].mask for k in range(EMPTY + 12, EMPTY + 30)]
+        for one in (scene, other)
+    ]
     assert np.median([iou(*pair) for pair in zip(*views, strict=True)]) > 0.9
     assert "30 frames a second" in scene_of([folder]).guesses
 
@@ -99,4 +145,7 @@ def test_a_picture_that_is_missing_is_held(filmed: Film, tmp_path: Path) -> None
     scene = scene_of([folder])
     assert scene.count == 60
     assert not any(scene.observations[k].usable for k in (30, 31))
-    assert any("2 of the frames 0 to 59 are missing, and are held" in guess for guess in scene.guesses)
+    assert any(
+        "2 of the frames 0 to 59 are missing, and are held" in guess
+        for guess in scene.guesses
+    )

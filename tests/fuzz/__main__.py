@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-SECONDS = 10.0  # of CPU time for an input, as a busy machine gives a process little of it
+# of CPU time for an input, as a busy machine gives a process little of it
+SECONDS = 10.0
 WAIT = 900.0  # seconds of the clock, for what does not run at all
 STARTING = 120.0  # seconds for a child to import everything and read the valid files
 MEGABYTES = 1_000  # of a child's memory, with everything that it has imported
@@ -23,7 +24,8 @@ MEGABYTES = 1_000  # of a child's memory, with everything that it has imported
 class Tally:
     """What came of inputs."""
 
-    counts: Counter[tuple[str, str]] = field(default_factory=Counter)  # of each reader, those read and those refused
+    # of each reader, those read and those refused
+    counts: Counter[tuple[str, str]] = field(default_factory=Counter)
     largest: int = 0  # MB
     longest: float = 0.0  # seconds
     findings: list[str] = field(default_factory=list)
@@ -35,9 +37,15 @@ class Tally:
 
     def add(self, number: int, answer: list[object], seconds: float) -> None:
         """Take what a child says of an input."""
-        how, reader, megabytes, what = str(answer[0]), str(answer[1]), int(str(answer[2])), answer[3]
+        how = str(answer[0])
+        reader = str(answer[1])
+        megabytes = int(str(answer[2]))
+        what = answer[3]
         self.counts[reader, how] += 1
-        self.largest, self.longest = max(self.largest, megabytes), max(self.longest, seconds)
+        self.largest, self.longest = (
+            max(self.largest, megabytes),
+            max(self.longest, seconds),
+        )
         if how not in ("read", "refused"):
             self.find(f"{number} {how} {reader}: {what}")
         if megabytes > MEGABYTES:
@@ -50,21 +58,39 @@ def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
     """Have inputs read by child processes, one after the other where one of them dies or hangs."""
     start = numbers.start
     while start < numbers.stop:
-        command = [sys.executable, "-m", "tests.fuzz.worker", str(seed), str(start), str(numbers.stop), kinds]
+        command = [
+            sys.executable,
+            "-m",
+            "tests.fuzz.worker",
+            str(seed),
+            str(start),
+            str(numbers.stop),
+            kinds,
+        ]
         with subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0) as child:
             assert child.stdout is not None
-            number, since, patience = start, 0.0, STARTING
+            number = start
+            since = 0.0
+            patience = STARTING
             while ready := _is_heard(child, since + patience):
                 line = child.stdout.readline().decode()
                 if not line:
                     break
                 if line.endswith("begun\n"):
-                    number, since, patience = int(line.split()[0]), cpu_seconds(child.pid), SECONDS
+                    number = int(line.split()[0])
+                    since = cpu_seconds(child.pid)
+                    patience = SECONDS
                 else:
-                    tally.add(number, json.loads(line.partition(" ")[2]), cpu_seconds(child.pid) - since)
+                    tally.add(
+                        number,
+                        json.loads(line.partition(" ")[2]),
+                        cpu_seconds(child.pid) - since,
+                    )
             if not ready:
                 child.kill()
-                tally.find(f"{number} hang: more than {patience:g} s of CPU time, or {WAIT:g} s without an answer")
+                tally.find(
+                    f"{number} hang: more than {patience:g} s of CPU time, or {WAIT:g} s without an answer"
+                )
             elif status := child.wait():
                 if patience == STARTING:
                     raise RuntimeError("a child could not read the valid files")
@@ -98,12 +124,16 @@ def main() -> int:
     parser.add_argument("--readers", default="", help="some alone, such as rows,frames")
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
-    numbers = range(given.inputs) if given.only is None else range(given.only, given.only + 1)
+    numbers = (
+        range(given.inputs) if given.only is None else range(given.only, given.only + 1)
+    )
     tally = run(given.seed, numbers, given.workers, given.readers)
     for reader in sorted({reader for reader, _ in tally.counts}):
         read, refused = (tally.counts[reader, how] for how in ("read", "refused"))
         print(f"{reader:12} read {read:>7,}  refused {refused:>7,}")
-    print(f"{len(tally.findings)} findings, largest {tally.largest} MB, longest {tally.longest:.1f} s")
+    print(
+        f"{len(tally.findings)} findings, largest {tally.largest} MB, longest {tally.longest:.1f} s"
+    )
     return int(bool(tally.findings))
 
 
@@ -112,7 +142,11 @@ def run(seed: int, numbers: range, workers: int, kinds: str = "") -> Tally:
     tally = Tally()
     cuts = [numbers.start + len(numbers) * k // workers for k in range(workers + 1)]
     with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(lambda ends: fuzz(seed, range(*ends), tally, kinds), pairwise(cuts)))
+        list(
+            pool.map(
+                lambda ends: fuzz(seed, range(*ends), tally, kinds), pairwise(cuts)
+            )
+        )
     return tally
 
 

@@ -54,34 +54,86 @@ def corpus(folder: Path) -> list[Seed]:
     write_asf(folder / "a.asf", motion.skeleton)
     write_amc(folder / "a.amc", motion)
     write_bvh(folder / "a.bvh", motion)
-    seeds = [Seed(kind, f".{kind}", (folder / f"a.{kind}").read_bytes()) for kind in ("asf", "amc", "bvh")]
-    rigs = (("mixamo", "t", 100.0), ("lafan1", "along x", 39.37), ("biped", "cmu", 1.0), ("vrm", "t", 17.7))
-    for name, rest, scale in rigs:  # in centimetres, inches, metres and the CMU database's unit
-        path = write_rig(folder / "rig.bvh", motion, STYLES[name], scale, about(0, np.pi / 2), rest)
+    seeds = [
+        Seed(kind, f".{kind}", (folder / f"a.{kind}").read_bytes())
+        for kind in ("asf", "amc", "bvh")
+    ]
+    rigs = (
+        ("mixamo", "t", 100.0),
+        ("lafan1", "along x", 39.37),
+        ("biped", "cmu", 1.0),
+        ("vrm", "t", 17.7),
+    )
+    # in centimetres, inches, metres and the CMU database's unit
+    for name, rest, scale in rigs:
+        path = write_rig(
+            folder / "rig.bvh", motion, STYLES[name], scale, about(0, np.pi / 2), rest
+        )
         seeds.append(Seed("bvh", ".bvh", path.read_bytes()))
-    body, camera = Body.of(motion.skeleton), Camera.around(motion.translations[0], 0.8, 3.5, (64, 48))
-    masks = np.stack([project(body, camera, *where) for where in zip(motion.poses, motion.translations, strict=True)])
+    body = Body.of(motion.skeleton)
+    camera = Camera.around(motion.translations[0], 0.8, 3.5, (64, 48))
+    masks = np.stack(
+        [
+            project(body, camera, *where)
+            for where in zip(motion.poses, motion.translations, strict=True)
+        ]
+    )
     usable = np.array([True, False, True])
     for save in (np.savez, np.savez_compressed):
-        for stack in (masks, masks.astype(np.uint8) * 255, np.asfortranarray(masks.astype(np.float32))):
-            seeds.append(_npz("masks", save, masks=stack, valid=~masks, usable=usable, fps=np.array(30.0)))
-    seeds += [Seed("images", suffix, _image(masks[0], suffix)) for suffix in (".png", ".jpg", ".bmp", ".tif", ".pgm")]
-    seeds += [Seed("images", suffix, _pages(masks, suffix)) for suffix in (".gif", ".webp", ".tif")]
-    pictures = [np.where(mask, 255, 0).astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks]
+        for stack in (
+            masks,
+            masks.astype(np.uint8) * 255,
+            np.asfortranarray(masks.astype(np.float32)),
+        ):
+            seeds.append(
+                _npz(
+                    "masks",
+                    save,
+                    masks=stack,
+                    valid=~masks,
+                    usable=usable,
+                    fps=np.array(30.0),
+                )
+            )
+    seeds += [
+        Seed("images", suffix, _image(masks[0], suffix))
+        for suffix in (".png", ".jpg", ".bmp", ".tif", ".pgm")
+    ]
+    seeds += [
+        Seed("images", suffix, _pages(masks, suffix))
+        for suffix in (".gif", ".webp", ".tif")
+    ]
+    pictures = [
+        np.where(mask, 255, 0).astype(np.uint8)[..., None].repeat(3, axis=2)
+        for mask in masks
+    ]
     for suffix in (".mp4", ".avi"):
         with VideoWriter(folder / f"video{suffix}", 30.0, (64, 48)) as writer:
             for picture in pictures:
                 writer.write(picture)
         seeds.append(Seed("video", suffix, (folder / f"video{suffix}").read_bytes()))
-    seeds.append(Seed("video", ".mkv", write_matroska(folder / "video.mkv", pictures, [0, 33, 99]).read_bytes()))
+    seeds.append(
+        Seed(
+            "video",
+            ".mkv",
+            write_matroska(folder / "video.mkv", pictures, [0, 33, 99]).read_bytes(),
+        )
+    )
     texts = [(".json", camera.to_json()), (".toml", TOML), (".xml", QUALISYS)]
     texts += [
-        (Path(name).suffix, text + EXTRI.partition("---")[2] * (name == "intri.yml")) for name, text in KINDS.items()
+        (Path(name).suffix, text + EXTRI.partition("---")[2] * (name == "intri.yml"))
+        for name, text in KINDS.items()
     ]
-    texts += [(suffix, opencv(folder / f"calibration{suffix}").read_text()) for suffix in (".yml", ".json", ".xml")]
+    texts += [
+        (suffix, opencv(folder / f"calibration{suffix}").read_text())
+        for suffix in (".yml", ".json", ".xml")
+    ]
     seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]
     suffixes = {"ledger": ".sqlite3"}
-    seeds += [Seed(kind, suffixes.get(kind, ".jsonl"), content) for kind, content in written(folder).items()]
+    seeds += [
+        Seed(kind, suffixes.get(kind, ".jsonl"), content)
+        for kind, content in written(folder).items()
+    ]
     return [*seeds, Seed("plan", ".toml", PLAN.encode())]
 
 
@@ -99,7 +151,14 @@ def _image(mask: Any, suffix: str) -> bytes:
 
 def _pages(masks: Any, suffix: str) -> bytes:
     """Return an image of several pages."""
-    first, *others = [Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)) for mask in masks]
+    first, *others = [
+        Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)) for mask in masks
+    ]
     buffer = io.BytesIO()
-    first.save(buffer, Image.registered_extensions()[suffix], save_all=True, append_images=others)
+    first.save(
+        buffer,
+        Image.registered_extensions()[suffix],
+        save_all=True,
+        append_images=others,
+    )
     return buffer.getvalue()

@@ -42,27 +42,46 @@ def _changed(rng: random.Random, content: bytes, other: bytes) -> bytes:
     kind = rng.choice((0, 0, 0, 1, 2, 3, 4, 5, 5, 5, 6, 7, 8))
     if kind == 0 and size:  # a bit
         place = rng.randrange(size)
-        return content[:place] + bytes([content[place] ^ (1 << rng.randrange(8))]) + content[place + 1 :]
+        return (
+            content[:place]
+            + bytes([content[place] ^ (1 << rng.randrange(8))])
+            + content[place + 1 :]
+        )
     if kind == 1:  # cut off
         return content[:start]
     if kind == 2:  # a part is missing
         return content[:start] + content[start + length :]
     if kind == 3:  # a part comes several times
-        return content[:start] + content[start : start + length] * rng.choice((2, 3, 50)) + content[start + length :]
+        return (
+            content[:start]
+            + content[start : start + length] * rng.choice((2, 3, 50))
+            + content[start + length :]
+        )
     if kind == 4:  # a word
-        return content[:start] + rng.choice(WORDS) + content[start + rng.choice((0, 1, length)) :]
+        return (
+            content[:start]
+            + rng.choice(WORDS)
+            + content[start + rng.choice((0, 1, length)) :]
+        )
     if kind == 5:  # a number
         numbers = list(_NUMBER.finditer(content[:200_000]))
         if numbers:
             number = rng.choice(numbers)
-            return content[: number.start()] + rng.choice(NUMBERS) + content[number.end() :]
+            return (
+                content[: number.start()]
+                + rng.choice(NUMBERS)
+                + content[number.end() :]
+            )
     if kind == 6:  # a part of another file
         begin = rng.randrange(len(other) + 1)
-        return content[:start] + other[begin : begin + length] + content[start + length :]
+        return (
+            content[:start] + other[begin : begin + length] + content[start + length :]
+        )
     if kind == 7:  # lines in another order
         lines = content.split(b"\n")
         if len(lines) > 1:
-            a, b = rng.randrange(len(lines)), rng.randrange(len(lines))
+            a = rng.randrange(len(lines))
+            b = rng.randrange(len(lines))
             lines[a], lines[b] = lines[b], lines[a]
             return b"\n".join(lines)
     return content[:start] + rng.randbytes(length) + content[start + length :]
@@ -77,18 +96,32 @@ def _repacked(rng: random.Random, content: bytes) -> bytes:
         members.pop(name)
     else:
         header = members[name][:128] if rng.random() < 0.7 else members[name]
-        members[name] = _changed(rng, header, rng.choice(list(members.values()))) + members[name][len(header) :]
+        members[name] = (
+            _changed(rng, header, rng.choice(list(members.values())))
+            + members[name][len(header) :]
+        )
     buffer = io.BytesIO()
-    packed = rng.choice((*[zipfile.ZIP_STORED] * 9, *[zipfile.ZIP_DEFLATED] * 10, zipfile.ZIP_BZIP2))
+    packed = rng.choice(
+        (*[zipfile.ZIP_STORED] * 9, *[zipfile.ZIP_DEFLATED] * 10, zipfile.ZIP_BZIP2)
+    )
     with zipfile.ZipFile(buffer, "w", packed) as archive:
         for member, value in members.items():
             archive.writestr(member, value)
-    return buffer.getvalue() if rng.random() < 0.9 else _changed(rng, buffer.getvalue(), content)
+    return (
+        buffer.getvalue()
+        if rng.random() < 0.9
+        else _changed(rng, buffer.getvalue(), content)
+    )
 
 
 def _resized(rng: random.Random, content: bytes) -> bytes:
     """Return a PNG file that states another size, colour or depth, whose checksum is right."""
-    sides = [rng.choice((0, 1, 64, 48, 7000, 20_000, 2**20, 2**31 - 1, 2**32 - 1)) for _ in range(2)]
-    head = struct.pack(">IIBB", *sides, rng.choice((1, 2, 4, 8, 16)), rng.choice((0, 2, 3, 4, 6)))
+    sides = [
+        rng.choice((0, 1, 64, 48, 7000, 20_000, 2**20, 2**31 - 1, 2**32 - 1))
+        for _ in range(2)
+    ]
+    head = struct.pack(
+        ">IIBB", *sides, rng.choice((1, 2, 4, 8, 16)), rng.choice((0, 2, 3, 4, 6))
+    )
     chunk = b"IHDR" + head + content[26:28] + bytes([rng.choice((0, 1))])
     return content[:12] + chunk + struct.pack(">I", zlib.crc32(chunk)) + content[33:]

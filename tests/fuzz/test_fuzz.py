@@ -15,13 +15,25 @@ def test_five_thousand_damaged_files_are_read_or_refused_with_one_line():
     tally = run(2, range(5_000), 1)
     assert tally.findings == []
     assert tally.counts.total() == 5_000
-    assert all(tally.counts[reader, "read"] for reader, _ in tally.counts.copy())  # some were still whole enough
+    # some were still whole enough
+    assert all(tally.counts[reader, "read"] for reader, _ in tally.counts.copy())
 
 
 def test_an_input_is_the_same_for_the_same_seed_and_number():
-    seeds = [Seed("plan", ".toml", b"seeds = [0, 1, 2]\n" * 9), Seed("ledger", ".json", b'{"format": 1}')]
+    seeds = [
+        Seed("plan", ".toml", b"seeds = [0, 1, 2]\n" * 9),
+        Seed("ledger", ".json", b'{"format": 1}'),
+    ]
     assert input_of(seeds, 1, 7) == input_of(seeds, 1, 7)
-    assert len({mutated(random.Random(k), seeds[0].content, ".toml", b"x")[:60] for k in range(50)}) > 10
+    assert (
+        len(
+            {
+                mutated(random.Random(k), seeds[0].content, ".toml", b"x")[:60]
+                for k in range(50)
+            }
+        )
+        > 10
+    )
 
 
 def test_the_harness_tells_what_is_neither_read_nor_refused(tmp_path):
@@ -34,11 +46,18 @@ def test_the_harness_tells_what_is_neither_read_nor_refused(tmp_path):
         return read
 
     assert outcome(lambda _: None, path)[0] == "read"
-    assert outcome(raising(ValueError(f"{path}: expected a plan, got none")), path)[0] == "refused"
+    assert (
+        outcome(raising(ValueError(f"{path}: expected a plan, got none")), path)[0]
+        == "refused"
+    )
     assert outcome(raising(ValueError("no")), path)[0] == "unclean"
     assert outcome(raising(KeyError("rows")), path)[0] == "unclean"
     tally = Tally()
     tally.add(0, ["read", "plan", MEGABYTES + 1, ""], 0.0)
     tally.add(1, ["refused", "plan", 1, ""], SECONDS + 1.0)
     tally.add(2, ["unclean", "plan", 1, "KeyError: 'rows'"], 0.0)
-    assert [finding.split()[1] for finding in tally.findings] == ["large", "hang", "unclean"]
+    assert [finding.split()[1] for finding in tally.findings] == [
+        "large",
+        "hang",
+        "unclean",
+    ]

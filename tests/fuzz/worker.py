@@ -21,8 +21,10 @@ from tests.fuzz.corpus import Seed, corpus
 from tests.fuzz.mutator import mutated
 
 NAME = "subject"  # what every input is called, so that a message can be seen to name it
-ADDRESSES = 6_000_000_000  # bytes of addresses that a child may have more than it has at first
-CELLS = 2_000  # of a plan here: a million are allowed, and reading takes as long as there are cells
+# bytes of addresses that a child may have more than it has at first
+ADDRESSES = 6_000_000_000
+# of a plan here: a million are allowed, and reading takes as long as there are cells
+CELLS = 2_000
 LONGEST = 400  # characters of a message
 
 
@@ -52,13 +54,26 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
 
     def calibration(path: Path) -> object:
         cameras = read_calibrations(path)
-        cameras = [fit for camera in cameras if (fit := camera if camera.size else camera.padded((640, 480)))]
-        alike = [camera for camera in cameras if camera.size and 3 * camera.size[0] == 4 * camera.size[1]]
-        return [(camera.camera((64, 48), upright(cameras)), camera.maps((64, 48))) for camera in alike]
+        cameras = [
+            fit
+            for camera in cameras
+            if (fit := camera if camera.size else camera.padded((640, 480)))
+        ]
+        alike = [
+            camera
+            for camera in cameras
+            if camera.size and 3 * camera.size[0] == 4 * camera.size[1]
+        ]
+        return [
+            (camera.camera((64, 48), upright(cameras)), camera.maps((64, 48)))
+            for camera in alike
+        ]
 
     def video(path: Path) -> object:
         filmed = Video.of(path)
-        return filmed.warnings, [image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)]
+        return filmed.warnings, [
+            image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)
+        ]
 
     return {
         "asf": parse_asf,
@@ -77,7 +92,9 @@ def input_of(seeds: list[Seed], seed: int, number: int) -> tuple[Seed, bytes]:
     """Return the valid file that an input was, and what it became."""
     rng = random.Random(f"{seed}/{number}")
     kinds = sorted({one.reader for one in seeds})
-    one = rng.choice([each for each in seeds if each.reader == kinds[number % len(kinds)]])
+    one = rng.choice(
+        [each for each in seeds if each.reader == kinds[number % len(kinds)]]
+    )
     return one, mutated(rng, one.content, one.suffix, rng.choice(seeds).content)
 
 
@@ -87,11 +104,20 @@ def outcome(read: Callable[[Path], object], path: Path) -> tuple[str, str]:
         read(path)
     except ValueError as error:
         message = str(error)
-        clean = NAME in message and "\n" not in message.strip() and len(message) < LONGEST
-        return ("refused", "") if clean else ("unclean", f"{type(error).__name__}: {message[:500]}")
+        clean = (
+            NAME in message and "\n" not in message.strip() and len(message) < LONGEST
+        )
+        return (
+            ("refused", "")
+            if clean
+            else ("unclean", f"{type(error).__name__}: {message[:500]}")
+        )
     except BaseException as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
-        return "unclean", f"{type(error).__name__}: {str(error)[:300]} ({place.filename}:{place.lineno})"
+        return (
+            "unclean",
+            f"{type(error).__name__}: {str(error)[:300]} ({place.filename}:{place.lineno})",
+        )
     return "read", ""
 
 
@@ -110,7 +136,9 @@ def main(seed: int, numbers: range, kinds: str) -> None:
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        seeds = [one for one in corpus(folder) if not kinds or one.reader in kinds.split(",")]
+        seeds = [
+            one for one in corpus(folder) if not kinds or one.reader in kinds.split(",")
+        ]
         known = readers(folder)
         for one in seeds:  # what is compiled or imported at first is not an input's
             (folder / f"{NAME}{one.suffix}").write_bytes(one.content)
@@ -119,7 +147,9 @@ def main(seed: int, numbers: range, kinds: str) -> None:
             _clear(folder)
         with open("/proc/self/statm", encoding="ascii") as file:
             addresses = int(file.read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (addresses + ADDRESSES, addresses + ADDRESSES))
+        resource.setrlimit(
+            resource.RLIMIT_AS, (addresses + ADDRESSES, addresses + ADDRESSES)
+        )
         peak()
         quiet = os.open(os.devnull, os.O_WRONLY)
         for stream in (1, 2):  # what libraries print is no part of the answer

@@ -30,7 +30,10 @@ NAME = "subject"
 def written(folder: Path) -> dict[str, bytes]:
     """Return a valid content for each of `readers`, which need what is left in `folder`."""
     made = [result(cells(1)[0], 1.0).row, search_result(search_cell("sapso"), 9).row]
-    figures = [{name: value for name, value in row.items() if name not in NAMES} for row in made]
+    figures = [
+        {name: value for name, value in row.items() if name not in NAMES}
+        for row in made
+    ]
     with Writer(folder / "seed" / FILE) as ledger:
         ledger.plan(cells(2))
         ledger.finish(cells(1)[0].key, result(cells(1)[0], 1.0))
@@ -38,12 +41,19 @@ def written(folder: Path) -> dict[str, bytes]:
         np.zeros(66), np.zeros(3), 1.0, np.ones((2, 3)), 40, np.array([[20, 2.0], [40, 1.0]]),
         Posterior(np.zeros((2, 66)), np.zeros((2, 3)), np.ones(2)), 0.5, "walk", {"a": np.ones(2), "b": "text"}, 0.1,
     )  # fmt: skip
-    with suppress(_ReadError), OutputFolder(folder / "made" / NAME, False, False, SPEC, lambda _: None) as output:
+    with (
+        suppress(_ReadError),
+        OutputFolder(
+            folder / "made" / NAME, False, False, SPEC, lambda _: None
+        ) as output,
+    ):
         for seed in range(3):
             output.record(frame, dict(np.random.default_rng(seed).bit_generator.state))
         raise _ReadError
     (unfinished,) = (folder / "made").iterdir()
-    content, mark = ((unfinished / name).read_bytes() for name in ("frames.jsonl", "unfinished.json"))
+    content, mark = (
+        (unfinished / name).read_bytes() for name in ("frames.jsonl", "unfinished.json")
+    )
     return {
         "rows": lines(made[0]["spec"], figures[0]), "searches": lines(made[1]["spec"], figures[1]),
         "quarantine": lines(made[0]["spec"], ["it had to"]), "ledger": (folder / "seed" / FILE).read_bytes(),
@@ -58,7 +68,9 @@ def lines(*values: object) -> bytes:
 
 def mended(content: bytes) -> bytes:
     """Return content whose lines have right checksums, where they are recorded frames."""
-    return _FRAME.sub(lambda match: b"%08x %s" % (zlib.crc32(match[1]), match[1]), content)
+    return _FRAME.sub(
+        lambda match: b"%08x %s" % (zlib.crc32(match[1]), match[1]), content
+    )
 
 
 def readers() -> dict[str, Callable[[Path], object]]:
@@ -86,8 +98,18 @@ def readers() -> dict[str, Callable[[Path], object]]:
             with Writer(file):
                 pass
             with closing(sqlite3.connect(file)) as database, database:
-                cell = "a" * 64, kind, spec, status, row if status != "done" else "[]", row
-                database.execute("INSERT INTO cells (key, kind, spec, status, faults, row) VALUES (?,?,?,?,?,?)", cell)
+                cell = (
+                    "a" * 64,
+                    kind,
+                    spec,
+                    status,
+                    row if status != "done" else "[]",
+                    row,
+                )
+                database.execute(
+                    "INSERT INTO cells (key, kind, spec, status, faults, row) VALUES (?,?,?,?,?,?)",
+                    cell,
+                )
             return reported(file)
 
         return read
@@ -99,7 +121,10 @@ def readers() -> dict[str, Callable[[Path], object]]:
             shutil.copytree(next((path.parent / "made").iterdir()), folder)
             os.replace(path, folder / name)
             frames: list[Frame] = []
-            with suppress(_ReadError), OutputFolder(room / NAME, False, True, SPEC, checked_message) as output:
+            with (
+                suppress(_ReadError),
+                OutputFolder(room / NAME, False, True, SPEC, checked_message) as output,
+            ):
                 frames, _ = output.earlier()
                 raise _ReadError
             return frames

@@ -39,7 +39,9 @@ def opencv(path: Path, placed: bool = True) -> Path:
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     storage.write("image_width", 640)
     storage.write("image_height", 480)
-    storage.write("camera_matrix", np.array([[500.0, 0, 319.5], [0, 510.0, 239.5], [0, 0, 1]]))
+    storage.write(
+        "camera_matrix", np.array([[500.0, 0, 319.5], [0, 510.0, 239.5], [0, 0, 1]])
+    )
     storage.write("distortion_coefficients", np.array([[0.1, 0.0, 0.0, 0.0, 0.0]]))
     if placed:
         storage.write("rvec", np.array([np.pi / 2, 0.0, 0.0]))
@@ -48,7 +50,8 @@ def opencv(path: Path, placed: bool = True) -> Path:
     return path
 
 
-ROTATION = cv2.Rodrigues(np.array([1.4, 0.3, -0.2]))[0]  # a camera that looks along a z-up world's ground
+# a camera that looks along a z-up world's ground
+ROTATION = cv2.Rodrigues(np.array([1.4, 0.3, -0.2]))[0]
 TRANSLATION = np.array([0.3, 1.1, 4.2])
 POSE = ROTATION, TRANSLATION
 K = [[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]]
@@ -61,7 +64,11 @@ def matrix_text(name: str, values: object) -> str:
     return f"{name}: !!opencv-matrix\n{shape}   data: {array.ravel().tolist()}\n"
 
 
-PLACED = {"rotation": cv2.Rodrigues(ROTATION)[0].tolist(), "translation": TRANSLATION[:, None].tolist()}  # columns
+# columns
+PLACED = {
+    "rotation": cv2.Rodrigues(ROTATION)[0].tolist(),
+    "translation": TRANSLATION[:, None].tolist(),
+}
 ENTRY = f"size = [640, 480]\nmatrix = {K}\ndistortions = {LENS}\nrotation = {PLACED['rotation']}\ntranslation = {PLACED['translation']}\nfisheye = false\n"
 LEFT_RIGHT = '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n'
 WRITTEN = {"R": PLACED["rotation"], "Rot": ROTATION, "T": PLACED["translation"]}
@@ -71,10 +78,16 @@ def matrices(**values: object) -> str:
     return "".join(matrix_text(name, value) for name, value in values.items())
 
 
-YAML_24 = "%YAML:1.0\nimage_Width: 640\nimage_Height: 480\n" + matrices(Camera_Matrix=K, Distortion_Coefficients=LENS)
-INTRI = LEFT_RIGHT + matrices(K_left=K, dist_left=LENS, K_right=K, dist_right=np.zeros(5))
+YAML_24 = "%YAML:1.0\nimage_Width: 640\nimage_Height: 480\n" + matrices(
+    Camera_Matrix=K, Distortion_Coefficients=LENS
+)
+INTRI = LEFT_RIGHT + matrices(
+    K_left=K, dist_left=LENS, K_right=K, dist_right=np.zeros(5)
+)
 EXTRI = LEFT_RIGHT + "".join(
-    matrix_text(f"{kind}_{name}", value) for name in ("left", "right") for kind, value in WRITTEN.items()
+    matrix_text(f"{kind}_{name}", value)
+    for name in ("left", "right")
+    for kind, value in WRITTEN.items()
 )
 ROS = (
     "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n"

@@ -8,10 +8,26 @@ import cv2
 import numpy as np
 import pytest
 
-from posefit.geometry.calibration import Calibration, guessed_up, read_calibrations, upright
+from posefit.geometry.calibration import (
+    Calibration,
+    guessed_up,
+    read_calibrations,
+    upright,
+)
 from posefit.geometry.camera import Camera
 from tests.cases import each
-from tests.geometry.calibrations import KINDS, LENS, POSE, QUALISYS, TOML, YAML_24, K, kind_written, matrices, opencv
+from tests.geometry.calibrations import (
+    KINDS,
+    LENS,
+    POSE,
+    QUALISYS,
+    TOML,
+    YAML_24,
+    K,
+    kind_written,
+    matrices,
+    opencv,
+)
 from tests.geometry.turns import about
 
 
@@ -29,65 +45,115 @@ def test_every_format_gives_the_same_camera(tmp_path: Path, name: str) -> None:
     assert (one.size, one.distorted) == ((640, 480), True)
     camera = one.camera((320, 240), upright([one]))
     np.testing.assert_allclose(camera.focal, [250.0, 255.0])
-    np.testing.assert_allclose(camera.centre, [160.0, 120.0])  # OpenCV's 319.5 is the middle of 640 pixels
+    # OpenCV's 319.5 is the middle of 640 pixels
+    np.testing.assert_allclose(camera.centre, [160.0, 120.0])
     # z was up: the camera stands 4 m before the origin, 1 m up, and sees up as up
     np.testing.assert_allclose(camera.position, [0.0, 1.0, 4.0], atol=1e-9)
-    pixels, depths = camera.project(np.array([[0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 0.0]]))
+    pixels, depths = camera.project(
+        np.array([[0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 0.0]])
+    )
     np.testing.assert_allclose(depths, 4.0)
-    np.testing.assert_allclose(pixels, [[160.0, 120.0], [160.0, 120.0 - 255.0 / 4.0], [160.0 + 62.5, 120.0]])
+    np.testing.assert_allclose(
+        pixels, [[160.0, 120.0], [160.0, 120.0 - 255.0 / 4.0], [160.0 + 62.5, 120.0]]
+    )
 
 
 def test_our_own_cameras_come_back_however_they_are_held(tmp_path: Path) -> None:
-    down = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks straight down: its up is -z
+    # looks straight down: its up is -z
+    down = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     for camera in (
         Camera.around(np.array([0.1, 0.9, 0.3]), 0.7, 3.0, (320, 240)),
-        Camera(320, 240, np.full(2, 300.0), np.array([160.0, 120.0]), down, np.array([0.0, 0.0, 4.0])),
+        Camera(
+            320,
+            240,
+            np.full(2, 300.0),
+            np.array([160.0, 120.0]),
+            down,
+            np.array([0.0, 0.0, 4.0]),
+        ),
     ):
         (tmp_path / "camera.json").write_text(camera.to_json())
         (one,) = read_calibrations(tmp_path / "camera.json")
         again = one.camera((320, 240), upright([one]))
         for name in ("focal", "centre", "rotation", "translation"):
-            np.testing.assert_allclose(getattr(again, name), getattr(camera, name), atol=1e-12)
+            np.testing.assert_allclose(
+                getattr(again, name), getattr(camera, name), atol=1e-12
+            )
 
 
-def test_a_camera_that_is_not_placed_looks_level_from_the_origin(tmp_path: Path) -> None:
+def test_a_camera_that_is_not_placed_looks_level_from_the_origin(
+    tmp_path: Path,
+) -> None:
     (one,) = read_calibrations(opencv(tmp_path / "a.yml", placed=False))
     camera = one.camera((640, 480), upright([one]))
     np.testing.assert_allclose(camera.position, 0.0, atol=1e-12)
-    np.testing.assert_allclose(camera.project(np.array([[0.0, 0.0, -2.0]]))[0], [[320.0, 240.0]])
+    np.testing.assert_allclose(
+        camera.project(np.array([[0.0, 0.0, -2.0]]))[0], [[320.0, 240.0]]
+    )
 
 
 def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
-    (tmp_path / "a.xml").write_text(QUALISYS.replace('radialDistortion3="0"', 'radialDistortion3="0.3"'))
+    (tmp_path / "a.xml").write_text(
+        QUALISYS.replace('radialDistortion3="0"', 'radialDistortion3="0.3"')
+    )
     (one,) = read_calibrations(tmp_path / "a.xml")
     across, down = one.maps((640, 480))
     # Brown's model, as OpenCV's manual writes it: x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and
     # y (...) + p1 (r^2 + 2 y^2) + 2 p2 x y
-    u, v = 600, 40
-    x, y = (u - 319.5) / 500.0, (v - 239.5) / 510.0
+    u = 600
+    v = 40
+    x = (u - 319.5) / 500.0
+    y = (v - 239.5) / 510.0
     r2 = x * x + y * y
     bent = 1.0 - 0.05 * r2 + 0.1 * r2**2 + 0.3 * r2**3
-    p1, p2 = 0.001, 0.002
-    assert across[v, u] == pytest.approx(319.5 + 500.0 * (x * bent + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)), abs=1e-3)
-    assert down[v, u] == pytest.approx(239.5 + 510.0 * (y * bent + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y), abs=1e-3)
+    p1 = 0.001
+    p2 = 0.002
+    assert across[v, u] == pytest.approx(
+        319.5 + 500.0 * (x * bent + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)), abs=1e-3
+    )
+    assert down[v, u] == pytest.approx(
+        239.5 + 510.0 * (y * bent + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y), abs=1e-3
+    )
 
 
 @each(
     ("name", "text", "message"),
     [
-        ("a.toml", "[metadata]\nadjusted = false\n", "expected a calibration with a camera, got none"),
-        ("a.toml", TOML.replace("[ 640, 480]", "[ 640.5, 480]"), "an image size of 640.5 x 480"),
+        (
+            "a.toml",
+            "[metadata]\nadjusted = false\n",
+            "expected a calibration with a camera, got none",
+        ),
+        (
+            "a.toml",
+            TOML.replace("[ 640, 480]", "[ 640.5, 480]"),
+            "an image size of 640.5 x 480",
+        ),
         ("a.toml", TOML.replace("500.0", "nan"), "finite numbers"),
-        ("a.toml", TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"), "a distortion of 3 numbers"),
+        (
+            "a.toml",
+            TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"),
+            "a distortion of 3 numbers",
+        ),
         ("a.xml", "<calibration>", "XML that is broken"),
         ("a.xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><calibration/>", "document type"),
         ("a.xml", QUALISYS.replace("intrinsic", "lens"), "a camera without intrinsic"),
-        ("a.xml", QUALISYS.replace("tangentalD", "tangentialD"), "the lens key 'tangentialDistortion1'"),
+        (
+            "a.xml",
+            QUALISYS.replace("tangentalD", "tangentialD"),
+            "the lens key 'tangentialDistortion1'",
+        ),
         ("a.xml", QUALISYS.replace('r11="1"', 'r11="3"'), "a rotation that is none"),
-        ("a.yml", "%YAML:1.0\n---\nimage_width: 3\n", "without camera_matrix, image_width and image_height"),
+        (
+            "a.yml",
+            "%YAML:1.0\n---\nimage_width: 3\n",
+            "without camera_matrix, image_width and image_height",
+        ),
     ],
 )
-def test_a_file_that_is_no_calibration_is_named(tmp_path: Path, name: str, text: str, message: str) -> None:
+def test_a_file_that_is_no_calibration_is_named(
+    tmp_path: Path, name: str, text: str, message: str
+) -> None:
     (tmp_path / name).write_text(text)
     with pytest.raises(ValueError, match=message) as caught:
         read_calibrations(tmp_path / name)
@@ -111,18 +177,26 @@ HIDDEN = "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(
 @each(
     ("before", "after", "message"),
     [
-        ("   cols: 3", "   cols: 3x", "'3x' where a number should be"),  # OpenCV's own reader corrupted memory
+        # OpenCV's own reader corrupted memory
+        ("   cols: 3", "   cols: 3x", "'3x' where a number should be"),
         ("   cols: 3", "   cols: -3", "a matrix of 3 x -3 with 9 numbers"),
         ("   rows: 3", "   rows: 4", "a matrix of 4 x 3 with 9 numbers"),
         ("   dt: d", "   dt: 99d", "a matrix of the type '99d'"),
         ("data: [", "data: [ [[[1]]],", "where a number should be"),
         ("---", "--- !!python/object/apply:os.system ['true']", "YAML that is broken"),
-        ("image_width", "a0: &a0 {b: 1}\n" + HIDDEN + "image_width", None),  # merges are not expanded
+        # merges are not expanded
+        ("image_width", "a0: &a0 {b: 1}\n" + HIDDEN + "image_width", None),
         ("image_width", "a: " + "[" * 9000 + "\nimage_width", "YAML that is broken"),
-        ("image_width", "# " + "a" * 500_000 + "\nimage_width", "expected at most 0.5 MB"),
+        (
+            "image_width",
+            "# " + "a" * 500_000 + "\nimage_width",
+            "expected at most 0.5 MB",
+        ),
     ],
 )
-def test_a_hostile_yaml_is_read_as_far_as_it_goes_or_refused(tmp_path, before, after, message) -> None:
+def test_a_hostile_yaml_is_read_as_far_as_it_goes_or_refused(
+    tmp_path, before, after, message
+) -> None:
     assert before in OPENCV
     (tmp_path / "a.yml").write_text(OPENCV.replace(before, after, 1))
     if message is None:
@@ -137,24 +211,32 @@ def test_a_hostile_yaml_is_read_as_far_as_it_goes_or_refused(tmp_path, before, a
     ("made_for", "came", "fits"),
     [
         ((1080, 1920), (1088, 1920), True),
-        ((1920, 1088), (1920, 1080), True),  # calibrated with the padding, filmed without
+        # calibrated with the padding, filmed without
+        ((1920, 1088), (1920, 1080), True),
         ((1920, 1080), (1080, 1920), False),
         ((1080, 1920), (1082, 1920), False),
     ],
 )
-def test_a_picture_that_a_codec_filled_up_has_the_camera_that_it_had(made_for, came, fits) -> None:
+def test_a_picture_that_a_codec_filled_up_has_the_camera_that_it_had(
+    made_for, came, fits
+) -> None:
     matrix = np.array([[1500.0, 0.0, 531.0], [0.0, 1510.0, 970.0], [0.0, 0.0, 1.0]])
     one = Calibration("a", made_for, matrix, np.zeros(4), None, None)
     padded = one.padded(came)
     assert (padded is not None) == fits
     if padded is not None:
-        before, after = one.camera(made_for, np.eye(3)), padded.camera(came, np.eye(3))
-        np.testing.assert_array_equal([after.focal, after.centre], [before.focal, before.centre])
+        before = one.camera(made_for, np.eye(3))
+        after = padded.camera(came, np.eye(3))
+        np.testing.assert_array_equal(
+            [after.focal, after.centre], [before.focal, before.centre]
+        )
         assert (after.width, after.height) == came
 
 
 @each("name", list(KINDS))
-def test_cameras_of_every_program_project_as_opencv_does(tmp_path: Path, name: str) -> None:
+def test_cameras_of_every_program_project_as_opencv_does(
+    tmp_path: Path, name: str
+) -> None:
     read = read_calibrations(kind_written(tmp_path, name))
     one = read[0]
     assert len(read) == (2 if name == "intri.yml" else 1)
@@ -162,47 +244,93 @@ def test_cameras_of_every_program_project_as_opencv_does(tmp_path: Path, name: s
     placed = not name.startswith("ros")
     assert (one.rotation is not None) == placed
     points = np.random.default_rng(0).uniform(-0.8, 0.8, (40, 3))
-    turn, place = POSE if placed else (np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 3.0]))
-    bent = cv2.projectPoints(points, turn, place, np.array(K), np.array(LENS))[0].reshape(-1, 2) + 0.5
-    pixels = one.camera((640, 480), np.eye(3)).project(points if placed else points + [0.0, 0.0, -3.0])[0]
-    straight = one.straightened(np.concatenate([bent, np.ones((40, 1))], axis=1), (640, 480))[:, :2]
+    turn, place = (
+        POSE if placed else (np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 3.0]))
+    )
+    bent = (
+        cv2.projectPoints(points, turn, place, np.array(K), np.array(LENS))[0].reshape(
+            -1, 2
+        )
+        + 0.5
+    )
+    pixels = one.camera((640, 480), np.eye(3)).project(
+        points if placed else points + [0.0, 0.0, -3.0]
+    )[0]
+    straight = one.straightened(
+        np.concatenate([bent, np.ones((40, 1))], axis=1), (640, 480)
+    )[:, :2]
     np.testing.assert_allclose(straight, pixels, atol=2e-2)
 
 
-@each(("name", "value"), [("fisheye_model", "1"), ("distortion_model", "equidistant"), ("fisheye", "true")])
+@each(
+    ("name", "value"),
+    [("fisheye_model", "1"), ("distortion_model", "equidistant"), ("fisheye", "true")],
+)
 def test_a_fisheye_is_one(tmp_path: Path, name: str, value: str) -> None:
     text = f"%YAML:1.0\n---\nimage_width: 1280\nimage_height: 800\n{name}: {value}\n"
     k = np.array([[600.0, 0.0, 639.5], [0.0, 600.0, 399.5], [0.0, 0.0, 1.0]])
     for lens in ([0.1, -0.02, 0.003, 0.0], [0.0] * 4):  # without numbers, too
-        (tmp_path / "a.yml").write_text(text + matrices(camera_matrix=k, distortion_coefficients=lens))
+        (tmp_path / "a.yml").write_text(
+            text + matrices(camera_matrix=k, distortion_coefficients=lens)
+        )
         (one,) = read_calibrations(tmp_path / "a.yml")
         assert one.distorted
         rays = np.array([[1.0, 0.55, 1.0], [-0.4, 0.2, 1.0]])
-        bent = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), k, np.array(lens))[0].reshape(-1, 2)
-        straight = one.straightened(np.concatenate([bent + 0.5, np.ones((2, 1))], axis=1), (1280, 800))
-        np.testing.assert_allclose(straight[0, :2], [1240.0, 730.0], atol=0.01)  # 640 + 600 x, 400 + 600 y
+        bent = cv2.fisheye.projectPoints(
+            rays[:, None], np.zeros(3), np.zeros(3), k, np.array(lens)
+        )[0].reshape(-1, 2)
+        straight = one.straightened(
+            np.concatenate([bent + 0.5, np.ones((2, 1))], axis=1), (1280, 800)
+        )
+        # 640 + 600 x, 400 + 600 y
+        np.testing.assert_allclose(straight[0, :2], [1240.0, 730.0], atol=0.01)
         across, down = one.maps((1280, 800))
-        np.testing.assert_allclose([across[729, 1239], down[729, 1239]], bent[0], atol=0.8)
+        np.testing.assert_allclose(
+            [across[729, 1239], down[729, 1239]], bent[0], atol=0.8
+        )
 
 
-FINE = "image_size: [640, 480]\nlens: Canon 50 mm\nlens_focal_mm: 4.2\nmodel: HERO9\ndistance: 3.0\n" + matrices(K=K)
+FINE = (
+    "image_size: [640, 480]\nlens: Canon 50 mm\nlens_focal_mm: 4.2\nmodel: HERO9\ndistance: 3.0\n"
+    + matrices(K=K)
+)
 
 
 @each(
     ("text", "message"),
     [
-        (f"{FINE}dist_foo: [0.1, 0.2, 0, 0]", "the lens key 'dist_foo' of 'a', which is not known"),
-        (f"{FINE}lens_coefs: [0.1, 0, 0, 0]", "the lens key 'lens_coefs' of 'a', which is not known"),
+        (
+            f"{FINE}dist_foo: [0.1, 0.2, 0, 0]",
+            "the lens key 'dist_foo' of 'a', which is not known",
+        ),
+        (
+            f"{FINE}lens_coefs: [0.1, 0, 0, 0]",
+            "the lens key 'lens_coefs' of 'a', which is not known",
+        ),
         (f"{FINE}xi: 1.2", "the lens key 'xi' of 'a', which is not known"),
         (f"{FINE}kappa: 0.1", "the lens key 'kappa' of 'a', which is not known"),
         (f"{FINE}k4: 0.2\nk1: 0.1", "the lens key 'k4' of 'a', which is not known"),
-        (FINE.replace("K:", "camera_matrix:") + "k: [0.1, 0, 0, 0]", "the lens key 'k' of 'a', which is not known"),
-        (f"{FINE}distortion_model: double_sphere", "the lens model 'double_sphere', which is not known"),
-        (f"{FINE}model: omnidirectional", "the lens model 'omnidirectional', which is not known"),
-        (f"{FINE}fisheye: true\ndist: [0.1, 0.1, 0.1, 0.1, 0.1]", "a distortion of 5 numbers of a fisheye"),
+        (
+            FINE.replace("K:", "camera_matrix:") + "k: [0.1, 0, 0, 0]",
+            "the lens key 'k' of 'a', which is not known",
+        ),
+        (
+            f"{FINE}distortion_model: double_sphere",
+            "the lens model 'double_sphere', which is not known",
+        ),
+        (
+            f"{FINE}model: omnidirectional",
+            "the lens model 'omnidirectional', which is not known",
+        ),
+        (
+            f"{FINE}fisheye: true\ndist: [0.1, 0.1, 0.1, 0.1, 0.1]",
+            "a distortion of 5 numbers of a fisheye",
+        ),
     ],
 )
-def test_a_lens_that_is_not_known_is_named(tmp_path: Path, text: str, message: str) -> None:
+def test_a_lens_that_is_not_known_is_named(
+    tmp_path: Path, text: str, message: str
+) -> None:
     path = tmp_path / "a.yml"
     path.write_text(FINE)
     assert not read_calibrations(path)[0].distorted
@@ -214,13 +342,22 @@ def test_a_lens_that_is_not_known_is_named(tmp_path: Path, text: str, message: s
 @each(
     ("matrix", "message"),
     [
-        (np.diag([1e8, 1e8, 1]).tolist(), "focal must be in pixels, for such pictures 32 to 64000, got 1e"),
-        ([[4.2, 0, 319.5], [0, 4.2, 239.5], [0, 0, 1]], "focal must be in pixels"),  # millimetres
-        (np.transpose(K).tolist(), "a camera matrix that is not of the form fx 0 cx"),  # as MATLAB has it
+        (
+            np.diag([1e8, 1e8, 1]).tolist(),
+            "focal must be in pixels, for such pictures 32 to 64000, got 1e",
+        ),
+        # millimetres
+        ([[4.2, 0, 319.5], [0, 4.2, 239.5], [0, 0, 1]], "focal must be in pixels"),
+        # as MATLAB has it
+        (np.transpose(K).tolist(), "a camera matrix that is not of the form fx 0 cx"),
     ],
 )
-def test_a_camera_that_cannot_be_is_refused_before(tmp_path: Path, matrix: object, message: str) -> None:
-    (tmp_path / "a.json").write_text(json.dumps({"K": matrix, "image_size": [640, 480]}))
+def test_a_camera_that_cannot_be_is_refused_before(
+    tmp_path: Path, matrix: object, message: str
+) -> None:
+    (tmp_path / "a.json").write_text(
+        json.dumps({"K": matrix, "image_size": [640, 480]})
+    )
     with pytest.raises(ValueError, match=message):
         read_calibrations(tmp_path / "a.json")
 
@@ -229,27 +366,46 @@ def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
     path = kind_written(tmp_path, "intri.yml")
     (one,) = read_calibrations(f"{path}:right")
     assert (one.name, one.distorted) == ("right", False)
-    with pytest.raises(ValueError, match="intri.yml: expected the name of a camera, left, right, got 'middle'"):
+    with pytest.raises(
+        ValueError,
+        match="intri.yml: expected the name of a camera, left, right, got 'middle'",
+    ):
         read_calibrations(f"{path}:middle")
     (tmp_path / "a:b.yml").write_text(YAML_24)  # a name of a file may have a colon
     assert read_calibrations(tmp_path / "a:b.yml")[0].distorted
 
 
-def test_up_that_is_named_holds_for_our_own_cameras_and_a_guess_is_reported(tmp_path: Path) -> None:
+def test_up_that_is_named_holds_for_our_own_cameras_and_a_guess_is_reported(
+    tmp_path: Path,
+) -> None:
     level = Camera.around(np.zeros(3), 0.4, 3.0, (320, 240))
-    lying = replace(level, rotation=level.rotation @ upright([], None) @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
+    lying = replace(
+        level,
+        rotation=level.rotation
+        @ upright([], None)
+        @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    )
     (tmp_path / "a.json").write_text(lying.to_json())
     (one,) = read_calibrations(tmp_path / "a.json")
     why = "as posefit's own files have it, though z is in their images"
     assert guessed_up([one]) == f"+y is up in the cameras' world, {why}"
-    np.testing.assert_allclose(one.camera((320, 240), upright([one], "z")).rotation, level.rotation, atol=1e-9)
-    for degrees, doubted in ((55.0, False), (65.0, True)):  # of which the cosines are 0.57 and 0.42
+    np.testing.assert_allclose(
+        one.camera((320, 240), upright([one], "z")).rotation, level.rotation, atol=1e-9
+    )
+    # of which the cosines are 0.57 and 0.42
+    for degrees, doubted in ((55.0, False), (65.0, True)):
         down = replace(level, rotation=about(0, np.radians(degrees)) @ level.rotation)
         (tmp_path / "a.json").write_text(down.to_json())
         for count in (1, 3):
-            assert bool(guessed_up(count * read_calibrations(tmp_path / "a.json"))) == doubted
+            assert (
+                bool(guessed_up(count * read_calibrations(tmp_path / "a.json")))
+                == doubted
+            )
     (tmp_path / "a.json").write_text(level.to_json())
     assert guessed_up(read_calibrations(tmp_path / "a.json")) == ""
-    assert guessed_up(read_calibrations(written(tmp_path, "a.toml"))) == "+z is up in the cameras' world"
+    assert (
+        guessed_up(read_calibrations(written(tmp_path, "a.toml")))
+        == "+z is up in the cameras' world"
+    )
     with pytest.raises(ValueError, match="up must be one of x, y, z, got 'w'"):
         upright([one], "w")  # type: ignore[arg-type]

@@ -7,7 +7,16 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.kernels import sine_cosine
 from posefit.geometry.rotation import rotation_from_joint_angles
-from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, LIMBS, Skeleton, angle_index, angles_of
+from posefit.geometry.skeleton import (
+    ANGLES,
+    BONES,
+    INNER,
+    JOINTS,
+    LIMBS,
+    Skeleton,
+    angle_index,
+    angles_of,
+)
 from posefit.motion.built_in import average_skeleton
 from tests.cases import each
 from tests.geometry.turns import about, chained
@@ -21,7 +30,10 @@ def test_polynomial_sines_are_numpys_over_many_turns() -> None:
 
 
 def slow_joints(skeleton: Skeleton, pose: Array, place: Array) -> Array:
-    angles = [pose[3 + 3 * INNER.index(j) :][:3] if j in INNER else np.zeros(3) for j in range(1, len(JOINTS))]
+    angles = [
+        pose[3 + 3 * INNER.index(j) :][:3] if j in INNER else np.zeros(3)
+        for j in range(1, len(JOINTS))
+    ]
     turns = [about(2, z) @ about(1, y) @ about(0, x) for x, y, z in angles]
     root = about(1, pose[0]) @ about(0, pose[1]) @ about(2, pose[2])
     return chained(root, place, turns, list(skeleton.axes), list(skeleton.offsets))
@@ -29,26 +41,41 @@ def slow_joints(skeleton: Skeleton, pose: Array, place: Array) -> Array:
 
 def test_shapes_are_checked() -> None:
     skeleton = average_skeleton()
-    with pytest.raises(ValueError, match=r"poses must have shape \(..., 66\), got \(2, 65\)"):
+    with pytest.raises(
+        ValueError, match=r"poses must have shape \(..., 66\), got \(2, 65\)"
+    ):
         skeleton.joints(np.zeros((2, 65)))
-    with pytest.raises(ValueError, match=r"translations must have shape \(2, 3\), got \(3,\)"):
+    with pytest.raises(
+        ValueError, match=r"translations must have shape \(2, 3\), got \(3,\)"
+    ):
         skeleton.joints(np.zeros((2, 66)), np.zeros(3))
-    with pytest.raises(ValueError, match=r"offsets must have shape \(26, 3\), got \(25, 3\)"):
+    with pytest.raises(
+        ValueError, match=r"offsets must have shape \(26, 3\), got \(25, 3\)"
+    ):
         Skeleton("x", np.zeros((25, 3)), np.zeros((26, 3, 3)), ())
 
 
 def test_free_angles_are_the_channels_and_the_root() -> None:
     channels = ("ltibia", ("rx",)), ("rfoot", ("rx", "rz")), ("rthumb", ("rx",))
-    skeleton = Skeleton("x", np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1)), channels)
-    tibia, foot = angle_index(JOINTS.index("ltibia")), angle_index(JOINTS.index("rfoot"))
+    skeleton = Skeleton(
+        "x", np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1)), channels
+    )
+    tibia = angle_index(JOINTS.index("ltibia"))
+    foot = angle_index(JOINTS.index("rfoot"))
     assert np.flatnonzero(skeleton.free).tolist() == [0, 1, 2, tibia, foot, foot + 2]
 
 
 @pytest.mark.pure
 def test_one_pose_equals_the_slow_twin_even_uncompiled() -> None:
     skeleton = average_skeleton()
-    pose, place = np.random.default_rng(6).uniform(-3.0, 3.0, ANGLES), np.array([0.1, 0.2, 0.3])
-    np.testing.assert_allclose(skeleton.joints(pose, place), slow_joints(skeleton, pose, place), rtol=0.0, atol=1e-9)
+    pose = np.random.default_rng(6).uniform(-3.0, 3.0, ANGLES)
+    place = np.array([0.1, 0.2, 0.3])
+    np.testing.assert_allclose(
+        skeleton.joints(pose, place),
+        slow_joints(skeleton, pose, place),
+        rtol=0.0,
+        atol=1e-9,
+    )
 
 
 def test_joints_equal_the_slow_twin_whatever_the_frames_of_the_angles() -> None:
@@ -56,13 +83,23 @@ def test_joints_equal_the_slow_twin_whatever_the_frames_of_the_angles() -> None:
     for share in (0.0, 0.5, 1.0):  # of the bones, those whose frame is turned
         axes = np.tile(np.eye(3), (26, 1, 1))
         turned = rng.random(26) < share
-        axes[turned] = rotation_from_joint_angles(rng.uniform(-3.0, 3.0, (int(turned.sum()), 3)))
+        axes[turned] = rotation_from_joint_angles(
+            rng.uniform(-3.0, 3.0, (int(turned.sum()), 3))
+        )
         skeleton = Skeleton("x", rng.normal(0.0, 0.3, (26, 3)), axes, ())
-        poses, places = rng.uniform(-3.0, 3.0, (10, ANGLES)), rng.normal(size=(10, 3))
-        slow = [slow_joints(skeleton, pose, place) for pose, place in zip(poses, places, strict=True)]
-        np.testing.assert_allclose(skeleton.joints(poses, places), slow, rtol=0.0, atol=1e-9)
+        poses = rng.uniform(-3.0, 3.0, (10, ANGLES))
+        places = rng.normal(size=(10, 3))
+        slow = [
+            slow_joints(skeleton, pose, place)
+            for pose, place in zip(poses, places, strict=True)
+        ]
+        np.testing.assert_allclose(
+            skeleton.joints(poses, places), slow, rtol=0.0, atol=1e-9
+        )
         led = skeleton.joints(poses.reshape(2, 5, ANGLES), places.reshape(2, 5, 3))
-        np.testing.assert_array_equal(led.reshape(10, 27, 3), skeleton.joints(poses, places))
+        np.testing.assert_array_equal(
+            led.reshape(10, 27, 3), skeleton.joints(poses, places)
+        )
 
 
 @each("name", LIMBS)
@@ -70,13 +107,20 @@ def test_a_limbs_angles_move_all_of_its_bones_and_no_other(name: str) -> None:
     skeleton = average_skeleton()
     pose = np.zeros(66)
     pose[angles_of(LIMBS[name])] = 0.3
-    moved = np.abs(skeleton.joints(pose) - skeleton.joints(np.zeros(66))).max(axis=1) > 1e-9
+    moved = (
+        np.abs(skeleton.joints(pose) - skeleton.joints(np.zeros(66))).max(axis=1) > 1e-9
+    )
     assert set(np.flatnonzero(moved[1:])) == {BONES.index(bone) for bone in LIMBS[name]}
 
 
 def test_a_joint_is_as_wide_as_the_widest_bone_that_meets_there() -> None:
     radii = np.zeros((26, 2))
-    bones = {"lhipjoint": (0.1, 0.2), "rhipjoint": (0.3, 0.0), "lfemur": (0.15, 0.05), "head": (0.0, 0.4)}
+    bones = {
+        "lhipjoint": (0.1, 0.2),
+        "rhipjoint": (0.3, 0.0),
+        "lfemur": (0.15, 0.05),
+        "head": (0.0, 0.4),
+    }
     radii[[BONES.index(bone) for bone in bones]] = list(bones.values())
     joint_radii = Body(average_skeleton(), radii).joint_radii()
     by_hand = {"root": 0.3, "lhipjoint": 0.2, "lfemur": 0.05, "head": 0.4}
@@ -85,9 +129,14 @@ def test_a_joint_is_as_wide_as_the_widest_bone_that_meets_there() -> None:
 
 def test_radii_are_checked() -> None:
     skeleton = average_skeleton()
-    with pytest.raises(ValueError, match=r"radii must have shape \(26, 2\), got \(2, 26\)"):
+    with pytest.raises(
+        ValueError, match=r"radii must have shape \(26, 2\), got \(2, 26\)"
+    ):
         Body(skeleton, np.zeros((2, 26)))
-    for bad, message in ((-0.1, "radii must not be negative, got -0.1"), (np.nan, "radii must be finite")):
+    for bad, message in (
+        (-0.1, "radii must not be negative, got -0.1"),
+        (np.nan, "radii must be finite"),
+    ):
         radii = np.ones((26, 2))
         radii[3, 1] = bad
         with pytest.raises(ValueError, match=message):

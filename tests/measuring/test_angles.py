@@ -30,29 +30,42 @@ def measured(**turned: float) -> dict[str, float]:
     pose = np.zeros((1, ANGLES))
     for name, degrees in turned.items():
         pose[0, angle(*name.split("_"))] = np.radians(degrees)
-    return {name: float(values[0]) for name, values in clinical_angles(SKELETON, pose).items()}
+    return {
+        name: float(values[0])
+        for name, values in clinical_angles(SKELETON, pose).items()
+    }
 
 
 def test_the_centres_are_where_bones_meet() -> None:
     motion = built_in.motion("walk", frames=3)
     centres = joint_centres(motion)
     assert tuple(centres) == CENTRES
-    np.testing.assert_array_equal(centres["left_knee"], motion.joints[:, JOINTS.index("lfemur")])
+    np.testing.assert_array_equal(
+        centres["left_knee"], motion.joints[:, JOINTS.index("lfemur")]
+    )
     assert len(set(PLACES)) == len(JOINTS)
     assert PLACES[JOINTS.index("lowerback")] == "lumbar"  # not of the left side
 
 
 @each(("side", "inwards"), [("left", -20.0), ("right", 20.0)])
-def test_a_leg_is_at_zero_where_it_stands_straight_and_moves_in_clinical_words(side: str, inwards: float) -> None:
+def test_a_leg_is_at_zero_where_it_stands_straight_and_moves_in_clinical_words(
+    side: str, inwards: float
+) -> None:
     def leg(**turned: float) -> dict[str, float]:
-        angles = measured(**{f"{side[0]}{name}": value for name, value in turned.items()})
+        angles = measured(
+            **{f"{side[0]}{name}": value for name, value in turned.items()}
+        )
         return {
             name.removeprefix(f"{side}_"): round(value, 2)
             for name, value in angles.items()
-            if name.startswith(side) and not abs(value) <= 1e-3 and "shoulder" not in name and "elbow" not in name
+            if name.startswith(side)
+            and not abs(value) <= 1e-3
+            and "shoulder" not in name
+            and "elbow" not in name
         }
 
-    assert leg(femur_z=inwards) == {}  # the legs of the pose of rest are apart by 20 degrees each
+    # the legs of the pose of rest are apart by 20 degrees each
+    assert leg(femur_z=inwards) == {}
     assert leg(femur_z=inwards, femur_x=-30.0) == {"hip_flexion": 30.0}
     assert leg(femur_z=inwards, tibia_x=60.0) == {"knee_flexion": 60.0}
     assert leg(femur_z=inwards, foot_x=-15.0) == {"ankle_dorsiflexion": 15.0}
@@ -85,7 +98,8 @@ def test_a_shoulder_near_its_pole_is_left_blank() -> None:
 
 
 def test_a_mirrored_body_has_the_other_sides_angles_and_its_yaw_changes_none() -> None:
-    poses = recorded.clip("02_01").motion().poses  # the skeleton is the same on both sides
+    # the skeleton is the same on both sides
+    poses = recorded.clip("02_01").motion().poses
     angles = clinical_angles(SKELETON, poses)
     mirrored = clinical_angles(SKELETON, mirrored_poses(SKELETON, poses))
     turned = clinical_angles(SKELETON, poses + 2.0 * np.eye(66)[0])
@@ -128,10 +142,18 @@ def read_c3d(path: Path) -> Any:
 def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
     write_c3d(tmp_path / "walk.c3d", walk, BLANK, gait_of(walk))
     read = read_c3d(tmp_path / "walk.c3d")
-    points, header = read["data"]["points"], read["header"]["points"]
-    parameters = {name: read["parameters"]["POINT"][name]["value"] for name in ("LABELS", "UNITS", "RATE")}
+    points = read["data"]["points"]
+    header = read["header"]["points"]
+    parameters = {
+        name: read["parameters"]["POINT"][name]["value"]
+        for name in ("LABELS", "UNITS", "RATE")
+    }
     assert parameters == {"LABELS": list(PLACES), "UNITS": ["mm"], "RATE": [30.0]}
-    assert (header["frame_rate"], header["first_frame"], header["last_frame"]) == (30.0, 0, len(walk) - 1)
+    assert (header["frame_rate"], header["first_frame"], header["last_frame"]) == (
+        30.0,
+        0,
+        len(walk) - 1,
+    )
     metres = points[:3].transpose(2, 1, 0) / 1e3
     known = np.array([k not in BLANK for k in range(len(walk))])
     np.testing.assert_allclose(metres[known], walk.joints[known], atol=TENTH)
@@ -147,20 +169,37 @@ def test_a_c3d_has_the_events_of_gait(walk: Motion, tmp_path: Path) -> None:
     read = read_c3d(tmp_path / "walk.c3d")["parameters"]["EVENT"]
     events = {name: read[name]["value"] for name in ("CONTEXTS", "LABELS", "TIMES")}
     strikes = [k for k, label in enumerate(events["LABELS"]) if label == "Foot Strike"]
-    assert [events["CONTEXTS"][k] for k in strikes] == ["Right", "Left", "Right", "Left"]
+    assert [events["CONTEXTS"][k] for k in strikes] == [
+        "Right",
+        "Left",
+        "Right",
+        "Left",
+    ]
     seconds = [step.strike_seconds for step in gait.steps]
     assert events["TIMES"][1][strikes] == pytest.approx(seconds)
     assert (events["TIMES"][0] == 0.0).all()
-    assert events["LABELS"].count("Foot Off") == sum(step.toe_off_seconds is not None for step in gait.steps)
+    assert events["LABELS"].count("Foot Off") == sum(
+        step.toe_off_seconds is not None for step in gait.steps
+    )
     write_c3d(tmp_path / "dance.c3d", walk, (), NO_WALK)
-    used = read_c3d(tmp_path / "dance.c3d")["parameters"].get("EVENT", {}).get("USED", {"value": [0]})
+    used = (
+        read_c3d(tmp_path / "dance.c3d")["parameters"]
+        .get("EVENT", {})
+        .get("USED", {"value": [0]})
+    )
     assert used["value"][0] == 0
 
 
-def test_a_long_c3d_counts_its_frames_and_its_events(walk: Motion, tmp_path: Path) -> None:
+def test_a_long_c3d_counts_its_frames_and_its_events(
+    walk: Motion, tmp_path: Path
+) -> None:
     many = np.arange(70_000) % len(walk)
-    longer = Motion("long", walk.skeleton, walk.poses[many], walk.translations[many], 30.0)
-    gait = Gait(steps=[Step(foot="left", strike_seconds=float(k)) for k in range(2_000)])
+    longer = Motion(
+        "long", walk.skeleton, walk.poses[many], walk.translations[many], 30.0
+    )
+    gait = Gait(
+        steps=[Step(foot="left", strike_seconds=float(k)) for k in range(2_000)]
+    )
     write_c3d(tmp_path / "long.c3d", longer, (), gait)
     read = read_c3d(tmp_path / "long.c3d")
     assert read["data"]["points"].shape[2] == 70_000
@@ -172,9 +211,13 @@ def test_a_long_c3d_counts_its_frames_and_its_events(walk: Motion, tmp_path: Pat
 def test_a_trc_is_what_a_plain_reader_reads(walk: Motion, tmp_path: Path) -> None:
     write_trc(tmp_path / "walk.trc", walk, BLANK)
     lines = (tmp_path / "walk.trc").read_text().splitlines()
-    assert dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))["NumMarkers"] == "27"
+    assert (
+        dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))["NumMarkers"]
+        == "27"
+    )
     assert lines[3].split() == ["Frame#", "Time", *PLACES]
-    table, expected = np.genfromtxt(lines[6:], delimiter="\t"), walk.joints.reshape(len(walk), -1)
+    table = np.genfromtxt(lines[6:], delimiter="\t")
+    expected = walk.joints.reshape(len(walk), -1)
     np.testing.assert_array_equal(table[:, 0], np.arange(1, len(walk) + 1))
     np.testing.assert_allclose(table[:, 1], np.arange(len(walk)) / 30.0, atol=1e-6)
     expected[[*BLANK]] = np.nan
@@ -189,20 +232,26 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
     points = np.empty((len(walk), len(JOINTS), 3))
     points[:, 0] = nodes[:, 0]
     for joint, name in enumerate(JOINTS[1:], 1):
-        node = next(one for one in read.nodes if one.name == NAMES[name])  # begins where the bone begins
+        # begins where the bone begins
+        node = next(one for one in read.nodes if one.name == NAMES[name])
         points[:, joint] = nodes[:, read.node_index[node.children[0].name]]
     np.testing.assert_allclose(points, walk.joints, atol=TENTH)
 
 
-def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion, tmp_path: Path) -> None:
+def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(
+    walk: Motion, tmp_path: Path
+) -> None:
     write_angles(tmp_path / "angles.csv", walk, BLANK)
-    table, count = np.genfromtxt(tmp_path / "angles.csv", delimiter=",", names=True), len(walk)
+    table = np.genfromtxt(tmp_path / "angles.csv", delimiter=",", names=True)
+    count = len(walk)
     assert table.dtype.names == ("frame", "seconds", *COLUMNS)
     np.testing.assert_array_equal(table["frame"], np.arange(count))
     np.testing.assert_allclose(table["seconds"], np.arange(count) / 30.0, atol=1e-6)
     blank = np.isin(np.arange(count), [*BLANK])
     for name, values in clinical_angles(walk.skeleton, walk.poses).items():
-        np.testing.assert_allclose(table[name], np.where(blank, np.nan, values), atol=1e-3)
+        np.testing.assert_allclose(
+            table[name], np.where(blank, np.nan, values), atol=1e-3
+        )
 
 
 def test_angles_of_recorded_people_do_not_jump() -> None:
@@ -212,25 +261,34 @@ def test_angles_of_recorded_people_do_not_jump() -> None:
         for name, values in clinical_angles(motion.skeleton, motion.poses).items():
             known = values[np.isfinite(values)]
             assert np.abs(np.diff(known)).max(initial=0.0) <= 180.0, (clip.name, name)
-            assert -180.0 <= np.median(known) <= 180.0 if len(known) else name.split("_")[1] == "shoulder"
+            assert (
+                -180.0 <= np.median(known) <= 180.0
+                if len(known)
+                else name.split("_")[1] == "shoulder"
+            )
 
 
 def test_a_whole_turn_of_a_joint_is_one_angle_that_grows() -> None:
     poses = np.zeros((73, ANGLES))
-    poses[:, angle("lwrist", "y")] = np.radians(np.linspace(-170.0, 190.0, 73))  # 5 degrees a frame
+    # 5 degrees a frame
+    poses[:, angle("lwrist", "y")] = np.radians(np.linspace(-170.0, 190.0, 73))
     turned = clinical_angles(SKELETON, poses)["left_elbow_pronation"]
     assert np.abs(np.diff(turned)) == pytest.approx(np.full(72, 5.0), abs=1e-6)
     poses = np.zeros((61, ANGLES))
-    poses[:, angle("lfemur", "z")] = np.radians(np.linspace(20.0, 140.0, 61))  # a leg out to the side, past its pole
+    # a leg out to the side, past its pole
+    poses[:, angle("lfemur", "z")] = np.radians(np.linspace(20.0, 140.0, 61))
     angles = clinical_angles(SKELETON, poses)
-    adduction, flexion = angles["left_hip_adduction"], angles["left_hip_flexion"]
+    adduction = angles["left_hip_adduction"]
+    flexion = angles["left_hip_flexion"]
     near = np.abs(np.abs(adduction) - 90.0) < NEAR_POLE
     assert near.any()
     np.testing.assert_array_equal(np.isnan(flexion), near)
     np.testing.assert_array_equal(np.isnan(angles["left_hip_internal_rotation"]), near)
 
 
-def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(walk: Motion, tmp_path: Path) -> None:
+def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(
+    walk: Motion, tmp_path: Path
+) -> None:
     part = walk.frames(20, 80)
     gait = gait_of(part)
     write_angles(tmp_path / "a.csv", part)
@@ -243,9 +301,14 @@ def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(walk: Motion, tmp_
     assert float(rows[0]["seconds"]) == pytest.approx(20 / 30.0, abs=1e-6)
     lines = [line.split("\t") for line in (tmp_path / "a.trc").read_text().splitlines()]
     assert dict(zip(lines[1], lines[2], strict=True))["OrigDataStartFrame"] == "21"
-    assert (lines[6][0], float(lines[6][1])) == ("21", pytest.approx(20 / 30.0, abs=1e-6))
+    assert (lines[6][0], float(lines[6][1])) == (
+        "21",
+        pytest.approx(20 / 30.0, abs=1e-6),
+    )
     read = read_c3d(tmp_path / "a.c3d")
-    assert [read["header"]["points"][name] for name in ("first_frame", "last_frame")] == [20, 79]
+    assert [
+        read["header"]["points"][name] for name in ("first_frame", "last_frame")
+    ] == [20, 79]
     assert read["data"]["points"].shape[2] == 60
     assert gait.steps[0].strike_seconds > 20 / 30.0
     assert read["parameters"]["EVENT"]["TIMES"]["value"][1].min() > 20 / 30.0
@@ -262,7 +325,11 @@ def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:
     assert list(rows[0]) == list(STEP_COLUMNS)
     assert [row["foot"] for row in rows] == ["right", "left", "right", "left"]
     assert rows[0]["step_length"] == ""  # it is unknown where it came from
-    assert float(rows[1]["step_length"]) == pytest.approx(gait.steps[1].step_length, abs=1e-6)
-    assert float(rows[1]["strike_seconds"]) == pytest.approx(gait.steps[1].strike_seconds, abs=1e-6)
+    assert float(rows[1]["step_length"]) == pytest.approx(
+        gait.steps[1].step_length, abs=1e-6
+    )
+    assert float(rows[1]["strike_seconds"]) == pytest.approx(
+        gait.steps[1].strike_seconds, abs=1e-6
+    )
     write_gait(tmp_path / "dance.csv", NO_WALK)
     assert csv_rows(tmp_path / "dance.csv") == []

@@ -17,7 +17,9 @@ from posefit.geometry.rotation import shortest_turn
 from posefit.measuring.segments import bone_rotations
 from tests.geometry.turns import about
 
-BONES = {  # of each joint of a rig: after which of posefit's joints its bone starts, and which bone it turns as
+# of each joint of a rig: after which of posefit's joints its bone starts, and which
+# bone it turns as
+BONES = {
     "hips": ("root", "root"),
     "thigh": ("{}hipjoint", "{}femur"),
     "shin": ("{}femur", "{}tibia"),
@@ -49,7 +51,8 @@ class Style:
     above: tuple[str, ...] = ()  # joints between the file's root and the hips
     order: str = "ZXY"
     positions: bool = False  # whether each joint has six channels
-    ends: Mapping[str, str] = field(default_factory=dict)  # joints where others have End Sites
+    # joints where others have End Sites
+    ends: Mapping[str, str] = field(default_factory=dict)
     shoulders_on: str = "chest"
     no_ends: bool = False
 
@@ -83,16 +86,26 @@ def named(program: str, prefix: str = "") -> dict[str, str]:
 
 STYLES: dict[str, Style] = {
     "mixamo": Style(
-        named("mixamo", "mixamorig:"), ends={"head": "mixamorig:HeadTop_End", "toe": "mixamorig:{}Toe_End"}
+        named("mixamo", "mixamorig:"),
+        ends={"head": "mixamorig:HeadTop_End", "toe": "mixamorig:{}Toe_End"},
     ),
     "mixamo without colons": Style(named("mixamo", "mixamorig1_")),
-    "humanik": Style(named("mixamo", "Character1_"), above=("Character1_Reference",), order="ZYX", positions=True),
+    "humanik": Style(
+        named("mixamo", "Character1_"),
+        above=("Character1_Reference",),
+        order="ZYX",
+        positions=True,
+    ),
     "motionbuilder": Style(named("motionbuilder"), order="XYZ", positions=True),
     "lafan1": Style(named("lafan1"), order="ZYX", positions=True),
     "rokoko": Style(named("rokoko")),
     "without a spine": Style(named("without a spine"), shoulders_on="hips"),
-    "bandai-namco": Style(named("bandai-namco"), SHORT, above=("joint_Root",), positions=True, order="XYZ"),
-    "biped": Style(named("biped", "Bip01 "), SHORT, above=("Bip01",), shoulders_on="neck"),
+    "bandai-namco": Style(
+        named("bandai-namco"), SHORT, above=("joint_Root",), positions=True, order="XYZ"
+    ),
+    "biped": Style(
+        named("biped", "Bip01 "), SHORT, above=("Bip01",), shoulders_on="neck"
+    ),
     "biovision": Style(named("biovision")),
     "biovision without toes": Style(named("biovision without toes")),
     "biovision to wrists and ankles": Style(named("biovision to wrists and ankles")),
@@ -109,7 +122,11 @@ def joint_after(role: str, style: Style) -> str:
     """Return after which of posefit's joints a role's joint is where a rig has fewer of neck and spine than posefit."""
     if role == "head" and "neck1" not in style.names:
         return "lowerneck"
-    return "lowerback" if role == "chest" and "spine1" not in style.names else BONES[role][0]
+    return (
+        "lowerback"
+        if role == "chest" and "spine1" not in style.names
+        else BONES[role][0]
+    )
 
 
 @dataclass
@@ -124,22 +141,34 @@ class _Joint:
 
 
 def write_rig(
-    path: Path, motion: Motion, style: Style, scale: float = 1.0, world: Array | None = None, rest: str = "cmu"
+    path: Path,
+    motion: Motion,
+    style: Style,
+    scale: float = 1.0,
+    world: Array | None = None,
+    rest: str = "cmu",
 ) -> Path:
     """Write a motion as a program would: lengths times `scale`, the world turned, another pose of rest.
 
     At rest, `cmu` is posefit's own pose, `t` has legs straight down, and `along x` lays all bones along x.
     """
-    skeleton, turns = motion.skeleton, bone_rotations(motion.skeleton, motion.poses)
+    skeleton = motion.skeleton
+    turns = bone_rotations(motion.skeleton, motion.poses)
     at_rest = skeleton.joints(np.zeros(66))
     joints: list[_Joint] = []
     numbers: dict[str, int] = {}
 
     def add(role: str, side: str, parent: int) -> int:
         letter = side[:1].lower()
-        starts, turning = (JOINTS.index(name.format(letter)) for name in (joint_after(role, style), BONES[role][1]))
-        axes, name = _axes(rest, role, skeleton.offsets[turning - 1]), style.names[role].format(side)
-        joints.append(_Joint(side + role, name, parent, turns[:, turning], at_rest[starts], axes))
+        starts, turning = (
+            JOINTS.index(name.format(letter))
+            for name in (joint_after(role, style), BONES[role][1])
+        )
+        axes = _axes(rest, role, skeleton.offsets[turning - 1])
+        name = style.names[role].format(side)
+        joints.append(
+            _Joint(side + role, name, parent, turns[:, turning], at_rest[starts], axes)
+        )
         numbers[side + role] = len(joints) - 1
         return len(joints) - 1
 
@@ -154,11 +183,15 @@ def write_rig(
     joints[parent].tip = at_rest[JOINTS.index("head")]
     for side in style.sides:
         letter = side[0].lower()
-        for chain, start, end in ((LEG, hips, "toes"), (ARM, numbers[style.shoulders_on], "hand")):
+        for chain, start, end in (
+            (LEG, hips, "toes"),
+            (ARM, numbers[style.shoulders_on], "hand"),
+        ):
             parent = start
             for role in chain:
                 parent = add(role, side, parent) if role in style.names else parent
-            lacks = chain[2 if chain is LEG else 3] not in style.names  # it ends at the ankle or the wrist
+            # it ends at the ankle or the wrist
+            lacks = chain[2 if chain is LEG else 3] not in style.names
             last = end if not lacks else "tibia" if chain is LEG else "radius"
             joints[parent].tip = at_rest[JOINTS.index(letter + last)]
     if style.no_ends:
@@ -166,37 +199,75 @@ def write_rig(
             joint.tip = None
     around = np.eye(3) if world is None else world
     turned = [joint.turn @ joint.axes for joint in joints]
-    turned = [turned[0] if style.above else around @ turned[0], *(around @ turn for turn in turned[1:])]
-    lines, columns = ["HIERARCHY"], list[Array]()
+    turned = [
+        turned[0] if style.above else around @ turned[0],
+        *(around @ turn for turn in turned[1:]),
+    ]
+    lines = ["HIERARCHY"]
+    columns = list[Array]()
 
     def visit(number: int, depth: int) -> None:
-        joint, tab = joints[number], "\t" * depth
+        joint = joints[number]
+        tab = "\t" * depth
         above = joints[joint.parent] if joint.parent >= 0 else None
-        offset = np.zeros(3) if above is None else scale * above.axes.T @ (joint.place - above.place)
+        offset = (
+            np.zeros(3)
+            if above is None
+            else scale * above.axes.T @ (joint.place - above.place)
+        )
         moves = joint.role == "hips" or style.positions
         channels = "Xposition Yposition Zposition " if moves else ""
         channels += " ".join(f"{axis}rotation" for axis in style.order)
-        lines.extend([f"{tab}{'ROOT' if above is None else 'JOINT'} {joint.name}", f"{tab}{{"])
-        lines.extend([f"{tab}\tOFFSET {_spaced(offset)}", f"{tab}\tCHANNELS {6 if moves else 3} {channels}"])
+        lines.extend(
+            [f"{tab}{'ROOT' if above is None else 'JOINT'} {joint.name}", f"{tab}{{"]
+        )
+        lines.extend(
+            [
+                f"{tab}\tOFFSET {_spaced(offset)}",
+                f"{tab}\tCHANNELS {6 if moves else 3} {channels}",
+            ]
+        )
         if joint.role == "hips":
             columns.append(scale * motion.translations @ around.T)
         elif moves:
             columns.append(np.tile(offset, (len(motion), 1)))
-        local = turned[number] if above is None else np.swapaxes(turned[joint.parent], 1, 2) @ turned[number]
+        local = (
+            turned[number]
+            if above is None
+            else np.swapaxes(turned[joint.parent], 1, 2) @ turned[number]
+        )
         columns.append(Rotation.from_matrix(local).as_euler(style.order, degrees=True))
         for child, each in enumerate(joints):
             if each.parent == number:
                 visit(child, depth + 1)
         if joint.tip is not None:
             end = _spaced(scale * joint.axes.T @ (joint.tip - joint.place))
-            name = next((text for role, text in style.ends.items() if joint.role.endswith(role)), "")
+            name = next(
+                (
+                    text
+                    for role, text in style.ends.items()
+                    if joint.role.endswith(role)
+                ),
+                "",
+            )
             if name:
                 name = name.format(joint.role.removesuffix("toe"))
-                lines.extend([f"{tab}\tJOINT {name}", f"{tab}\t{{", f"{tab}\t\tOFFSET {end}"])
-                lines.extend([f"{tab}\t\tCHANNELS 3 Zrotation Xrotation Yrotation", f"{tab}\t}}"])
+                lines.extend(
+                    [f"{tab}\tJOINT {name}", f"{tab}\t{{", f"{tab}\t\tOFFSET {end}"]
+                )
+                lines.extend(
+                    [f"{tab}\t\tCHANNELS 3 Zrotation Xrotation Yrotation", f"{tab}\t}}"]
+                )
                 columns.append(np.zeros((len(motion), 3)))
             else:
-                lines.extend([f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\tOFFSET {end}", f"{tab}\t}}"])
+                lines.extend(
+                    [
+                        f"{tab}\tEnd Site",
+                        f"{tab}\t{{",
+                        f"{tab}\t\tOFFSET {end}",
+                        f"{tab}\t}}",
+                    ]
+                )
         lines.append(f"{tab}}}")
 
     visit(0, 0)
@@ -211,8 +282,12 @@ def places_of(path: Path) -> dict[str, Array]:
     head, table = path.read_text().split("MOTION\n")
     rows = np.array([line.split() for line in table.splitlines()[2:]], dtype=np.float64)
     places: dict[str, Array] = {}
-    stack: list[tuple[Array, Array]] = [(np.zeros((len(rows), 3)), np.tile(np.eye(3), (len(rows), 1, 1)))]
-    name, offset, column = "", np.zeros(3), 0
+    stack: list[tuple[Array, Array]] = [
+        (np.zeros((len(rows), 3)), np.tile(np.eye(3), (len(rows), 1, 1)))
+    ]
+    name = ""
+    offset = np.zeros(3)
+    column = 0
     for words in map(str.split, head.splitlines()):
         if words[0] in ("ROOT", "JOINT", "End"):
             name = f"{name} end" if words[0] == "End" else " ".join(words[1:])
@@ -225,12 +300,15 @@ def places_of(path: Path) -> dict[str, Array]:
             start, turn = stack[-1]
             moved = np.tile(offset, (len(rows), 1))
             for channel in words[2:]:
-                axis, values = "XYZ".index(channel[0]), rows[:, column]
+                axis = "XYZ".index(channel[0])
+                values = rows[:, column]
                 column += 1
                 if channel.endswith("position"):
                     moved[:, axis] = values
                 else:
-                    turn = turn @ np.array([about(axis, angle) for angle in np.radians(values)])
+                    turn = turn @ np.array(
+                        [about(axis, angle) for angle in np.radians(values)]
+                    )
             places[name] = start + np.einsum("tij,tj->ti", stack[-1][1], moved)
             stack.append((places[name], turn))
         elif words[0] == "}":
@@ -244,9 +322,12 @@ def _axes(rest: str, role: str, offset: Array) -> Array:
         return np.eye(3)
     if rest == "t":
         down = role in LEG[:2]
-        return shortest_turn(offset, np.array([0.0, -1.0, 0.0])).T if down else np.eye(3)
+        return (
+            shortest_turn(offset, np.array([0.0, -1.0, 0.0])).T if down else np.eye(3)
+        )
     if role == "hips":
-        return np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # its x is up, y ahead, z left
+        # its x is up, y ahead, z left
+        return np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     return np.asarray(shortest_turn(offset, np.array([1.0, 0.0, 0.0])).T)
 
 

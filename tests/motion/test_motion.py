@@ -9,33 +9,69 @@ from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from tests.cases import each
 
-SKELETON = Skeleton("stick", np.ones((26, 3)), np.tile(np.eye(3), (26, 1, 1)), tuple((bone, ()) for bone in BONES))
+SKELETON = Skeleton(
+    "stick",
+    np.ones((26, 3)),
+    np.tile(np.eye(3), (26, 1, 1)),
+    tuple((bone, ()) for bone in BONES),
+)
 
 
 def clip(frames: int, fps: float = 120.0) -> Motion:
     rng = np.random.default_rng(3)
     steps = rng.uniform(-0.3, 0.3, (frames, 66))
-    return Motion("clip", SKELETON, np.cumsum(steps, axis=0), rng.normal(size=(frames, 3)), fps)
+    return Motion(
+        "clip", SKELETON, np.cumsum(steps, axis=0), rng.normal(size=(frames, 3)), fps
+    )
 
 
 @each(
     ("poses", "translations", "fps", "message"),
     [
-        (np.zeros((2, 62)), np.zeros((2, 3)), 30.0, r"poses must have shape \(frames, 66\), got \(2, 62\)"),
-        (np.zeros((0, 66)), np.zeros((0, 3)), 30.0, "poses must hold at least 1 frame, got 0"),
-        (np.full((1, 66), np.nan), np.zeros((1, 3)), 30.0, "poses must be finite, got 66 that are not"),
-        (np.zeros((2, 66)), np.zeros((3, 3)), 30.0, r"translations must have shape \(2, 3\), got \(3, 3\)"),
-        (np.zeros((2, 66)), np.zeros((2, 3)), np.nan, r"fps must lie in 0.001 to 1e\+06, got nan"),
+        (
+            np.zeros((2, 62)),
+            np.zeros((2, 3)),
+            30.0,
+            r"poses must have shape \(frames, 66\), got \(2, 62\)",
+        ),
+        (
+            np.zeros((0, 66)),
+            np.zeros((0, 3)),
+            30.0,
+            "poses must hold at least 1 frame, got 0",
+        ),
+        (
+            np.full((1, 66), np.nan),
+            np.zeros((1, 3)),
+            30.0,
+            "poses must be finite, got 66 that are not",
+        ),
+        (
+            np.zeros((2, 66)),
+            np.zeros((3, 3)),
+            30.0,
+            r"translations must have shape \(2, 3\), got \(3, 3\)",
+        ),
+        (
+            np.zeros((2, 66)),
+            np.zeros((2, 3)),
+            np.nan,
+            r"fps must lie in 0.001 to 1e\+06, got nan",
+        ),
     ],
 )
-def test_mistakes_are_named(poses: np.ndarray, translations: np.ndarray, fps: float, message: str) -> None:
+def test_mistakes_are_named(
+    poses: np.ndarray, translations: np.ndarray, fps: float, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         Motion("m", SKELETON, poses, translations, fps)
 
 
 @each(("start", "stop"), [(3, 3), (-1, 4), (0, 11), (5, 2)])
 def test_frames_outside_the_clip_are_refused(start: int, stop: int) -> None:
-    with pytest.raises(ValueError, match=rf"start < stop <= 10, got start {start} and stop {stop}"):
+    with pytest.raises(
+        ValueError, match=rf"start < stop <= 10, got start {start} and stop {stop}"
+    ):
         clip(10).frames(start, stop)
 
 
@@ -52,17 +88,31 @@ def test_a_whole_ratio_takes_every_kth_frame_as_it_is(frames: int, kept: int) ->
 @each(
     ("frames", "fps", "new", "kept"),
     # times k / new up to (frames - 1) / fps: 0.05 s at 50 Hz is k = 0, 1, 2; 0.1 s at 30 Hz is k = 0 ... 3
-    [(7, 120.0, 50.0, 3), (11, 100.0, 30.0, 4), (2, 30.0, 120.0, 5), (1, 30.0, 120.0, 1), (2, 30.0, 29.0, 1)],
+    [
+        (7, 120.0, 50.0, 3),
+        (11, 100.0, 30.0, 4),
+        (2, 30.0, 120.0, 5),
+        (1, 30.0, 120.0, 1),
+        (2, 30.0, 29.0, 1),
+    ],
 )
-def test_times_stay_within_the_clip(frames: int, fps: float, new: float, kept: int) -> None:
+def test_times_stay_within_the_clip(
+    frames: int, fps: float, new: float, kept: int
+) -> None:
     assert len(clip(frames, fps).resampled(new)) == kept
 
 
-def test_between_frames_joints_are_linear_and_the_root_lies_half_way_on_the_shortest_arc() -> None:
+def test_between_frames_joints_are_linear_and_the_root_lies_half_way_on_the_shortest_arc() -> (
+    None
+):
     motion = clip(5, 20.0)
     fast = motion.resampled(40.0)
     np.testing.assert_allclose(fast.poses[::2], motion.poses, atol=1e-12)
-    np.testing.assert_allclose(fast.poses[1::2, 3:], (motion.poses[1:, 3:] + motion.poses[:-1, 3:]) / 2, atol=1e-12)
+    np.testing.assert_allclose(
+        fast.poses[1::2, 3:],
+        (motion.poses[1:, 3:] + motion.poses[:-1, 3:]) / 2,
+        atol=1e-12,
+    )
     middle = (motion.translations[1:] + motion.translations[:-1]) / 2
     np.testing.assert_allclose(fast.translations[1::2], middle, atol=1e-12)
     roots = rotation_from_root_angles(motion.poses[:, :3])
@@ -75,17 +125,23 @@ def test_between_frames_joints_are_linear_and_the_root_lies_half_way_on_the_shor
 def test_a_root_that_turns_on_and_on_keeps_its_turns() -> None:
     poses = (7.0 + 0.5 * np.arange(40)[:, None]) * np.eye(1, 66)
     fast = Motion("spin", SKELETON, poses, np.zeros((40, 3)), 30.0).resampled(45.0)
-    np.testing.assert_allclose(fast.poses[:, 0], 7.0 + np.arange(len(fast)) / 3.0, atol=1e-9)
+    np.testing.assert_allclose(
+        fast.poses[:, 0], 7.0 + np.arange(len(fast)) / 3.0, atol=1e-9
+    )
 
 
 def test_a_motion_is_not_resampled_to_more_frames_than_fit_into_memory() -> None:
     motion = clip(100, fps=0.1)
-    for fps, message in ((1000.0, "must have at most 200000 frames when it is resampled"), (1e-300, "fps must lie in")):
+    for fps, message in (
+        (1000.0, "must have at most 200000 frames when it is resampled"),
+        (1e-300, "fps must lie in"),
+    ):
         with pytest.raises(ValueError, match=message):
             motion.resampled(fps)
 
 
-LEFT, RIGHT = JOINTS.index("lfoot"), JOINTS.index("rfoot")
+LEFT = JOINTS.index("lfoot")
+RIGHT = JOINTS.index("rfoot")
 
 
 def still(frames: int) -> np.ndarray:
@@ -96,7 +152,9 @@ def still(frames: int) -> np.ndarray:
 
 
 @each(("fps", "left_out"), [(30.0, 1), (120.0, 4), (25.0, 1)])
-def test_what_falls_accelerates_as_it_does_at_any_rate(fps: float, left_out: int) -> None:
+def test_what_falls_accelerates_as_it_does_at_any_rate(
+    fps: float, left_out: int
+) -> None:
     times = np.arange(40) / fps
     joints = still(40)
     joints[..., 1] -= 0.5 * 9.81 * times[:, None] ** 2
@@ -118,7 +176,8 @@ def test_a_foot_that_is_lifted_or_goes_fast_does_not_stand() -> None:
 def test_a_step_is_as_long_as_a_foot_creeps_along_the_ground() -> None:
     joints = still(60)
     joints[20:40, LEFT, 1] = 0.2  # two steps of the left foot, one of the right
-    joints[40:, LEFT] += np.arange(20)[:, None] * [0.003, 0.0, 0.004]  # 5 mm a frame, 15 cm a second
+    # 5 mm a frame, 15 cm a second
+    joints[40:, LEFT] += np.arange(20)[:, None] * [0.003, 0.0, 0.004]
     stands = standing(joints, 30.0)
     lengths = slides(joints, stands)
     assert (len(lengths), lengths[0], lengths[2]) == (3, 0.0, 0.0)
@@ -127,7 +186,8 @@ def test_a_step_is_as_long_as_a_foot_creeps_along_the_ground() -> None:
 
 def test_the_lowest_place_of_the_feet_is_the_ground_wherever_that_is() -> None:
     rising = still(300)
-    rising[..., 1] += 0.03 * np.arange(300)[:, None] / 30.0  # 30 cm in ten seconds: a track that drifts
+    # 30 cm in ten seconds: a track that drifts
+    rising[..., 1] += 0.03 * np.arange(300)[:, None] / 30.0
     assert standing(rising, 30.0).all()
 
 

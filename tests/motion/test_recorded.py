@@ -10,17 +10,24 @@ from posefit.motion import recorded
 from tests.commands import printed
 
 
-def test_the_files_are_small_and_say_where_they_come_from_and_open_without_pickle() -> None:
+def test_the_files_are_small_and_say_where_they_come_from_and_open_without_pickle() -> (
+    None
+):
     path = files("posefit.motion") / "recorded.npz"
     assert len(path.read_bytes()) < 3_000_000
     built_in = (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
     assert len(built_in.encode()) < 100_000
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
         origins = str(stored["origin"]), json.loads(built_in)["origin"]
-    assert all("mocap.cs.cmu.edu" in origin and "NSF EIA-0196217" in origin for origin in origins)
+    assert all(
+        "mocap.cs.cmu.edu" in origin and "NSF EIA-0196217" in origin
+        for origin in origins
+    )
 
 
-def test_between_two_stored_poses_lies_their_mean_and_after_the_last_nothing_moves() -> None:
+def test_between_two_stored_poses_lies_their_mean_and_after_the_last_nothing_moves() -> (
+    None
+):
     clip = next(one for one in recorded.clips() if (np.diff(one.times) == 2).any())
     poses, translations = clip.at(clip.times)
     assert np.array_equal(poses, clip.poses)
@@ -28,7 +35,9 @@ def test_between_two_stored_poses_lies_their_mean_and_after_the_last_nothing_mov
     k = int(np.flatnonzero(np.diff(clip.times) == 2)[0])
     poses, translations = clip.at(np.array([clip.times[k] + 1, clip.times[-1] + 50]))
     assert poses[0] == pytest.approx(clip.poses[k : k + 2].mean(axis=0), abs=1e-12)
-    assert translations[0] == pytest.approx(clip.translations[k : k + 2].mean(axis=0), abs=1e-12)
+    assert translations[0] == pytest.approx(
+        clip.translations[k : k + 2].mean(axis=0), abs=1e-12
+    )
     assert np.array_equal(poses[1], clip.poses[-1])
     assert np.array_equal(translations[1], clip.translations[-1])
 
@@ -44,5 +53,8 @@ def test_people_are_chosen_by_name() -> None:
 
 def test_the_command_lists_what_there_is() -> None:
     first, *others = printed("motions")["recorded"]
-    assert (first["name"], first["seconds"]) == ("02_01", pytest.approx(85 / 30, abs=1e-3))
+    assert (first["name"], first["seconds"]) == (
+        "02_01",
+        pytest.approx(85 / 30, abs=1e-3),
+    )
     assert len(others) == 215

@@ -27,12 +27,14 @@ from tests.cases import each
 
 def climbs(space: Toy, rng: np.random.Generator, objective: Any) -> None:
     """A library as they are: it calls the objective, and returns at the end."""
-    place, cost = np.zeros(space.dimensions), np.inf
+    place = np.zeros(space.dimensions)
+    cost = np.inf
     for _ in range(20):
         near = place + 0.3 * rng.standard_normal((5, space.dimensions))
         costs = objective(near)
         if costs.min() < cost:
-            place, cost = near[costs.argmin()], costs.min()
+            place = near[costs.argmin()]
+            cost = costs.min()
 
 
 def fails(space: Toy, rng: np.random.Generator, objective: Any) -> None:
@@ -46,7 +48,11 @@ def bridge(library: Any, space: Toy, seed: int = 0) -> Bridge:
 
 def bridges() -> set[threading.Thread]:
     gc.collect()
-    return {thread for thread in threading.enumerate() if thread.name == "posefit_bridges.optimisers"}
+    return {
+        thread
+        for thread in threading.enumerate()
+        if thread.name == "posefit_bridges.optimisers"
+    }
 
 
 def test_costs_reach_the_proposals_they_belong_to() -> None:
@@ -59,7 +65,8 @@ def test_costs_reach_the_proposals_they_belong_to() -> None:
 
     optimiser = bridge(library, Toy(2))
     while len(asked := optimiser.ask()):
-        np.testing.assert_array_equal(optimiser.ask(), asked)  # asking again changes nothing
+        # asking again changes nothing
+        np.testing.assert_array_equal(optimiser.ask(), asked)
         optimiser.tell(asked, asked.sum(axis=1))
     assert len(calls) == 5
     for asked, costs in calls:
@@ -77,7 +84,11 @@ def test_no_thread_outlives_its_search_or_an_error_in_it() -> None:
     assert bridges() <= before
 
     with pytest.raises(RuntimeError, match="the cost failed"):
-        minimise(Mock(side_effect=RuntimeError("the cost failed")), bridge(climbs, Toy(3)), 100)
+        minimise(
+            Mock(side_effect=RuntimeError("the cost failed")),
+            bridge(climbs, Toy(3)),
+            100,
+        )
     assert bridges() <= before
 
 
@@ -108,41 +119,72 @@ def test_a_borrowed_global_generator_is_put_back() -> None:
             return [float(np.random.rand()) for _ in range(2)]  # noqa: NPY002
 
     before = np.random.get_state()[1].copy()  # noqa: NPY002
-    one, other = GlobalRandom(5), GlobalRandom(5)
+    one = GlobalRandom(5)
+    other = GlobalRandom(5)
     first = draws(one)
     assert draws(other) == first
     assert draws(one) != first  # it goes on
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
 
 
-LIBRARIES = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna", "mediapipe": "mediapipe"}
+LIBRARIES = {
+    "pycma": "cma",
+    "nevergrad": "nevergrad",
+    "pymoo": "pymoo",
+    "optuna": "optuna",
+    "mediapipe": "mediapipe",
+}
 
 
 def test_an_absent_library_is_named_with_the_extra_to_install() -> None:
-    plugins = load([EntryPoint(name, f"posefit_{name}", "posefit") for name in ("bridges", "mediapipe")])
-    needs = {offer.name: offer.needs for plugin in plugins for offer in plugin.offers if offer.needs}
-    assert needs == {name: (library, f"posefit[{name}]") for name, library in LIBRARIES.items()}
+    plugins = load(
+        [
+            EntryPoint(name, f"posefit_{name}", "posefit")
+            for name in ("bridges", "mediapipe")
+        ]
+    )
+    needs = {
+        offer.name: offer.needs
+        for plugin in plugins
+        for offer in plugin.offers
+        if offer.needs
+    }
+    assert needs == {
+        name: (library, f"posefit[{name}]") for name, library in LIBRARIES.items()
+    }
     for plugin in plugins:
-        absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{offer.name}]")) for offer in plugin.offers)
+        absent = tuple(
+            replace(offer, needs=("no_such_library", f"posefit[{offer.name}]"))
+            for offer in plugin.offers
+        )
         for offer in absent:
             message = rf"{offer.kind} {offer.name} needs the library .* 'posefit\[{offer.name}\]'"
             with pytest.raises(ImportError, match=message):
-                Registry((plugin._replace(offers=absent),)).offer(offer.kind, offer.name)
+                Registry((plugin._replace(offers=absent),)).offer(
+                    offer.kind, offer.name
+                )
 
 
 def test_listing_plugins_imports_none_of_their_libraries() -> None:
     names = [*LIBRARIES.values(), "scipy.optimize", "sklearn"]
     script = f"import sys; from posefit.registry import registry; registry(); print({{*{names}}} & {{*sys.modules}})"
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    ran = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
     assert ran.stdout.splitlines()[-1] == "set()"
 
 
-@each("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna"])
+@each(
+    "name",
+    ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna"],
+)
 def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     threads = set(threading.enumerate())
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        summary = posefit.track("walk", method=name, frames=(0, 2), size=(120, 90), evaluations=400).summary
+        summary = posefit.track(
+            "walk", method=name, frames=(0, 2), size=(120, 90), evaluations=400
+        ).summary
     assert summary["evaluations_per_frame"] == 400
     assert 720 <= summary["evaluations"] <= 800
     assert summary["iou"] > 0.5
@@ -150,7 +192,8 @@ def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
 
 
 def test_a_library_says_afterwards_what_it_said_before() -> None:
-    optuna, config = pytest.importorskip("optuna"), pytest.importorskip("pymoo.config").Config
+    optuna = pytest.importorskip("optuna")
+    config = pytest.importorskip("pymoo.config").Config
     before = optuna.logging.get_verbosity(), config.warnings["not_compiled"]
     try:
         optuna.logging.set_verbosity(optuna.logging.DEBUG)
@@ -168,11 +211,22 @@ def test_a_library_says_afterwards_what_it_said_before() -> None:
 
 def test_an_unknown_variant_is_named() -> None:
     for name, message in (
-        ("pymoo:NSGA9", "variant must be one of DE, PSO, GA, ES, SRES, ISRES, got 'NSGA9'"),
+        (
+            "pymoo:NSGA9",
+            "variant must be one of DE, PSO, GA, ES, SRES, ISRES, got 'NSGA9'",
+        ),
         ("optuna:Best", "variant must be one of TPESampler"),
-        ("nevergrad:Best", "variant must be one of [0-9]+ names such as TwoPointsDE, CMA, PSO, got 'Best'"),
-        ("scipy:minimize", "variant must be one of differential_evolution, dual_annealing, got 'minimize'"),
+        (
+            "nevergrad:Best",
+            "variant must be one of [0-9]+ names such as TwoPointsDE, CMA, PSO, got 'Best'",
+        ),
+        (
+            "scipy:minimize",
+            "variant must be one of differential_evolution, dual_annealing, got 'minimize'",
+        ),
         ("pso:fast", "optimiser must be pso, which has no variants, got 'pso:fast'"),
     ):
         with pytest.raises(ValueError, match=message):
-            posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)
+            posefit.track(
+                "walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100
+            )

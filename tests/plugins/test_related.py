@@ -9,13 +9,26 @@ import pytest
 
 import posefit
 from posefit import Silhouette
-from posefit.plugin import Observation, check_optimiser, check_prior, check_tracker, contour_fit
+from posefit.plugin import (
+    Observation,
+    check_optimiser,
+    check_prior,
+    check_tracker,
+    contour_fit,
+)
 from posefit.registry import registry
 from posefit.testing.tracker_rules import scene
 from posefit_related.frames import costs_of, frame_of, place_of
 from tests.cases import each
 
-METHODS = ["hpso@pca", "haga@pca", "psopf@pca", "local@pca", "sapso@isomap", "sapso@gplvm"]
+METHODS = [
+    "hpso@pca",
+    "haga@pca",
+    "psopf@pca",
+    "local@pca",
+    "sapso@isomap",
+    "sapso@gplvm",
+]
 TRACKERS = ["smoothing", "gradient", "regression"]
 
 
@@ -40,7 +53,8 @@ def test_each_follows_the_rules_of_its_kind(kind: str, name: str) -> None:
 
 @each("method", [*METHODS, *TRACKERS])
 def test_a_walk_is_followed_better_than_by_its_mean_pose(method: str) -> None:
-    seeds, how = range(1 if method == "regression" else 5), {"frames": (0, 4), "evaluations": 800}
+    seeds = range(1 if method == "regression" else 5)
+    how = {"frames": (0, 4), "evaluations": 800}
     tracks = [posefit.track("walk", method=method, seed=seed, **how) for seed in seeds]
     errors = [track.summary["error_degrees"]["mean"] for track in tracks]
     assert np.median(errors) < tracks[0].summary["baselines_degrees"]["mean_pose"]
@@ -48,7 +62,10 @@ def test_a_walk_is_followed_better_than_by_its_mean_pose(method: str) -> None:
 
 @each("method", TRACKERS)
 def test_a_place_that_is_not_known_is_found_in_the_masks(method: str) -> None:
-    how = {"settings": {"regression.samples": 300} if method == "regression" else {}, "translation": "aligned"}
+    how = {
+        "settings": {"regression.samples": 300} if method == "regression" else {},
+        "translation": "aligned",
+    }
     track = posefit.track("walk", method=method, frames=(0, 4), evaluations=800, **how)
     assert track.summary["iou"] > 0.3
     assert np.isfinite(track.motion.translations).all()
@@ -58,7 +75,12 @@ def test_without_training_there_is_one_line() -> None:
     task = replace(scene()[0], training=())
     for name in TRACKERS:
         with pytest.raises(ValueError, match="training must hold a motion"):
-            list(registry().offer("tracker", name).factory(task).track(scene()[2], np.random.default_rng(0)))
+            list(
+                registry()
+                .offer("tracker", name)
+                .factory(task)
+                .track(scene()[2], np.random.default_rng(0))
+            )
     for name in ("isomap", "gplvm"):
         with pytest.raises(ValueError, match="angles must hold at least"):
             registry().offer("prior", name).factory().fit(np.zeros((3, 63)))
@@ -69,7 +91,9 @@ def test_a_pose_is_moved_to_the_contours_of_its_masks() -> None:
     free = np.flatnonzero(task.body.skeleton.free)
     pose = motion.poses[0].copy()
     pose[free] += np.radians(4.0) * np.random.default_rng(0).standard_normal(len(free))
-    after, place, used = contour_fit(task, observations[0], (pose, motion.translations[0]), (0.1, 0.003), 400)
+    after, place, used = contour_fit(
+        task, observations[0], (pose, motion.translations[0]), (0.1, 0.003), 400
+    )
 
     def error(angles: Any) -> float:
         joints = task.body.skeleton.joints(angles[None], motion.translations[:1])
@@ -77,25 +101,38 @@ def test_a_pose_is_moved_to_the_contours_of_its_masks() -> None:
 
     assert error(after) < error(pose)
     assert used == 12 * 27  # never more than twelve steps
-    assert contour_fit(task, observations[0], (pose, place), (0.1, 0.003), 60)[2] == 2 * 27
+    assert (
+        contour_fit(task, observations[0], (pose, place), (0.1, 0.003), 60)[2] == 2 * 27
+    )
 
 
 def test_a_camera_that_knows_nothing_does_not_count() -> None:
     task, _, (observation, *_) = scene()
-    nothing = Silhouette.of(*np.zeros((2, task.cameras[0].height, task.cameras[0].width), dtype=bool))
+    nothing = Silhouette.of(
+        *np.zeros((2, task.cameras[0].height, task.cameras[0].width), dtype=bool)
+    )
     blind = replace(observation, silhouettes=[observation.silhouettes[0], nothing])
-    pose, place = task.training[0].poses[:1], task.anchor[None]
+    pose = task.training[0].poses[:1]
+    place = task.anchor[None]
     costs = []
-    for cameras, views in ((1, replace(observation, silhouettes=observation.silhouettes[:1])), (2, blind)):
+    for cameras, views in (
+        (1, replace(observation, silhouettes=observation.silhouettes[:1])),
+        (2, blind),
+    ):
         part = replace(task, cameras=[task.cameras[0]] * cameras)
-        costs += [costs_of(part, views, pose, place)[0], frame_of(part, views, pose[0], place[0], 0).cost]
+        costs += [
+            costs_of(part, views, pose, place)[0],
+            frame_of(part, views, pose[0], place[0], 0).cost,
+        ]
     assert len(set(costs)) == 1
 
 
 def test_a_mask_says_where_the_root_is() -> None:
     task, motion, (observation, *_) = scene()
-    pose, place = motion.poses[0], motion.translations[0]
-    assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)  # known
+    pose = motion.poses[0]
+    place = motion.translations[0]
+    # known
+    assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)
     unknown = Observation(observation.silhouettes)
     moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])
     assert np.linalg.norm(moved - place) < 0.08  # a pixel of 120 rows is 3 cm

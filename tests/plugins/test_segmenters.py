@@ -16,7 +16,10 @@ def test_the_kit_passes_the_built_in_ones() -> None:
     offers = registry().offers["segmenter"]
     for name in ("masks", "mean", "median", "mixture"):
         assert offers[name].distribution == "posefit"
-        report = check_segmenter(offers[name].factory, settings={"background": "0:6"} if name == "mean" else {})
+        report = check_segmenter(
+            offers[name].factory,
+            settings={"background": "0:6"} if name == "mean" else {},
+        )
         assert report, str(report)
         assert len(report.of("passed")) >= 7
 
@@ -67,11 +70,25 @@ def test_the_kit_fails_what_was_planted() -> None:
     for factory, broken in (
         (Sound, set()),
         (spoiled(lambda image, person, shadow: person), {"masks", "overlap"}),
-        (spoiled(lambda image, person, shadow: (person.astype(np.float32), shadow)), {"masks", "overlap"}),
-        (spoiled(lambda image, person, shadow: (person[::2], shadow[::2])), {"masks", "overlap"}),
-        (spoiled(lambda image, person, shadow: (shadow & ~shadow, shadow)), {"overlap"}),
         (
-            spoiled(lambda image, person, shadow: (person & (np.random.random(person.shape) < 0.95), shadow)),  # noqa: NPY002
+            spoiled(lambda image, person, shadow: (person.astype(np.float32), shadow)),
+            {"masks", "overlap"},
+        ),
+        (
+            spoiled(lambda image, person, shadow: (person[::2], shadow[::2])),
+            {"masks", "overlap"},
+        ),
+        (
+            spoiled(lambda image, person, shadow: (shadow & ~shadow, shadow)),
+            {"overlap"},
+        ),
+        (
+            spoiled(
+                lambda image, person, shadow: (
+                    person & (np.random.random(person.shape) < 0.95),  # noqa: NPY002
+                    shadow,
+                )
+            ),
             {"same_again", "global_randomness"},
         ),
         (spoiled(paint), {"inputs"}),

@@ -8,14 +8,18 @@ from posefit.registry import registry
 from posefit.testing.toy import Toy, sphere
 from tests.cases import each
 
-NAMES = [name for name, offer in registry().offers["optimiser"].items() if not offer.missing]
+NAMES = [
+    name for name, offer in registry().offers["optimiser"].items() if not offer.missing
+]
 
 
 @each("name", NAMES)
 def test_costs_that_nobody_asked_for_are_refused(name: str) -> None:
     space = Toy(5)
     optimiser = registry().optimiser(name)(space, np.random.default_rng(0))
-    with pytest.raises(InputError, match="tell must follow ask, got costs before proposals"):
+    with pytest.raises(
+        InputError, match="tell must follow ask, got costs before proposals"
+    ):
         optimiser.tell(np.zeros((40, 5)), np.zeros(40))
     proposals = optimiser.ask()
     n = len(proposals)

@@ -21,14 +21,20 @@ from tests.cases import each
 SIZE = (200, 240)
 
 
-def seen(name: str = "jacks-b", frames: int = 40, azimuth: float = 0.1) -> tuple[Task, list[Observation]]:
+def seen(
+    name: str = "jacks-b", frames: int = 40, azimuth: float = 0.1
+) -> tuple[Task, list[Observation]]:
     """Return a task and what is seen of a built-in motion, from the front."""
     motion = built_in.motion(name, frames=frames)
     body = Body.of(motion.skeleton)
     camera = Camera.around(np.array([0.0, 1.05, 0.0]), azimuth, 4.4, SIZE)
     placed = zip(motion.poses, motion.translations, strict=True)
-    observations = [Observation([Silhouette.of(project(body, camera, *at))]) for at in placed]
-    return Task(body, [camera], 600, 0.0, motion.translations[0], "aligned"), observations
+    observations = [
+        Observation([Silhouette.of(project(body, camera, *at))]) for at in placed
+    ]
+    return Task(
+        body, [camera], 600, 0.0, motion.translations[0], "aligned"
+    ), observations
 
 
 def blank(one: Observation) -> Observation:
@@ -56,18 +62,27 @@ def test_it_keeps_the_rules_of_a_tracker() -> None:
 
 
 @each("exchanged", [False, True])
-def test_landmarks_bring_the_pose_nearer_though_a_detector_exchanges_legs(exchanged: bool) -> None:
+def test_landmarks_bring_the_pose_nearer_though_a_detector_exchanges_legs(
+    exchanged: bool,
+) -> None:
     task, observations = seen("walk-b", azimuth=1.4)
-    motion, given = built_in.motion("walk-b", frames=len(observations)), []
+    motion = built_in.motion("walk-b", frames=len(observations))
+    given = []
     for k, (one, joints) in enumerate(zip(observations, motion.joints, strict=True)):
-        found = np.column_stack([task.cameras[0].project(joints)[0], np.ones(len(joints))])
+        found = np.column_stack(
+            [task.cameras[0].project(joints)[0], np.ones(len(joints))]
+        )
         if exchanged and k % 4 == 0:
             found[GROUPS[0]] = found[MIRRORED[GROUPS[0]]]
         given.append(replace(one, landmarks=found[None]))
 
     def error(observations: list[Observation]) -> float:
         poses = np.array([frame.pose for frame in follow(task, observations)])
-        return float(joint_distances(motion.skeleton.joints(motion.poses), motion.skeleton.joints(poses)).mean())
+        return float(
+            joint_distances(
+                motion.skeleton.joints(motion.poses), motion.skeleton.joints(poses)
+            ).mean()
+        )
 
     assert error(given) < 0.9 * error(observations)
 
@@ -79,7 +94,8 @@ def test_a_short_gap_is_coasted_through(gap: int) -> None:
         observations[k] = blank(observations[k])
     frames = follow(task, observations)
     assert not any(frame.details["lost"] for frame in frames)
-    assert [frame.evaluations for frame in frames[1:]] == [1] * (len(frames) - 1)  # no fresh estimation
+    # no fresh estimation
+    assert [frame.evaluations for frame in frames[1:]] == [1] * (len(frames) - 1)
     assert iou(frames)[-8:].mean() > 0.5
 
 
@@ -104,7 +120,8 @@ def test_nothing_is_ever_seen() -> None:
 def test_what_is_no_person_is_no_reason_to_fail() -> None:
     task, observations = seen(frames=24)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
-    disc = (rows - 120) ** 2 + (columns - 100) ** 2 < 40**2  # its skeleton is a point: no end points
+    # its skeleton is a point: no end points
+    disc = (rows - 120) ** 2 + (columns - 100) ** 2 < 40**2
     dot = (rows == 100) & (columns == 100)
     for k, change in enumerate(
         (
@@ -123,11 +140,22 @@ def test_what_is_no_person_is_no_reason_to_fail() -> None:
 
 def test_an_activity_is_as_probable_as_its_models_together() -> None:
     models = ("stiff-walk", "walk", "jacks")
-    assert most_probable(TOPOLOGY.activities, models, np.array([0.3, 0.3, 0.4])) == "walk"
-    assert most_probable(TOPOLOGY.activities, models, np.array([0.2, 0.2, 0.6])) == "jacks"
+    assert (
+        most_probable(TOPOLOGY.activities, models, np.array([0.3, 0.3, 0.4])) == "walk"
+    )
+    assert (
+        most_probable(TOPOLOGY.activities, models, np.array([0.2, 0.2, 0.6])) == "jacks"
+    )
 
 
-@each("settings", [{"structure": "all"}, {"variant": "patent"}, {"variant": "patent", "recovery": True}])
+@each(
+    "settings",
+    [
+        {"structure": "all"},
+        {"variant": "patent"},
+        {"variant": "patent", "recovery": True},
+    ],
+)
 def test_other_forms_run(settings: dict[str, Any]) -> None:
     task, observations = seen(frames=40)
     poses = np.array([frame.pose for frame in follow(task, observations, **settings)])
@@ -135,10 +163,17 @@ def test_other_forms_run(settings: dict[str, Any]) -> None:
     assert len(np.unique(poses, axis=0)) > 20  # it moves, and is not held
 
 
-def test_the_rules_of_a_frame_look_at_the_joints_detected_in_it(monkeypatch: pytest.MonkeyPatch) -> None:  # VSMM 7
+# VSMM 7
+def test_the_rules_of_a_frame_look_at_the_joints_detected_in_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     recorded: list[np.ndarray] = []
     cycle = Switching.cycle
-    monkeypatch.setattr(Switching, "cycle", lambda self, *given: (recorded.append(given[-1]), cycle(self, *given))[1])
+    monkeypatch.setattr(
+        Switching,
+        "cycle",
+        lambda self, *given: (recorded.append(given[-1]), cycle(self, *given))[1],
+    )
     frames = follow(*seen(frames=6))
     for frame, points in zip(frames, recorded, strict=True):
         assert np.array_equal(points, frame.details["joints"][0])
@@ -149,18 +184,26 @@ def test_a_setting_counts_whatever_the_variant_is() -> None:
     for k in range(5, 30):
         observations[k] = blank(observations[k])
     # without recovery a track is never lost
-    cases = ("default", None, True), ("default", False, False), ("patent", None, False), ("patent", True, True)
+    cases = (
+        ("default", None, True),
+        ("default", False, False),
+        ("patent", None, False),
+        ("patent", True, True),
+    )
     for variant, recovery, lost in cases:
         frames = follow(task, observations, variant=variant, recovery=recovery)
         assert frames[-1].details["lost"] == lost
 
 
 @each("variant", ["default", "patent"])
-def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hidden_joint_is_where_its_own_filter_has_it(
+    variant: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     task, observations = seen(frames=5)
     observations[3] = blank(observations[3])  # where no joint is detected
     measured: list[np.ndarray] = []
-    marks = np.arange(17)[:, None] + np.array([1000.0, 2000.0])  # where no joint is expected
+    # where no joint is expected
+    marks = np.arange(17)[:, None] + np.array([1000.0, 2000.0])
     monkeypatch.setattr(tracker.JointFilter, "follow", lambda *_: marks)
     measure = tracker.JointCameras.measure
 
@@ -170,7 +213,8 @@ def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch
 
     monkeypatch.setattr(tracker.JointCameras, "measure", recorded)
     hidden_joints = 0
-    for frame in follow(task, observations, variant=variant):  # VSMM 2.7, Interpretation V9
+    # VSMM 2.7, Interpretation V9
+    for frame in follow(task, observations, variant=variant):
         hidden = frame.details["confidence"][0] == 0.0
         np.testing.assert_array_equal(frame.details["joints"][0][hidden], marks[hidden])
         assert (frame.details["joints"][0][~hidden] < 1000.0).all()

@@ -26,19 +26,27 @@ class Watched:
     """A page, and what it should not have done."""
 
     page: Any
-    complaints: list[str] = field(default_factory=list)  # errors and messages on the console
+    # errors and messages on the console
+    complaints: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
 
 
 @contextmanager
 def browser() -> Iterator[Any]:
     """Give a browser; the test is skipped where there is none. POSEFIT_BROWSER names one that is elsewhere."""
-    library = pytest.importorskip("playwright.sync_api", reason="pages need playwright: pip install posefit[browser]")
-    program = os.environ.get("POSEFIT_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
+    library = pytest.importorskip(
+        "playwright.sync_api",
+        reason="pages need playwright: pip install posefit[browser]",
+    )
+    program = os.environ.get("POSEFIT_BROWSER") or next(
+        filter(None, map(shutil.which, NAMES)), None
+    )
     if program is None:
         pytest.skip(f"pages need a browser: none of {', '.join(NAMES)} is installed")
     with library.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        chromium = driver.chromium.launch(
+            executable_path=program, args=["--no-sandbox"]
+        )
         try:
             yield chromium
         finally:
@@ -46,10 +54,13 @@ def browser() -> Iterator[Any]:
 
 
 @contextmanager
-def opened(chromium: Any, path: Path | str, width: int = 1280, **how: Any) -> Iterator[Watched]:
+def opened(
+    chromium: Any, path: Path | str, width: int = 1280, **how: Any
+) -> Iterator[Watched]:
     """Give a file's page, or that of an address, in a window so many pixels wide; offline by default."""
     context = chromium.new_context(
-        viewport={"width": width, "height": 900}, **{"offline": True, "reduced_motion": "reduce", **how}
+        viewport={"width": width, "height": 900},
+        **{"offline": True, "reduced_motion": "reduce", **how},
     )
     watched = Watched(context.new_page())
     watched.page.on("console", lambda message: watched.complaints.append(message.text))
@@ -65,7 +76,10 @@ def opened(chromium: Any, path: Path | str, width: int = 1280, **how: Any) -> It
 def result(cell: TrackCell, error: float, **more: Any) -> CellResult:
     """Return a result as large as a real one; of four frames, each joint wrong by the error in centimetres."""
     truth = np.random.default_rng(cell.instance).normal(0.0, 0.3, (4, 27, 3))
-    return CellResult(row_of(cell, error, **more), packed_joints(truth=truth, estimate=truth + 0.01 * error))
+    return CellResult(
+        row_of(cell, error, **more),
+        packed_joints(truth=truth, estimate=truth + 0.01 * error),
+    )
 
 
 def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
@@ -76,8 +90,24 @@ def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
         "spec": cell.spec,
         "status": "done",
         "error_degrees": {"mean": error, "std": 0.0, "max": error},
-        **dict.fromkeys(("geodesic_degrees", "free_error_degrees", "mpjpe_mm", "pa_mpjpe_mm", "cost"), error),
-        **{"iou": 0.9, "swap_rate": 0.0, "lost_rate": 0.0, "held_frames": 0, "skill": skill, "warnings": []},
+        **dict.fromkeys(
+            (
+                "geodesic_degrees",
+                "free_error_degrees",
+                "mpjpe_mm",
+                "pa_mpjpe_mm",
+                "cost",
+            ),
+            error,
+        ),
+        **{
+            "iou": 0.9,
+            "swap_rate": 0.0,
+            "lost_rate": 0.0,
+            "held_frames": 0,
+            "skill": skill,
+            "warnings": [],
+        },
         "baselines_degrees": dict.fromkeys(skill, 4.0),
         "prior_floor_degrees": 0.5,
         "seconds_per_frame": 0.01,
@@ -86,7 +116,10 @@ def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
         "evaluations_used": cell.evaluations * cell.frames,
         "dimensions": 9,
         "joint_errors_mm": [error * joint for joint in range(27)],
-        "trace": {"evaluations": [40, 80, 120], "cost": [4.0 * error, 2.0 * error, error]},
+        "trace": {
+            "evaluations": [40, 80, 120],
+            "cost": [4.0 * error, 2.0 * error, error],
+        },
         "mode_reliability": [],
     } | more
 
@@ -101,11 +134,15 @@ def written(made: Path, *words: object) -> tuple[list[str], str]:
 
 def data_in(page: str) -> dict[str, Any]:
     """Return the data that a page holds."""
-    data: dict[str, Any] = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
+    data: dict[str, Any] = json.loads(
+        page.partition('id="data">')[2].partition("</script>")[0]
+    )
     return data
 
 
-def sure(coverage: float, width: float, modes: list[list[float]], unknown: float = 0.0) -> dict[str, Any]:
+def sure(
+    coverage: float, width: float, modes: list[list[float]], unknown: float = 0.0
+) -> dict[str, Any]:
     """Return the uncertainty of a row: its 80 % intervals, and narrower and wider ones in step."""
     return {
         "coverage": {"50": coverage - 0.3, "80": coverage, "95": coverage + 0.15},
@@ -115,7 +152,11 @@ def sure(coverage: float, width: float, modes: list[list[float]], unknown: float
     }
 
 
-def ledger(path: Path, results: Iterable[CellResult], failures: Iterable[tuple[TrackCell, list[str]]] = ()) -> Path:
+def ledger(
+    path: Path,
+    results: Iterable[CellResult],
+    failures: Iterable[tuple[TrackCell, list[str]]] = (),
+) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
     with Writer(path / FILE) as writer, writer.transaction():
         for done in results:

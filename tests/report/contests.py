@@ -30,7 +30,10 @@ def contest_of_results(path: Path, results: Iterable[CellResult]) -> Contest:
 
 
 def results_of(errors: Errors) -> list[CellResult]:
-    return [result(replace(FIRST, method=m, instance=i, seed=s), error) for (m, i, s), error in errors.items()]
+    return [
+        result(replace(FIRST, method=m, instance=i, seed=s), error)
+        for (m, i, s), error in errors.items()
+    ]
 
 
 def contest_of_errors(path: Path, errors: Errors) -> Contest:
@@ -50,7 +53,11 @@ def full(methods: dict[str, float], instances: int = 2, seeds: int = 2) -> Error
 def three_methods() -> Errors:
     """Return errors of which b's are 1 more than a's in each of 12 blocks, and c's differ from a's by chance alone."""
     errors = full({"a": 1.0, "b": 2.0}, instances=6)
-    return errors | {("c", i, s): errors["a", i, s] + 0.001 * (-1) ** i for i in range(6) for s in range(2)}
+    return errors | {
+        ("c", i, s): errors["a", i, s] + 0.001 * (-1) ** i
+        for i in range(6)
+        for s in range(2)
+    }
 
 
 def sentences(contest: Contest) -> list[str]:

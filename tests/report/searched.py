@@ -10,9 +10,23 @@ from tests.report.browser import ledger
 BUDGET = 100  # evaluations for each dimension
 
 
-def cell(method: str, function: int = 1, dimension: int = 9, instance: int = 10_000, **more: Any) -> SearchCell:
+def cell(
+    method: str,
+    function: int = 1,
+    dimension: int = 9,
+    instance: int = 10_000,
+    **more: Any,
+) -> SearchCell:
     suite = "posefit-2026.3"
-    return SearchCell(method, suite, function, dimension, instance, more.pop("budget", BUDGET) * dimension, **more)
+    return SearchCell(
+        method,
+        suite,
+        function,
+        dimension,
+        instance,
+        more.pop("budget", BUDGET) * dimension,
+        **more,
+    )
 
 
 def search_result(cell: SearchCell, targets: int) -> CellResult:
@@ -20,10 +34,22 @@ def search_result(cell: SearchCell, targets: int) -> CellResult:
     costs = [40.0, *(2.0 ** (5.0 - k / 4.0) for k in range(targets))]
     used = [1, *(10 * (k + 1) for k in range(targets))]
     if used[-1] < cell.evaluations:
-        used, costs = [*used, cell.evaluations], [*costs, costs[-1]]
+        used = [*used, cell.evaluations]
+        costs = [*costs, costs[-1]]
     row = {
-        **{"key": cell.key, "spec": cell.spec, "status": "done", "cost": costs[-1], "truth_cost": 0.0},
-        **{"evaluations_used": cell.evaluations, "dimensions": cell.dimension, "seconds": 0.1, "warnings": []},
+        **{
+            "key": cell.key,
+            "spec": cell.spec,
+            "status": "done",
+            "cost": costs[-1],
+            "truth_cost": 0.0,
+        },
+        **{
+            "evaluations_used": cell.evaluations,
+            "dimensions": cell.dimension,
+            "seconds": 0.1,
+            "warnings": [],
+        },
         "trace": {"evaluations": used, "cost": costs},
     }
     return CellResult(row, b"")
@@ -44,5 +70,12 @@ def searched(
     return ledger(path, made, lost)
 
 
-def problems(functions: Iterable[int], dimensions: Iterable[int], instances: int) -> list[tuple[int, int, int]]:
-    return [(f, d, 10_000 + i) for f in functions for d in dimensions for i in range(instances)]
+def problems(
+    functions: Iterable[int], dimensions: Iterable[int], instances: int
+) -> list[tuple[int, int, int]]:
+    return [
+        (f, d, 10_000 + i)
+        for f in functions
+        for d in dimensions
+        for i in range(instances)
+    ]

@@ -23,6 +23,11 @@ def test_lines_and_bands_have_their_values():
     band = axes.collections[0].get_paths()[0].vertices
     assert (band[:, 1].min(), band[:, 1].max()) == (2.5, 10.0)
     assert axes.get_xscale() == "log"
-    line = axes_of(Line(GRID, np.array([0.1, 0.5, 1.0])), stepped=True, most=1.0).lines[0]
-    assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (GRID.tolist(), [0.1, 0.5, 1.0])
+    line = axes_of(Line(GRID, np.array([0.1, 0.5, 1.0])), stepped=True, most=1.0).lines[
+        0
+    ]
+    assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (
+        GRID.tolist(),
+        [0.1, 0.5, 1.0],
+    )
     assert line.get_drawstyle() == "steps-post"

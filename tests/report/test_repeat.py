@@ -20,13 +20,41 @@ from tests.sweep.fake import cells
 
 SMALL: dict[str, Any] = {"frames": 2, "size": [80, 60], "evaluations": 80}
 SPECS: list[dict[str, Any]] = [
-    {"method": "sapso@pca", "motion": "walk", "settings": {"sapso": {"cooling": 0.9}}, "instance": 3, "seed": 4},
-    {"method": "random@full", "motion": "run", "settings": {"full.limits": "training"}, "view_degrees": [0, 90.5]},
-    {"method": "cma@pca", "motion": "walk-a", "corruption": {"holes": 0.3, "dropped": 0.1}, "train": ["walk", "run"]},
-    {"method": "sapso@pca", "motion": "walk", "settings": {"tracker.root_range_degrees": "40,10,10"}, "seed": 1},
+    {
+        "method": "sapso@pca",
+        "motion": "walk",
+        "settings": {"sapso": {"cooling": 0.9}},
+        "instance": 3,
+        "seed": 4,
+    },
+    {
+        "method": "random@full",
+        "motion": "run",
+        "settings": {"full.limits": "training"},
+        "view_degrees": [0, 90.5],
+    },
+    {
+        "method": "cma@pca",
+        "motion": "walk-a",
+        "corruption": {"holes": 0.3, "dropped": 0.1},
+        "train": ["walk", "run"],
+    },
+    {
+        "method": "sapso@pca",
+        "motion": "walk",
+        "settings": {"tracker.root_range_degrees": "40,10,10"},
+        "seed": 1,
+    },
 ]
 SEARCH: dict[str, Any] = {
-    **{"method": "pso", "suite": "posefit-2026.3", "function": 7, "dimension": 24, "instance": 3, "seed": 5},
+    **{
+        "method": "pso",
+        "suite": "posefit-2026.3",
+        "function": 7,
+        "dimension": 24,
+        "instance": 3,
+        "seed": 5,
+    },
     **{"budget": 30, "infeasible": "reject", "settings": {"population_size": 20}},
 }
 
@@ -40,17 +68,25 @@ def plan_in(text: str) -> dict[str, Any]:
 
 def test_the_command_is_a_plan_of_the_cell() -> None:
     for cell in (search_of(SEARCH), *(cell_of(SMALL | spec) for spec in SPECS)):
-        assert [planned.key for planned in Plan.of(plan_in(repeat_command(cell.spec)))] == [cell.key]
+        assert [
+            planned.key for planned in Plan.of(plan_in(repeat_command(cell.spec)))
+        ] == [cell.key]
 
 
 def test_the_command_runs_the_row_again(tmp_path: Path) -> None:
-    bash, posefit = shutil.which("bash"), Path(sys.executable).with_name("posefit")
+    bash = shutil.which("bash")
+    posefit = Path(sys.executable).with_name("posefit")
     if bash is None or not posefit.exists():
         pytest.skip("needs a shell and the command posefit beside Python")
     cell = cell_of(SMALL | SPECS[0])
-    environment = {**os.environ, "PATH": os.pathsep.join([str(posefit.parent), os.environ["PATH"]])}
+    environment = {
+        **os.environ,
+        "PATH": os.pathsep.join([str(posefit.parent), os.environ["PATH"]]),
+    }
     words = [bash, "-c", repeat_command(cell.spec)]
-    subprocess.run(words, cwd=tmp_path, env=environment, check=True, capture_output=True)
+    subprocess.run(
+        words, cwd=tmp_path, env=environment, check=True, capture_output=True
+    )
     (row,) = Ledger(tmp_path / "rerun").rows()
     expected = run_cell(cell).row
     for name in ("seconds", "seconds_per_frame", "cpu_seconds_per_frame"):
@@ -59,9 +95,21 @@ def test_the_command_runs_the_row_again(tmp_path: Path) -> None:
 
 
 def test_nothing_in_a_name_ends_the_plan_or_reaches_the_shell() -> None:
-    for name in ('a"b', "END", "a\nEND\nrm -rf /", "$(id) `id` 'x' \\", "\x7f\x85\u2028</script>", "é漢"):
-        more: dict[str, Any] = {"settings": {f"sapso.{name}": name}, "corruption": {name: 0.5}}
-        command = repeat_command(replace(cells(1)[0], motion=name, train=(name,), **more).spec)
+    for name in (
+        'a"b',
+        "END",
+        "a\nEND\nrm -rf /",
+        "$(id) `id` 'x' \\",
+        "\x7f\x85\u2028</script>",
+        "é漢",
+    ):
+        more: dict[str, Any] = {
+            "settings": {f"sapso.{name}": name},
+            "corruption": {name: 0.5},
+        }
+        command = repeat_command(
+            replace(cells(1)[0], motion=name, train=(name,), **more).spec
+        )
         (cell,) = plan_in(command)["cells"]
         assert cell.items() >= {"motion": name, "train": [name], **more}.items()
         assert "END" not in command.split("\n")[1:-1]

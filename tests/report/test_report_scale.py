@@ -17,7 +17,9 @@ from tests.sweep.fake import cells
 
 ROOT = Path(__file__).parents[2]
 METHODS = 10
-PROPOSED, FALLING = list(range(40, 2480, 40)), 20.0 / np.arange(1.0, 62.0)  # of the trace of every row
+# of the trace of every row
+PROPOSED = list(range(40, 2480, 40))
+FALLING = 20.0 / np.arange(1.0, 62.0)
 REPORT = """
 import json, sys, time
 from posefit.report.write import write_report
@@ -31,26 +33,38 @@ print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
 
 def rows(instances: int, seeds: int) -> Iterator[CellResult]:
     """Yield results as large as those of real cells; of one picture, whatever the row."""
-    first, rng = replace(cells(1)[0], frames=60), np.random.default_rng(0)
+    first = replace(cells(1)[0], frames=60)
+    rng = np.random.default_rng(0)
     picture = result(first, 1.0).joints
     for m in range(METHODS):
         for i in range(instances):
             for s, error in enumerate(rng.gamma(2.0, 1.0, seeds).tolist()):
-                trace: dict[str, Any] = {"evaluations": PROPOSED, "cost": np.round(FALLING + error, 4).tolist()}
+                trace: dict[str, Any] = {
+                    "evaluations": PROPOSED,
+                    "cost": np.round(FALLING + error, 4).tolist(),
+                }
                 cell = replace(first, method=f"m{m}@pca", instance=i, seed=s)
                 yield CellResult(row_of(cell, error, trace=trace), picture)
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads what it took from /proc")
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="reads what it took from /proc"
+)
 @pytest.mark.parametrize(("instances", "seeds"), [(100, 100), (5000, 2)])
-def test_100_000_rows_are_reported_in_2_gigabytes(tmp_path: Path, instances: int, seeds: int) -> None:
+def test_100_000_rows_are_reported_in_2_gigabytes(
+    tmp_path: Path, instances: int, seeds: int
+) -> None:
     made = ledger(tmp_path / "ledger", rows(instances, seeds))
     words = [sys.executable, "-c", REPORT, str(made), str(tmp_path / "report.html")]
-    printed = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    printed = subprocess.run(
+        words, cwd=ROOT, check=True, capture_output=True, text=True
+    ).stdout
     done, taken, peak = json.loads(printed.splitlines()[-1])
     size = (tmp_path / "report.html").stat().st_size
-    print(f"{done} rows in {taken:.1f} s, {peak / 1e9:.2f} GB, a page of {size / 1e6:.1f} MB")
+    print(
+        f"{done} rows in {taken:.1f} s, {peak / 1e9:.2f} GB, a page of {size / 1e6:.1f} MB"
+    )
     assert done == METHODS * instances * seeds
     assert peak < 2e9
     assert size < 100 * done + 2e5

@@ -15,14 +15,17 @@ from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
 from tests.report.contests import FIRST, full, results_of
 
-SAPSO, COOLER = replace(FIRST, method="sapso@pca"), replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
+SAPSO = replace(FIRST, method="sapso@pca")
+COOLER = replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
 
 
 def read(path: Path, *results: CellResult) -> Runs:
     return runs_of(Ledger(ledger(path / "results", results)))
 
 
-def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_first(tmp_path: Path) -> None:
+def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_first(
+    tmp_path: Path,
+) -> None:
     runs = read(
         tmp_path,
         result(SAPSO, 3.0),
@@ -44,7 +47,10 @@ def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_firs
 def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
     all_of_them = {"sapso.seed": 1, "pca.seed": 2, "sapso.cooling": 0.9}
     several = [all_of_them, {"sapso.seed": 1, "pca.seed": 2}, {"pca.seed": 3}]
-    runs = read(tmp_path, *(result(replace(SAPSO, settings=s), 1.0 + k) for k, s in enumerate(several)))
+    runs = read(
+        tmp_path,
+        *(result(replace(SAPSO, settings=s), 1.0 + k) for k, s in enumerate(several)),
+    )
     assert runs.methods == (
         "sapso@pca (pca.seed 2, cooling 0.9, sapso.seed 1)",
         "sapso@pca (pca.seed 2, sapso.seed 1)",
@@ -53,7 +59,12 @@ def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
 
 
 def test_names_are_distinct_and_printable_whatever_they_hold() -> None:
-    details = [{"version": "1", "evaluations": "2"}, {"version": "1", "evaluations": "3"}, {}, {}]
+    details = [
+        {"version": "1", "evaluations": "2"},
+        {"version": "1", "evaluations": "3"},
+        {},
+        {},
+    ]
     assert distinct(["cold", "cold", "a", "a (2)"], details) == (
         "cold (evaluations 2)", "cold (evaluations 3)", "a", "a (2)",
     )  # fmt: skip
@@ -64,8 +75,16 @@ def test_names_are_distinct_and_printable_whatever_they_hold() -> None:
 
 
 def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -> None:
-    changes: list[dict[str, Any]] = [{"corruption": {"holes": 0.5}}, {"instance": 2}, {"frames": 30}, {}, {"seed": 1}]
-    runs = read(tmp_path, *(result(replace(FIRST, **change), 1.0) for change in changes))
+    changes: list[dict[str, Any]] = [
+        {"corruption": {"holes": 0.5}},
+        {"instance": 2},
+        {"frames": 30},
+        {},
+        {"seed": 1},
+    ]
+    runs = read(
+        tmp_path, *(result(replace(FIRST, **change), 1.0) for change in changes)
+    )
     assert runs.instances == (
         "walk, view 45°, instance 0 (frames 30)",
         "walk, view 45°, instance 0 (frames 60)",
@@ -75,9 +94,12 @@ def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -
     assert np.bincount(runs.instance).tolist() == [1, 2, 1, 1]
 
 
-def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(tmp_path: Path) -> None:
+def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(
+    tmp_path: Path,
+) -> None:
     made = results_of(full({"a": 1.0, "b": 1.0}, instances=3))
-    runs, mixed = read(tmp_path / "a", *made), read(tmp_path / "b", *random.Random(0).sample(made, len(made)))
+    runs = read(tmp_path / "a", *made)
+    mixed = read(tmp_path / "b", *random.Random(0).sample(made, len(made)))
     assert runs.keys == mixed.keys
     assert (runs.figures["error"] == mixed.figures["error"]).all()
     assert runs.heads == mixed.heads
@@ -87,16 +109,31 @@ def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(tmp_pat
 def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
     skill = {"mean_pose": None, "persistence": 0.5, "nearest": 0.25}
     empty = {"evaluations": [], "cost": []}
-    runs = read(tmp_path, result(FIRST, 1.0, error_degrees=None, skill=skill, baselines_degrees=None, trace=empty))
+    runs = read(
+        tmp_path,
+        result(
+            FIRST,
+            1.0,
+            error_degrees=None,
+            skill=skill,
+            baselines_degrees=None,
+            trace=empty,
+        ),
+    )
     assert {name for name in TRACKS.columns if np.isnan(runs.figures[name][0])} == {
         "error", "skill_mean_pose", "baseline_mean_pose", "baseline_persistence", "baseline_nearest", "unknown",
         *(f"{kind}_{level}" for kind in ("coverage", "interval") for level in (50, 80, 95)),
     }  # fmt: skip
-    figures = [runs.figures[name].item() for name in ("skill_nearest", "evaluations", "ms")]
+    figures = [
+        runs.figures[name].item() for name in ("skill_nearest", "evaluations", "ms")
+    ]
     assert figures == [0.25, FIRST.evaluations, 10.0]
     assert len(runs.data["traces"][0][0]) == 0
 
 
 def test_seeds_of_any_size_keep_every_digit(tmp_path: Path) -> None:
-    runs = read(tmp_path, *(result(replace(FIRST, seed=seed), 1.0) for seed in (2**70 + 1, 2**70)))
+    runs = read(
+        tmp_path,
+        *(result(replace(FIRST, seed=seed), 1.0) for seed in (2**70 + 1, 2**70)),
+    )
     assert [runs.seeds[k] for k in runs.seed] == [2**70, 2**70 + 1]

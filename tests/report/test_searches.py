@@ -18,15 +18,25 @@ from tests.report.browser import data_in, ledger, result, written
 from tests.report.contests import FIRST, baselines, contest_in, sentences
 from tests.report.searched import cell, problems, search_result, searched
 
-LOST = (cell("pso", instance=10_001, settings={"population_size": 20}, seed=3), ["ValueError: it had to"])
+LOST = (
+    cell("pso", instance=10_001, settings={"population_size": 20}, seed=3),
+    ["ValueError: it had to"],
+)
 
 
 def test_the_leader_and_its_certainty_are_one_sentence(tmp_path: Path) -> None:
     # of 29 targets 10, 11 or 12 in turn, by function and instance: 11 on average, 37.9 %
-    contest = contest_in(searched(tmp_path / "r", {"cma": 10, "random": 2}, problems([1, 5], [9, 24], 3)))
+    contest = contest_in(
+        searched(tmp_path / "r", {"cma": 10, "random": 2}, problems([1, 5], [9, 24], 3))
+    )
     board = leaderboard(contest)
-    assert [(row["name"], row["runs"]) for row in board] == [("cma", 12), ("random", 12)]
-    assert [row["reached"] for row in board] == pytest.approx([1100.0 / 29.0, 300.0 / 29.0])
+    assert [(row["name"], row["runs"]) for row in board] == [
+        ("cma", 12),
+        ("random", 12),
+    ]
+    assert [row["reached"] for row in board] == pytest.approx(
+        [1100.0 / 29.0, 300.0 / 29.0]
+    )
     assert sentences(contest) == [
         f"cma leads with 37.9 % of all targets reached (95 % interval {board[0]['low']:.1f} % to "
         f"{board[0]['high']:.1f} %) on functions 1 and 5 in 9 and 24 dimensions, 6 "
@@ -36,16 +46,29 @@ def test_the_leader_and_its_certainty_are_one_sentence(tmp_path: Path) -> None:
     ]
 
 
-def test_the_interval_is_that_of_instances_in_any_number_of_dimensions(tmp_path: Path) -> None:
-    flat, both = (searched(tmp_path / str(len(d)), {"cma": 10}, problems([1], d, 3)) for d in ([9], [9, 24]))
+def test_the_interval_is_that_of_instances_in_any_number_of_dimensions(
+    tmp_path: Path,
+) -> None:
+    flat, both = (
+        searched(tmp_path / str(len(d)), {"cma": 10}, problems([1], d, 3))
+        for d in ([9], [9, 24])
+    )
     rows = [leaderboard(contest_in(path))[0] for path in (flat, both)]
     # 10, 11 and 12 of 29: a standard deviation of 1, so t of 2 degrees of freedom, 4.302653, over the root of 3
-    assert rows[0]["high"] - rows[0]["reached"] == pytest.approx(4.302653 / math.sqrt(3.0) * 100.0 / 29.0)
+    assert rows[0]["high"] - rows[0]["reached"] == pytest.approx(
+        4.302653 / math.sqrt(3.0) * 100.0 / 29.0
+    )
     assert rows[1]["high"] == pytest.approx(rows[0]["high"])
 
 
-def test_random_search_is_the_baseline_unless_it_leads_or_is_missing(tmp_path: Path) -> None:
-    text = sentences(contest_in(searched(tmp_path / "a", {"cma": 3, "random": 6}, problems([1], [9], 6))))
+def test_random_search_is_the_baseline_unless_it_leads_or_is_missing(
+    tmp_path: Path,
+) -> None:
+    text = sentences(
+        contest_in(
+            searched(tmp_path / "a", {"cma": 3, "random": 6}, problems([1], [9], 6))
+        )
+    )
     assert text[0].startswith("random leads with ")
     assert text[-1] == "That is random search: no method does better."
     alone = contest_in(searched(tmp_path / "b", {"cma": 3}, problems([1], [9], 1)))
@@ -54,13 +77,29 @@ def test_random_search_is_the_baseline_unless_it_leads_or_is_missing(tmp_path: P
         "No other method shares its runs.",
     ]
     assert baselines(alone) == []
-    once = contest_in(searched(tmp_path / "c", {"cma": 3, "pso": 2}, problems([1], [9, 24], 1)))
-    assert "One shared instance is too few to distinguish it from any other method." in sentences(once)
+    once = contest_in(
+        searched(tmp_path / "c", {"cma": 3, "pso": 2}, problems([1], [9, 24], 1))
+    )
+    assert (
+        "One shared instance is too few to distinguish it from any other method."
+        in sentences(once)
+    )
 
 
-def test_methods_differ_in_settings_budget_and_infeasible_proposals(tmp_path: Path) -> None:
-    more: list[dict[str, Any]] = [{}, {"settings": {"population_size": 20}}, {"budget": 30}, {"infeasible": "reject"}]
-    made = [search_result(cell("pso", instance=10_000 + i, **dict(fields)), 5) for fields in more for i in range(2)]
+def test_methods_differ_in_settings_budget_and_infeasible_proposals(
+    tmp_path: Path,
+) -> None:
+    more: list[dict[str, Any]] = [
+        {},
+        {"settings": {"population_size": 20}},
+        {"budget": 30},
+        {"infeasible": "reject"},
+    ]
+    made = [
+        search_result(cell("pso", instance=10_000 + i, **dict(fields)), 5)
+        for fields in more
+        for i in range(2)
+    ]
     assert sorted(runs_of(Ledger(ledger(tmp_path / "r", made))).methods) == [
         "pso (budget 100, infeasible reject)",
         "pso (budget 100, infeasible repair)",
@@ -70,44 +109,81 @@ def test_methods_differ_in_settings_budget_and_infeasible_proposals(tmp_path: Pa
 
 
 def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> None:
-    results = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))  # 9 + 2 and 9; 9 and 9 + 1
+    # 9 + 2 and 9; 9 and 9 + 1
+    results = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))
     data = data_of(results, runs_of(results))
-    assert [chart["title"] for chart in data["charts"]] == ["All functions", "1 single image", "5 sequence"]
+    assert [chart["title"] for chart in data["charts"]] == [
+        "All functions",
+        "1 single image",
+        "5 sequence",
+    ]
     together, first, _ = (chart["lines"][0]["y"] for chart in data["charts"])
     evaluations = data["charts"][0]["lines"][0]["x"]
     assert (evaluations[0], evaluations[-1]) == pytest.approx((1.0, 100.0))
-    assert together[0] == 0.0  # the first target falls at the tenth evaluation, 1.1 for each dimension
+    # the first target falls at the tenth evaluation, 1.1 for each dimension
+    assert together[0] == 0.0
     assert together[-1] == pytest.approx(39.0 / (4.0 * 29.0))
     assert first[-1] == pytest.approx(20.0 / (2.0 * 29.0))
     half = int(np.searchsorted(evaluations, 5.0))
-    assert together[half] == pytest.approx(min(int(evaluations[half] * 9.0 / 10.0), 9) / 29.0)
+    assert together[half] == pytest.approx(
+        min(int(evaluations[half] * 9.0 / 10.0), 9) / 29.0
+    )
     last = data["charts"][0]["lines"][0]
     row = data["leaderboard"][0]
-    assert [100.0 * last[end][-1] for end in ("low", "high")] == pytest.approx([row["low"], row["high"]])
+    assert [100.0 * last[end][-1] for end in ("low", "high")] == pytest.approx(
+        [row["low"], row["high"]]
+    )
     # +16 is the fifth target, at the 50th evaluation; +4 the 13th, which no run reaches
     times = [(row["function"], row["times"]) for row in data["times"]]
-    assert times == [(function, [50.0, None, None, None]) for function in (1, 5)]  # and no mean of both
+    # and no mean of both
+    assert times == [(function, [50.0, None, None, None]) for function in (1, 5)]
 
 
-def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_page(tmp_path: Path) -> None:
-    results = searched(tmp_path / "results", {"cma": 10, "random": 2}, problems([1, 5], [9], 3), [LOST])
+def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_page(
+    tmp_path: Path,
+) -> None:
+    results = searched(
+        tmp_path / "results", {"cma": 10, "random": 2}, problems([1, 5], [9], 3), [LOST]
+    )
     lines, page = written(results, "--csv", tmp_path / "rows.csv")
-    assert lines[0].startswith("cma leads with 37.9 % of all targets reached (95 % interval ")
-    assert lines[3:5] == ["1 cell failed, left out of all figures: pso 1", "  1 x ValueError: it had to"]
+    assert lines[0].startswith(
+        "cma leads with 37.9 % of all targets reached (95 % interval "
+    )
+    assert lines[3:5] == [
+        "1 cell failed, left out of all figures: pso 1",
+        "  1 x ValueError: it had to",
+    ]
     assert lines[5] == "no cell finished, so not on the leaderboard: pso"
-    assert lines[6].split() == ["targets", "%", "95", "%", "interval", "behind", "p", "above"]
-    assert [line.split()[:2] for line in lines[7:9]] == [["cma", "37.9"], ["random", "10.3"]]
+    assert lines[6].split() == [
+        "targets",
+        "%",
+        "95",
+        "%",
+        "interval",
+        "behind",
+        "p",
+        "above",
+    ]
+    assert [line.split()[:2] for line in lines[7:9]] == [
+        ["cma", "37.9"],
+        ["random", "10.3"],
+    ]
     data = data_in(page)
     assert data["answer"] == lines[:3]
     assert data["failures"][0]["name"] == "pso on f1 in 9D, instance 10001, seed 3"
-    assert data["baselines"] == [{"baseline": "random", "reached": pytest.approx(10.345)}]
+    assert data["baselines"] == [
+        {"baseline": "random", "reached": pytest.approx(10.345)}
+    ]
     assert len(csv_rows(tmp_path / "rows.csv")) == 12 + 1
     printed = json.loads(run("report", results, "--json").stdout)
     assert [row["name"] for row in printed["leaderboard"]] == ["cma", "random"]
     assert printed["times"][0]["times"][0] == 50.0
     assert printed["answer"][0].startswith("cma leads")
     mistake = error_of("report", results, "--figures", tmp_path / "new")
-    assert "--figures must be given with a sweep of tracks, got one of single searches" in mistake
+    assert (
+        "--figures must be given with a sweep of tracks, got one of single searches"
+        in mistake
+    )
     assert not (tmp_path / "new").exists()
 
 
@@ -118,5 +194,8 @@ def test_a_ledger_of_tracks_and_searches_is_refused(tmp_path: Path) -> None:
         ledger(tmp_path / "b", [search_result(search, 3)], [(FIRST, ["no"])]),
     ):
         message = error_of("report", path, "--out", tmp_path / "page.html")
-        assert "expected a ledger of tracks or one of single searches, got both in one" in message
+        assert (
+            "expected a ledger of tracks or one of single searches, got both in one"
+            in message
+        )
         assert not (tmp_path / "page.html").exists()

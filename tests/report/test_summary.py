@@ -20,8 +20,11 @@ def test_what_leads_by_how_much_and_how_certain_that_is(tmp_path: Path) -> None:
     ]
 
 
-def test_a_method_with_a_large_error_that_no_test_tells_apart_has_its_effect(tmp_path: Path) -> None:
-    errors = full({"a": 1.0, "b": 3.0}, instances=5, seeds=1)  # of five blocks, the least p is 0.0625
+def test_a_method_with_a_large_error_that_no_test_tells_apart_has_its_effect(
+    tmp_path: Path,
+) -> None:
+    # of five blocks, the least p is 0.0625
+    errors = full({"a": 1.0, "b": 3.0}, instances=5, seeds=1)
     assert sentences(contest_of_errors(tmp_path, errors))[1:3] == [
         "5 paired runs are too few to tell it from b (median difference +2.00°, p = 0.062).",
         "So few cannot show any difference: of 1 pair of methods no p can be below 0.062.",
@@ -34,10 +37,15 @@ def test_a_leader_by_the_mean_may_be_worse_on_most_runs(tmp_path: Path) -> None:
     errors |= {("b", i, 0): 7.5 if i == 3 else 0.9 + 0.999 * i for i in range(12)}
     text = sentences(contest_of_errors(tmp_path, errors))
     assert text[0].startswith("a leads")
-    assert text[1] == "On most runs it is worse than b (median difference −0.11°, p = 0.034)."
+    assert (
+        text[1]
+        == "On most runs it is worse than b (median difference −0.11°, p = 0.034)."
+    )
 
 
-def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(tmp_path: Path) -> None:
+def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(
+    tmp_path: Path,
+) -> None:
     two = {"a": 1.0, "b": 2.0}
     for k, (errors, text) in enumerate(
         [
@@ -45,9 +53,15 @@ def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(tmp_pa
                 full(two, instances=6),
                 "Over 12 paired runs every other method is worse, the next one is b (median difference +1.00°, p < 0.001).",
             ),
-            (full({"a": 1.0}), "a has an error of 1.06° on 2 instances of walk with 2 seeds each."),
+            (
+                full({"a": 1.0}),
+                "a has an error of 1.06° on 2 instances of walk with 2 seeds each.",
+            ),
             (full({"a": 1.0}), "No other method shares its runs."),
-            (full(two, instances=1, seeds=1), "One shared run is too few to distinguish it from any other method."),
+            (
+                full(two, instances=1, seeds=1),
+                "One shared run is too few to distinguish it from any other method.",
+            ),
             (
                 full({"a": 5.0, "b": 6.0}),
                 "It does not beat the baselines: the best baseline, the mean training pose, has 4.00°.",

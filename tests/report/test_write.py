@@ -17,23 +17,35 @@ from tests.files import csv_rows
 from tests.report.browser import data_in, ledger, result, sure, written
 from tests.report.contests import FIRST, full, results_of
 
-LOST = [(replace(FIRST, seed=9), ["its process died", "ValueError: it had to", "its process died"])]
+LOST = [
+    (
+        replace(FIRST, seed=9),
+        ["its process died", "ValueError: it had to", "its process died"],
+    )
+]
 
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
     """Return a ledger of two methods on two instances with two seeds, and one failure."""
     made = [
-        result(replace(FIRST, method=method, instance=i, seed=s, frames=4), error + 0.01 * s)
+        result(
+            replace(FIRST, method=method, instance=i, seed=s, frames=4),
+            error + 0.01 * s,
+        )
         for (method, i, s), error in full({"random@pca": 2.0, "sapso@pca": 1.0}).items()
     ]
     return ledger(tmp_path / "results", made, LOST)
 
 
-def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, tmp_path: Path) -> None:
+def test_the_report_is_one_file_that_links_to_nothing_but_itself(
+    results: Path, tmp_path: Path
+) -> None:
     lines, page = written(results)
     assert lines[-1] == f"written to {tmp_path / 'report.html'}: open it in any browser"
-    assert lines[0].startswith("sapso@pca leads with an error of 1.06° on 2 instances of walk with 2 seeds each.")
+    assert lines[0].startswith(
+        "sapso@pca leads with an error of 1.06° on 2 instances of walk with 2 seeds each."
+    )
     assert lines[4] == "1 cell failed, left out of all figures: random@pca 1"
     assert [line.split()[:6] for line in lines[8:-1]] == [
         ["sapso@pca", "1.06", "-", "-", "0/4", "0.0"],
@@ -46,13 +58,25 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert not re.search(r"<(link|img|iframe|object)\b", page)
     data = data_in(page)
     assert data["header"]["done"] == 8
-    assert data["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
+    assert data["failures"][0]["reasons"] == [
+        "its process died",
+        "ValueError: it had to",
+    ]
     assert data["certainty"] is None
-    assert not [name for name in (*data["columns"], *data["rows"]) if re.match("coverage|interval|unknown", name)]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
+    assert not [
+        name
+        for name in (*data["columns"], *data["rows"])
+        if re.match("coverage|interval|unknown", name)
+    ]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "report.html",
+        "results",
+    ]
 
 
-def test_a_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(results: Path, tmp_path: Path) -> None:
+def test_a_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(
+    results: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "report.html"
     done = run("report", results)
     assert done.exit_code == 0, done.stderr
@@ -64,16 +88,35 @@ def test_a_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(r
     out.write_text(MARK + "of another day")
     printed = json.loads(run("report", results, "--out", out, "--json").stdout)
     assert out.read_bytes() == first
-    assert [row["name"] for row in printed["leaderboard"]] == ["sapso@pca", "random@pca"]
-    assert printed["leaderboard"][0]["skill_mean_pose"] == pytest.approx(1.0 - 1.06 / 4.0)
-    assert {row["baseline"] for row in printed["baselines"]} == {"mean_pose", "persistence", "nearest"}
+    assert [row["name"] for row in printed["leaderboard"]] == [
+        "sapso@pca",
+        "random@pca",
+    ]
+    assert printed["leaderboard"][0]["skill_mean_pose"] == pytest.approx(
+        1.0 - 1.06 / 4.0
+    )
+    assert {row["baseline"] for row in printed["baselines"]} == {
+        "mean_pose",
+        "persistence",
+        "nearest",
+    }
     assert printed["header"]["failed"] == 1
 
 
-def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_path: Path) -> None:
+def test_failures_and_instances_left_out_are_named_above_the_leaderboard(
+    tmp_path: Path,
+) -> None:
     errors = full({"random@pca": 1.0, "sapso@pca": 1.0}, instances=3)
-    made = results_of({key: error for key, error in errors.items() if key[:2] != ("sapso@pca", 1)})
-    lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
+    made = results_of(
+        {key: error for key, error in errors.items() if key[:2] != ("sapso@pca", 1)}
+    )
+    lost = [
+        (
+            replace(FIRST, method="sapso@pca", instance=1, seed=s),
+            ["its process died of SIGSEGV"],
+        )
+        for s in range(2)
+    ]
     lines, page = written(ledger(tmp_path / "results", made, lost))
     assert lines[4:9] == [
         "2 cells failed, left out of all figures: sapso@pca 2",
@@ -82,36 +125,60 @@ def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_pat
         "left out of the comparison, for every method: 1 instance",
         "  walk, view 45°, instance 1: no run of sapso@pca",
     ]
-    assert " ".join(lines[9].split()) == "error deg 95 % interval behind p lost in lost % skill"
-    assert data_in(page)["header"]["dropped"] == [{"instance": "walk, view 45°, instance 1", "missing": ["sapso@pca"]}]
+    assert (
+        " ".join(lines[9].split())
+        == "error deg 95 % interval behind p lost in lost % skill"
+    )
+    assert data_in(page)["header"]["dropped"] == [
+        {"instance": "walk, view 45°, instance 1", "missing": ["sapso@pca"]}
+    ]
 
 
-def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: Path) -> None:
+def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(
+    tmp_path: Path,
+) -> None:
     lines, page = written(ledger(tmp_path / "results", [], LOST))
     assert lines[:3] == [
         "1 cell failed, left out of all figures: random@pca 1",
         "  1 x its process died",
         "  1 x ValueError: it had to",
     ]
-    assert data_in(page)["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
+    assert data_in(page)["failures"][0]["reasons"] == [
+        "its process died",
+        "ValueError: it had to",
+    ]
 
 
 def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    figures, rows = tmp_path / "figures", tmp_path / "rows.csv"
+    figures = tmp_path / "figures"
+    rows = tmp_path / "rows.csv"
     written(results, "--figures", figures, "--csv", rows)
-    drawn = {f"{name}.{kind}" for name in ("convergence", "profile") for kind in ("png", "pdf")}
+    drawn = {
+        f"{name}.{kind}"
+        for name in ("convergence", "profile")
+        for kind in ("png", "pdf")
+    }
     assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.csv"}
-    assert sorted(row["status"] for row in csv_rows(rows)) == ["done"] * 8 + ["quarantined"]
+    assert sorted(row["status"] for row in csv_rows(rows)) == ["done"] * 8 + [
+        "quarantined"
+    ]
 
 
 def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     uncertainty = sure(0.8, 60.0, [[4, 0.9, 0.5]])
-    made = [result(replace(FIRST, method=m, seed=s), 1.0 + s, **uncertainty) for m in "ab" for s in (0, 1)]
+    made = [
+        result(replace(FIRST, method=m, seed=s), 1.0 + s, **uncertainty)
+        for m in "ab"
+        for s in (0, 1)
+    ]
     made += [result(replace(FIRST, method="without", seed=s), 3.0) for s in (0, 1)]
-    figures, rows = tmp_path / "figures", tmp_path / "rows.csv"
-    _, page = written(ledger(tmp_path / "results", made), "--figures", figures, "--csv", rows)
+    figures = tmp_path / "figures"
+    rows = tmp_path / "rows.csv"
+    _, page = written(
+        ledger(tmp_path / "results", made), "--figures", figures, "--csv", rows
+    )
     head, first, *_ = (figures / "leaderboard.csv").read_text().splitlines()
     assert "flagged unknown,80 % interval holds,80 % interval (mm)" in head
     assert ",0.8,60.0," in first
@@ -119,21 +186,46 @@ def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
     assert (row["interval_mm.80"], row["coverage.80"]) == ("60.0", "0.8")
     assert "mode_reliability" not in row
     data = data_in(page)
-    assert [method is None for method in data["certainty"]["methods"]] == [False, False, True]
+    assert [method is None for method in data["certainty"]["methods"]] == [
+        False,
+        False,
+        True,
+    ]
     assert data["rows"]["coverage_80"] == [0.8] * 4 + [None] * 2
 
 
 MISTAKES = [
-    ("NONE", "expected a ledger, a folder or .sqlite file that posefit sweep wrote, got none"),
+    (
+        "NONE",
+        "expected a ledger, a folder or .sqlite file that posefit sweep wrote, got none",
+    ),
     ("EMPTY --out OUT.html", "expected a ledger with finished rows, got one with none"),
-    ("OTHER.html", "OTHER.html: expected a whole SQLite file, got file is not a database"),
+    (
+        "OTHER.html",
+        "OTHER.html: expected a whole SQLite file, got file is not a database",
+    ),
     ("results --out OUT.txt", "--out must be a file that ends in .html, got "),
-    ("results --out OTHER.html", "expected a new name or an earlier report, got something else"),
-    ("results --out DIR.html", "expected a new name or an earlier report, got something else"),
+    (
+        "results --out OTHER.html",
+        "expected a new name or an earlier report, got something else",
+    ),
+    (
+        "results --out DIR.html",
+        "expected a new name or an earlier report, got something else",
+    ),
     ("results --out none/OUT.html", "expected a place to write to, got one in "),
-    ("results --out OUT.html --csv OTHER.html", "expected a new name to write to, got one that exists"),
-    ("results --out OUT.html --figures results", "expected a place of its own for each"),
-    ("results --out OUT.html --figures none/OUT", "expected a place to write to, got one in "),
+    (
+        "results --out OUT.html --csv OTHER.html",
+        "expected a new name to write to, got one that exists",
+    ),
+    (
+        "results --out OUT.html --figures results",
+        "expected a place of its own for each",
+    ),
+    (
+        "results --out OUT.html --figures none/OUT",
+        "expected a place to write to, got one in ",
+    ),
 ]
 
 
@@ -143,10 +235,18 @@ def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) 
     (tmp_path / "DIR.html").mkdir()
     before = sorted(tmp_path.rglob("*"))
     for words, message in MISTAKES:
-        arguments = [word if re.match(r"--|\d", word) else tmp_path / word for word in words.split()]
+        arguments = [
+            word if re.match(r"--|\d", word) else tmp_path / word
+            for word in words.split()
+        ]
         assert message in error_of("report", *arguments), words
-        after = [path for path in sorted(tmp_path.rglob("*")) if not path.name.endswith(("-wal", "-shm"))]
-        assert after == before, words  # SQLite has these beside a ledger as long as somebody reads it
+        after = [
+            path
+            for path in sorted(tmp_path.rglob("*"))
+            if not path.name.endswith(("-wal", "-shm"))
+        ]
+        # SQLite has these beside a ledger as long as somebody reads it
+        assert after == before, words
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
 
 
@@ -154,17 +254,33 @@ def test_without_matplotlib_figures_are_one_line_and_nothing_is_written(
     results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    line = error_of("report", results, "--out", tmp_path / "b.html", "--figures", tmp_path / "figures")
+    line = error_of(
+        "report",
+        results,
+        "--out",
+        tmp_path / "b.html",
+        "--figures",
+        tmp_path / "figures",
+    )
     assert "figures need the library matplotlib: pip install posefit[figures]" in line
     assert [path.name for path in tmp_path.iterdir()] == ["results"]
 
 
 def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
-    for text in ("</script>", "<!--", "]]>", "&lt;", "\u2028\u2029", '"\\', "\U0001f600é"):
+    for text in (
+        "</script>",
+        "<!--",
+        "]]>",
+        "&lt;",
+        "\u2028\u2029",
+        '"\\',
+        "\U0001f600é",
+    ):
         json_text = embedded({text: [text, float("nan"), float("inf"), 1.23456789]})
         assert not set("<>&\u2028\u2029") & set(json_text)
         assert json.loads(json_text) == {text: [text, None, None, 1.2346]}
-    extreme = [1e-320, -1.7976931348623157e308, 0.5]  # of which five digits are beyond what a float holds
+    # of which five digits are beyond what a float holds
+    extreme = [1e-320, -1.7976931348623157e308, 0.5]
     assert json.loads(embedded([np.array(extreme), *extreme])) == [extreme, *extreme]
     assert plain({"a": np.arange(2), "b": np.array([0.5, np.nan]), "c": (np.int64(2**60), True, None)}) == {
         "a": [0, 1], "b": [0.5, None], "c": [2**60, True, None],

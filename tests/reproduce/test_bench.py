@@ -15,14 +15,19 @@ from tests.cases import each
 
 
 @each("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
-def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tuple[float, float]) -> None:
+def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(
+    stretch: tuple[float, float],
+) -> None:
     usual = bench_problem()
     camera = replace(usual.cameras[0], focal=usual.cameras[0].focal * stretch)
-    proposals = np.random.default_rng(0).uniform(-0.3, 0.3, (50, usual.space.dimensions))
+    proposals = np.random.default_rng(0).uniform(
+        -0.3, 0.3, (50, usual.space.dimensions)
+    )
     poses, translations = usual.decode(proposals[:1])
     seen = Silhouette.of(project(usual.body, camera, poses[0], translations[0]))
     problem = PoseProblem(usual.body, [camera], [seen], usual.space)
-    ours, theirs = problem.evaluate(proposals), opencv_costs(problem, proposals)
+    ours = problem.evaluate(proposals)
+    theirs = opencv_costs(problem, proposals)
     # OpenCV also sets the pixels that a border merely touches, a ring of half a pixel around limbs 10 pixels wide
     assert ours[0] == 0.0
     assert theirs[0] < 4.0

@@ -16,7 +16,9 @@ def test_jobs_come_back_under_their_keys_from_other_processes() -> None:
             steps.append(count)
             yield one
 
-    found = each({**{k: partial(divmod, k, 3) for k in (5, 4, 9)}, "who": os.getpid}, 2, watched)
+    found = each(
+        {**{k: partial(divmod, k, 3) for k in (5, 4, 9)}, "who": os.getpid}, 2, watched
+    )
     assert found.pop("who") != os.getpid()
     assert list(found.items()) == [(5, (1, 2)), (4, (1, 1)), (9, (3, 0))]
     assert steps == [4] * 4

@@ -22,47 +22,92 @@ pytestmark = [
 ]
 
 
-def assert_equals_the_cpu(body: Body, camera: Camera, poses: Array, places: Array) -> None:
+def assert_equals_the_cpu(
+    body: Body, camera: Camera, poses: Array, places: Array
+) -> None:
     mask = project(body, camera, poses[0], np.zeros(3))
-    silhouette = Silhouette.of(mask, np.random.default_rng(1).random(mask.shape) < 0.9)  # a tenth is not known
+    # a tenth is not known
+    silhouette = Silhouette.of(mask, np.random.default_rng(1).random(mask.shape) < 0.9)
     expected = areas(body, camera, silhouette, poses, places)
-    np.testing.assert_array_equal(areas(body, camera, moved_to(silhouette, "cuda"), poses, places), expected)
+    np.testing.assert_array_equal(
+        areas(body, camera, moved_to(silhouette, "cuda"), poses, places), expected
+    )
 
 
 # widths about those of a word and of what a thread fills at a time; the body is as large as the image, or larger
 @each("size", [(40, 30), (1, 9), (63, 17), (65, 8), (97, 24), (129, 20), (161, 16)])
 @each("depth", [3.0, 0.6])
-def test_200_poses_have_the_areas_that_a_cpu_counts(body: Body, size: tuple[int, int], depth: float) -> None:
+def test_200_poses_have_the_areas_that_a_cpu_counts(
+    body: Body, size: tuple[int, int], depth: float
+) -> None:
     rng = np.random.default_rng(2)
     camera = Camera.around(np.zeros(3), 0.4, depth, size, field_of_view=0.9)
     count = 32 if size == (40, 30) else 12
-    assert_equals_the_cpu(body, camera, random_poses(rng, count), rng.normal(0.0, 0.4, (count, 3)) * [1.0, 1.0, 0.2])
+    assert_equals_the_cpu(
+        body,
+        camera,
+        random_poses(rng, count),
+        rng.normal(0.0, 0.4, (count, 3)) * [1.0, 1.0, 0.2],
+    )
 
 
-def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the_same_areas(body: Body) -> None:
+def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the_same_areas(
+    body: Body,
+) -> None:
     camera = Camera.around(np.zeros(3), 0.4, 4.0, (40, 30))
     towards = camera.rotation.T @ np.array([0.0, 0.0, -1.0])
-    across = np.array([[0.9, 0.5, 0.0], [-0.9, 0.3, 0.0], [0.2, -0.9, 0.0], [9.0, 0.0, 0.0], [0.0, -9.0, 0.0]])
-    places = [*across, *(depth * towards for depth in (3.2, 3.7, 3.95, 4.0, 4.4, 9.0)), np.full(3, 1e300)]
-    assert_equals_the_cpu(body, camera, random_poses(np.random.default_rng(3), len(places)), np.array(places))
+    across = np.array(
+        [
+            [0.9, 0.5, 0.0],
+            [-0.9, 0.3, 0.0],
+            [0.2, -0.9, 0.0],
+            [9.0, 0.0, 0.0],
+            [0.0, -9.0, 0.0],
+        ]
+    )
+    places = [
+        *across,
+        *(depth * towards for depth in (3.2, 3.7, 3.95, 4.0, 4.4, 9.0)),
+        np.full(3, 1e300),
+    ]
+    assert_equals_the_cpu(
+        body,
+        camera,
+        random_poses(np.random.default_rng(3), len(places)),
+        np.array(places),
+    )
 
 
-def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_on_their_way_are_put_together_in_order(
+    body: Body, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("posefit.silhouette.cuda.areas.PART", 3)
     rng = np.random.default_rng(6)
     camera = Camera.around(np.zeros(3), 0.4, 3.0, (24, 20))
-    assert_equals_the_cpu(body, camera, random_poses(rng, 13), rng.normal(0.0, 0.2, (13, 3)))
+    assert_equals_the_cpu(
+        body, camera, random_poses(rng, 13), rng.normal(0.0, 0.2, (13, 3))
+    )
 
 
 def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:
     one = pose_problem().coarser(4)
-    seen, around = one.silhouettes[0], Camera.around(one.space.anchor, 2.0, 3.5, (33, 20))
-    problem = replace(one, cameras=[*one.cameras, around], silhouettes=[seen, Silhouette.of(np.eye(20, 33))])
-    on_device = replace(problem, silhouettes=[moved_to(view, "cuda") for view in problem.silhouettes])
+    seen = one.silhouettes[0]
+    around = Camera.around(one.space.anchor, 2.0, 3.5, (33, 20))
+    problem = replace(
+        one,
+        cameras=[*one.cameras, around],
+        silhouettes=[seen, Silhouette.of(np.eye(20, 33))],
+    )
+    on_device = replace(
+        problem, silhouettes=[moved_to(view, "cuda") for view in problem.silhouettes]
+    )
     proposals = draw_population(problem.space, np.random.default_rng(7), 6)
     count = PoseCount()
     with count.counting():
-        np.testing.assert_array_equal(on_device.evaluate(proposals), problem.evaluate(proposals))
-    assert count.poses == 2 * (6 + 6 / 16)  # of each view on the device and on the CPU, in one a quarter as large
+        np.testing.assert_array_equal(
+            on_device.evaluate(proposals), problem.evaluate(proposals)
+        )
+    # of each view on the device and on the CPU, in one a quarter as large
+    assert count.poses == 2 * (6 + 6 / 16)
     half = on_device.coarser(2), problem.coarser(2)
     np.testing.assert_array_equal(*(size.evaluate(proposals) for size in half))

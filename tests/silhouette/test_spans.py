@@ -18,21 +18,34 @@ def popcount_compiled(bits):  # type: ignore[no-untyped-def]
 
 def test_eight_spans_are_those_of_plain_python_whatever_they_are() -> None:
     rng = np.random.default_rng(0)
-    edges = np.array([0, 1, STRIP_PIXELS - 1, STRIP_PIXELS, STRIP_PIXELS + 1, 2 * STRIP_PIXELS - 1, 2 * STRIP_PIXELS])
+    edges = np.array(
+        [
+            0,
+            1,
+            STRIP_PIXELS - 1,
+            STRIP_PIXELS,
+            STRIP_PIXELS + 1,
+            2 * STRIP_PIXELS - 1,
+            2 * STRIP_PIXELS,
+        ]
+    )
     for case in range(300):
         numbers = edges if case % 2 else np.arange(2 * STRIP_PIXELS + 1)
         spans = rng.choice(numbers, 2 * BLOCK).astype(np.int32)
         if case % 5 == 0:
-            spans[0], spans[BLOCK] = 1 << 30, -(1 << 30)  # of a row that the cone does not cross
+            # of a row that the cone does not cross
+            spans[0], spans[BLOCK] = 1 << 30, -(1 << 30)
         before = rng.integers(0, 2**63, (2, BLOCK), dtype=np.uint64)
-        plain, compiled = before.copy(), before.copy()
+        plain = before.copy()
+        compiled = before.copy()
         set_spans(plain, BLOCK, BLOCK, spans)
         set_spans_compiled(compiled, BLOCK, BLOCK, spans)
         np.testing.assert_array_equal(compiled, plain)
 
 
 def test_spans_by_hand() -> None:
-    image, spans = np.zeros((2, BLOCK // 2), dtype=np.uint64), np.zeros(2 * BLOCK, dtype=np.int32)
+    image = np.zeros((2, BLOCK // 2), dtype=np.uint64)
+    spans = np.zeros(2 * BLOCK, dtype=np.int32)
     spans[0], spans[BLOCK] = 30, 34  # in the first row, two pixels of either strip
     set_spans_compiled(image, 0, BLOCK, spans)
     rows = image.view(np.uint32).reshape(2, BLOCK)

@@ -17,7 +17,9 @@ def random_poses(rng: np.random.Generator, count: int) -> Array:
     return poses
 
 
-def hull_distance(x: Array, y: Array, first: Array, second: Array, r0: float, r1: float) -> Array:
+def hull_distance(
+    x: Array, y: Array, first: Array, second: Array, r0: float, r1: float
+) -> Array:
     """Return the signed distance of points from the hull of two discs, negative inside.
 
     It is the least distance from any disc between the two, centres and radii taken linearly: sqrt(a^2 + b^2) - r at
@@ -25,7 +27,10 @@ def hull_distance(x: Array, y: Array, first: Array, second: Array, r0: float, r1
     """
     axis = second - first
     length = np.hypot(*axis)
-    ends = np.minimum(np.hypot(x - first[0], y - first[1]) - r0, np.hypot(x - second[0], y - second[1]) - r1)
+    ends = np.minimum(
+        np.hypot(x - first[0], y - first[1]) - r0,
+        np.hypot(x - second[0], y - second[1]) - r1,
+    )
     if length <= abs(r0 - r1):
         return ends
     e = axis / length
@@ -46,10 +51,14 @@ def body_distance(body: Body, camera: Camera, pose: Array, translation: Array) -
     distance = np.full(x.shape, np.inf)
     scale = np.sqrt(camera.focal[0] * camera.focal[1])
     for bone, parent in enumerate(PARENTS[1:]):
-        start, end = seen[parent], seen[bone + 1]
+        start = seen[parent]
+        end = seen[bone + 1]
         if not (NEAR <= start[2] <= FAR and NEAR <= end[2] <= FAR):
             continue
         (u0, u1) = (p[:2] / p[2] * camera.focal + camera.centre for p in (start, end))
-        (r0, r1) = (scale * r / p[2] for r, p in zip(body.radii[bone], (start, end), strict=True))
+        (r0, r1) = (
+            scale * r / p[2]
+            for r, p in zip(body.radii[bone], (start, end), strict=True)
+        )
         distance = np.minimum(distance, hull_distance(x, y, u0, u1, r0, r1))
     return distance

@@ -32,7 +32,9 @@ def model(seed: int) -> Model:
     steps = [rng.uniform(0.0, 3.0, sizes) for sizes in pairwise(SIZES)]
     frames: list[FrameStates] = []
     for k, fit in enumerate(fits):
-        frames.append(frame_states(fit, frames[-1] if k else None, steps[k - 1] if k else None))
+        frames.append(
+            frame_states(fit, frames[-1] if k else None, steps[k - 1] if k else None)
+        )
     return Model(fits, steps, frames)
 
 
@@ -53,19 +55,25 @@ def shares(costs: dict[tuple[int, ...], float], frame: int) -> Array:
     return found / found.sum()
 
 
-def test_a_state_is_as_likely_as_all_ways_to_it_together() -> None:  # RABINER1989 (forward)
+# RABINER1989 (forward)
+def test_a_state_is_as_likely_as_all_ways_to_it_together() -> None:
     for seed in [0, 1, 2]:
         one = model(seed)
         for k, frame in enumerate(one.frames):
-            np.testing.assert_allclose(frame.forward, shares(ways(one, k + 1), k), rtol=1e-5)
+            np.testing.assert_allclose(
+                frame.forward, shares(ways(one, k + 1), k), rtol=1e-5
+            )
 
 
-def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do() -> None:  # RABINER1989 (backward)
+# RABINER1989 (backward)
+def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do() -> None:
     for seed in [0, 1, 2]:
         one = model(seed)
         for first, count in combinations(range(len(SIZES) + 1), 2):
             expected = shares(ways(one, count), first)
-            np.testing.assert_allclose(markov.state_weights(one.frames[first:count]), expected, rtol=1e-5)
+            np.testing.assert_allclose(
+                markov.state_weights(one.frames[first:count]), expected, rtol=1e-5
+            )
 
 
 def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (Viterbi)
@@ -74,12 +82,20 @@ def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (
         for count in range(1, len(SIZES) + 1):
             costs = ways(one, count)
             best = min(costs, key=lambda way: costs[way])
-            assert [markov.viterbi_state(one.frames[k:count]) for k in range(count)] == list(best)
-            each = [min(cost for way, cost in costs.items() if way[-1] == row) for row in range(SIZES[count - 1])]
-            np.testing.assert_allclose(one.frames[count - 1].totals, np.array(each) - min(each), atol=1e-12)
+            assert [
+                markov.viterbi_state(one.frames[k:count]) for k in range(count)
+            ] == list(best)
+            each = [
+                min(cost for way, cost in costs.items() if way[-1] == row)
+                for row in range(SIZES[count - 1])
+            ]
+            np.testing.assert_allclose(
+                one.frames[count - 1].totals, np.array(each) - min(each), atol=1e-12
+            )
 
 
-def test_exemplars_are_poses_of_the_clips_that_lie_apart() -> None:  # TOYAMA2001 (exemplars)
+# TOYAMA2001 (exemplars)
+def test_exemplars_are_poses_of_the_clips_that_lie_apart() -> None:
     # on a line: after 0 the farthest is 9, after both it is 4 (4 from 0, 5 from 9), then 6
     line = np.array([[0.0], [4.0], [1.0], [9.0], [6.0]], dtype=np.float32)
     assert line[farthest_first(line, 4)[0]].ravel().tolist() == [0.0, 9.0, 4.0, 6.0]
@@ -87,18 +103,22 @@ def test_exemplars_are_poses_of_the_clips_that_lie_apart() -> None:  # TOYAMA200
     codes = rng.normal(size=(200, 4)).astype(np.float32)
     centres, _ = farthest_first(codes, 12)
     for count in range(1, 12):  # the slow twin
-        away = np.linalg.norm(codes[:, None] - codes[centres[:count]], axis=-1).min(axis=1)
+        away = np.linalg.norm(codes[:, None] - codes[centres[:count]], axis=-1).min(
+            axis=1
+        )
         assert centres[count] == away.argmax()
 
 
-def test_likelihood_is_an_exponential_of_the_distance_over_a_temperature() -> None:  # TOYAMA2001 (likelihood)
+# TOYAMA2001 (likelihood)
+def test_likelihood_is_an_exponential_of_the_distance_over_a_temperature() -> None:
     # distances of 6, 6 + 2 ln 2 and 6 + 2 ln 4 over a temperature of 2: likelihoods as 4 : 2 : 1
     found = frame_states((6.0 + 2.0 * np.log([1.0, 2.0, 4.0])) / 2.0)
     np.testing.assert_allclose(found.likelihoods, [1.0, 0.5, 0.25])
     np.testing.assert_allclose(found.forward, [4 / 7, 2 / 7, 1 / 7])
 
 
-def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:  # TOYAMA2001 (dynamics)
+# TOYAMA2001 (dynamics)
+def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:
     # a clip of 30 frames a second: who does what it did next pays nothing, who is 3 cm off half a unit
     walk = built_in.motion("walk-a", frames=20)
     clips = Exemplars.of([walk], average_skeleton())
@@ -107,11 +127,19 @@ def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:  # TOYAMA20
         seconds = float(clips.times[state + 1] - clips.times[state])
         yaws = clips.poses[[state, state + 1], 0]
         before = Beam(np.array([state]), yaws[:1], np.zeros(1), clips.places[[state]])
-        beams = Beam(np.array([state + 1, after]), np.repeat(yaws[1:], 2), np.zeros(2), np.zeros((2, 3)))
-        following, last = transition_costs(clips, before, beams, Step(seconds, 0.03), clips.places[state + 1])[0]
+        beams = Beam(
+            np.array([state + 1, after]),
+            np.repeat(yaws[1:], 2),
+            np.zeros(2),
+            np.zeros((2, 3)),
+        )
+        following, last = transition_costs(
+            clips, before, beams, Step(seconds, 0.03), clips.places[state + 1]
+        )[0]
         assert following == pytest.approx(0.0, abs=1e-4)
         off = float(((clips.codes[state + 1] - clips.codes[after]) ** 2).sum())
-        assert last <= min(0.5 * off / 0.03**2, 12.0) + 1e-4  # or less, at another speed
+        # or less, at another speed
+        assert last <= min(0.5 * off / 0.03**2, 12.0) + 1e-4
 
 
 POWERS = (1.0, 0.4)
@@ -122,23 +150,36 @@ def tempered(one: Model, power: float) -> Model:
     return one._replace(fits=[power * fit for fit in one.fits])
 
 
-def test_a_message_is_the_share_of_all_ways_on_from_a_state() -> None:  # GODSILL2004 (messages)
+# GODSILL2004 (messages)
+def test_a_message_is_the_share_of_all_ways_on_from_a_state() -> None:
     for power in POWERS:
         one = model(0)
         found = markov.backward_messages(one.frames[1:], power)
         expected = np.zeros(SIZES[1])
         for way, cost in ways(tempered(one, power), len(SIZES)).items():
-            first = power * one.fits[0][way[0]] + one.steps[0][way[0], way[1]] + power * one.fits[1][way[1]]
-            expected[way[1]] += np.exp(first - cost)  # what comes after; each of the ways before it counts once
-        np.testing.assert_allclose(found / found.sum(), expected / expected.sum(), rtol=1e-5)
+            first = (
+                power * one.fits[0][way[0]]
+                + one.steps[0][way[0], way[1]]
+                + power * one.fits[1][way[1]]
+            )
+            # what comes after; each of the ways before it counts once
+            expected[way[1]] += np.exp(first - cost)
+        np.testing.assert_allclose(
+            found / found.sum(), expected / expected.sum(), rtol=1e-5
+        )
 
 
 def test_ways_are_drawn_as_often_as_they_are_likely() -> None:  # GODSILL2004 (step)
     for power in POWERS:
-        one, count, rng = model(1), 40_000, np.random.default_rng(0)
-        rows, drawn = None, []
+        one = model(1)
+        count = 40_000
+        rng = np.random.default_rng(0)
+        rows = None
+        drawn = []
         for k in range(len(SIZES)):
-            rows = markov.sample_states(one.frames[k:], rows, markov.Sampling(count, power), rng)
+            rows = markov.sample_states(
+                one.frames[k:], rows, markov.Sampling(count, power), rng
+            )
             drawn.append(rows)
         costs = ways(tempered(one, power), len(SIZES))
         total = sum(np.exp(-cost) for cost in costs.values())

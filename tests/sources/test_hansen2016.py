@@ -14,7 +14,8 @@ from posefit.testing.toy import Toy, sphere
 # Six proposals in two dimensions, worked by hand. mu = 3 and ln 3.5 - ln i is:
 RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
 MU_EFF = 2.028615  # 1.966530^2 / (1.569415 + 0.313170 + 0.023763)
-(WEIGHTS, SMALL), (EIGHT_WEIGHTS, EIGHT) = constants(2, 6), constants(3, 8)  # the latter those of `learnt`
+# the latter those of `learnt`
+(WEIGHTS, SMALL), (EIGHT_WEIGHTS, EIGHT) = constants(2, 6), constants(3, 8)
 
 
 @dataclass(frozen=True)
@@ -39,45 +40,64 @@ class Generation:
 
 def learnt(generations: int = 6, *, far: float = 0.0) -> Generation:
     """Return the last of some generations on an ellipsoid; with `far`, its proposals lie so much to one side."""
-    strategy, rng = Strategy(np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.3, 0.2]), 8), np.random.default_rng(4)
+    strategy = Strategy(np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.3, 0.2]), 8)
+    rng = np.random.default_rng(4)
     for number in range(generations):
         x = strategy.sample(rng, 8) + far * (number == generations - 1)
         costs = x**2 @ np.array([1.0, 10.0, 3.0])
         before = deepcopy(vars(strategy))
         strategy.learn(x, costs)
-    return Generation(before, strategy, (x[costs.argsort()] - before["mean"]) / before["sigma"])
+    return Generation(
+        before, strategy, (x[costs.argsort()] - before["mean"]) / before["sigma"]
+    )
 
 
 def heeded(one: Generation) -> float:
     """h_sigma, page 28: whether the path is not too long for the covariance to follow; the first generation is 1."""
-    rates, g = EIGHT, one.after.generation
-    long = np.linalg.norm(one.after.step_path) / np.sqrt(1.0 - (1.0 - rates.c_sigma) ** (2 * (g + 1)))
+    rates = EIGHT
+    g = one.after.generation
+    long = np.linalg.norm(one.after.step_path) / np.sqrt(
+        1.0 - (1.0 - rates.c_sigma) ** (2 * (g + 1))
+    )
     return float(long < (1.4 + 2.0 / 4.0) * rates.chi)
 
 
-def test_eq_8_mu_eff_is_how_many_equal_weights_select_as_much() -> None:  # HANSEN2016 (8)
+# HANSEN2016 (8)
+def test_eq_8_mu_eff_is_how_many_equal_weights_select_as_much() -> None:
     assert pytest.approx(MU_EFF, abs=1e-5) == SMALL.mu_eff
     # four proposals: (0.916291 + 0.223144)^2 / (0.839589 + 0.049793)
     assert constants(3, 4)[1].mu_eff == pytest.approx(1.459792, abs=1e-5)
 
 
-def test_eq_38_the_first_draws_are_normal_around_the_mean_with_its_spread() -> None:  # HANSEN2016 (38)
-    mean, spread = np.array([0.1, -0.2, 0.0, 0.3]), np.array([0.02, 0.05, 0.01, 0.03])
+# HANSEN2016 (38)
+def test_eq_38_the_first_draws_are_normal_around_the_mean_with_its_spread() -> None:
+    mean = np.array([0.1, -0.2, 0.0, 0.3])
+    spread = np.array([0.02, 0.05, 0.01, 0.03])
     drawn = Strategy(mean, spread, 10).sample(np.random.default_rng(0), 20000)
     np.testing.assert_allclose(drawn.mean(axis=0), mean, atol=1.5e-3)
     np.testing.assert_allclose(np.cov(drawn.T), np.diag(spread**2), atol=1e-4)
 
 
-def test_eq_39_steps_are_normal_draws_along_the_axes_of_the_covariance() -> None:  # HANSEN2016 (39)
+# HANSEN2016 (39)
+def test_eq_39_steps_are_normal_draws_along_the_axes_of_the_covariance() -> None:
     strategy = learnt().after
     # what unit draws become are the columns of B D, and B D (B D)' = C
-    steps = (strategy.sample(np.random.default_rng(0), 3) - strategy.mean) / strategy.sigma
+    steps = (
+        strategy.sample(np.random.default_rng(0), 3) - strategy.mean
+    ) / strategy.sigma
     columns = np.linalg.solve(np.random.default_rng(0).standard_normal((3, 3)), steps)
-    np.testing.assert_allclose(columns.T @ columns, strategy.covariance, rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(columns @ columns.T, np.diag(np.linalg.eigvalsh(strategy.covariance)), atol=1e-12)
+    np.testing.assert_allclose(
+        columns.T @ columns, strategy.covariance, rtol=1e-10, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        columns @ columns.T,
+        np.diag(np.linalg.eigvalsh(strategy.covariance)),
+        atol=1e-12,
+    )
 
 
-def test_eq_40_proposals_lie_a_step_size_times_a_step_from_the_mean() -> None:  # HANSEN2016 (40)
+# HANSEN2016 (40)
+def test_eq_40_proposals_lie_a_step_size_times_a_step_from_the_mean() -> None:
     strategy = learnt().after
     near = strategy.sample(np.random.default_rng(0), 5) - strategy.mean
     strategy.sigma *= 3.0
@@ -86,48 +106,75 @@ def test_eq_40_proposals_lie_a_step_size_times_a_step_from_the_mean() -> None:  
     np.testing.assert_allclose(far, 3.0 * near, rtol=1e-9)
 
 
-def test_eq_41_the_step_of_the_mean_is_the_better_halfs_weighted_sum() -> None:  # HANSEN2016 (41)
+# HANSEN2016 (41)
+def test_eq_41_the_step_of_the_mean_is_the_better_halfs_weighted_sum() -> None:
     # two dimensions, where sigma is 1 and the mean 0, so that the new mean is the step
     strategy = Strategy(np.zeros(2), np.ones(2), 6)
-    x = np.array([[0.0, 9.0], [3.0, 0.0], [1.0, 0.0], [9.0, 9.0], [2.0, 0.0], [9.0, 0.0]])
+    x = np.array(
+        [[0.0, 9.0], [3.0, 0.0], [1.0, 0.0], [9.0, 9.0], [2.0, 0.0], [9.0, 0.0]]
+    )
     strategy.learn(x, np.array([4.0, 3.0, 1.0, 6.0, 2.0, 5.0]))
     # (1 x 1.252763 + 2 x 0.559616 + 3 x 0.154151) / 1.966530
     np.testing.assert_allclose(strategy.mean, [1.441346, 0.0], atol=1e-5)
 
 
-def test_eq_42_the_mean_moves_by_a_step_size_times_the_step() -> None:  # HANSEN2016 (42)
+# HANSEN2016 (42)
+def test_eq_42_the_mean_moves_by_a_step_size_times_the_step() -> None:
     one = learnt()
-    np.testing.assert_allclose(one.after.mean, one.before["mean"] + one.before["sigma"] * one.step, rtol=1e-12)
+    np.testing.assert_allclose(
+        one.after.mean, one.before["mean"] + one.before["sigma"] * one.step, rtol=1e-12
+    )
 
 
-def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() -> None:  # HANSEN2016 (43)
+# HANSEN2016 (43)
+def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() -> None:
     one = learnt()
-    fresh = np.sqrt(EIGHT.c_sigma * (2.0 - EIGHT.c_sigma) * EIGHT.mu_eff) * one.root @ one.step
-    np.testing.assert_allclose(one.after.step_path, (1.0 - EIGHT.c_sigma) * one.before["step_path"] + fresh, rtol=1e-10)
+    fresh = (
+        np.sqrt(EIGHT.c_sigma * (2.0 - EIGHT.c_sigma) * EIGHT.mu_eff)
+        * one.root
+        @ one.step
+    )
+    np.testing.assert_allclose(
+        one.after.step_path,
+        (1.0 - EIGHT.c_sigma) * one.before["step_path"] + fresh,
+        rtol=1e-10,
+    )
 
 
-def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> None:  # HANSEN2016 (44)
+# HANSEN2016 (44)
+def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> None:
     for far in (0.0, 2.0):
         one = learnt(far=far)
         share = np.linalg.norm(one.after.step_path) / EIGHT.chi
-        grown = float(one.before["sigma"]) * np.exp(EIGHT.c_sigma / EIGHT.d_sigma * (share - 1.0))
+        grown = float(one.before["sigma"]) * np.exp(
+            EIGHT.c_sigma / EIGHT.d_sigma * (share - 1.0)
+        )
         assert one.after.sigma == pytest.approx(grown, rel=1e-12)
         assert (one.after.sigma > one.before["sigma"]) == (share > 1.0)
 
 
-def test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long() -> None:  # HANSEN2016 (h_sigma)
-    near, far = learnt(), learnt(far=5.0)
+# HANSEN2016 (h_sigma)
+def test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long() -> None:
+    near = learnt()
+    far = learnt(far=5.0)
     assert (heeded(near), heeded(far)) == (1.0, 0.0)
-    np.testing.assert_allclose(far.after.path, (1.0 - EIGHT.c_c) * far.before["path"], rtol=1e-12)
+    np.testing.assert_allclose(
+        far.after.path, (1.0 - EIGHT.c_c) * far.before["path"], rtol=1e-12
+    )
 
 
 def test_eq_45_the_covariances_path_adds_the_step() -> None:  # HANSEN2016 (45)
     one = learnt()
-    fresh = heeded(one) * np.sqrt(EIGHT.c_c * (2.0 - EIGHT.c_c) * EIGHT.mu_eff) * one.step
-    np.testing.assert_allclose(one.after.path, (1.0 - EIGHT.c_c) * one.before["path"] + fresh, rtol=1e-10)
+    fresh = (
+        heeded(one) * np.sqrt(EIGHT.c_c * (2.0 - EIGHT.c_c) * EIGHT.mu_eff) * one.step
+    )
+    np.testing.assert_allclose(
+        one.after.path, (1.0 - EIGHT.c_c) * one.before["path"] + fresh, rtol=1e-10
+    )
 
 
-def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -> None:  # HANSEN2016 (46)
+# HANSEN2016 (46)
+def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -> None:
     # far away proposals that are bad take away no more than ones nearby: sqrt(d) long they would weigh as they are
     good = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
     taken = []
@@ -142,21 +189,35 @@ def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -
     kept = 1.0 - SMALL.c_1 - SMALL.c_mu * WEIGHTS.sum()
     of_good = sum(w * np.outer(y, y) for w, y in zip(WEIGHTS, good, strict=False))
     of_bad = WEIGHTS[3:].sum() * np.array([[0.72, 0.96], [0.96, 1.28]])
-    np.testing.assert_allclose(taken[0], kept * np.eye(2) + path + SMALL.c_mu * (of_good + of_bad), rtol=1e-7)
+    np.testing.assert_allclose(
+        taken[0], kept * np.eye(2) + path + SMALL.c_mu * (of_good + of_bad), rtol=1e-7
+    )
 
 
 @pytest.mark.pure
-def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step() -> None:  # HANSEN2016 (47)
+# HANSEN2016 (47)
+def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step() -> None:
     for far in [0.0, 5.0]:
         one = learnt(far=far)
-        h, rates, w = heeded(one), EIGHT, EIGHT_WEIGHTS
+        h = heeded(one)
+        rates = EIGHT
+        w = EIGHT_WEIGHTS
         lengths = np.linalg.norm(one.y @ one.root, axis=1)
         shares = np.where(w >= 0.0, w, 3.0 * w / lengths**2)
-        rank_mu = sum(wi * np.outer(yi, yi) for wi, yi in zip(shares, one.y, strict=True))
-        kept = 1.0 + rates.c_1 * (1.0 - h) * rates.c_c * (2.0 - rates.c_c) - rates.c_1 - rates.c_mu * w.sum()
+        rank_mu = sum(
+            wi * np.outer(yi, yi) for wi, yi in zip(shares, one.y, strict=True)
+        )
+        kept = (
+            1.0
+            + rates.c_1 * (1.0 - h) * rates.c_c * (2.0 - rates.c_c)
+            - rates.c_1
+            - rates.c_mu * w.sum()
+        )
         of_path = rates.c_1 * np.outer(one.after.path, one.after.path)
         expected = kept * one.before["covariance"] + of_path + rates.c_mu * rank_mu
-        np.testing.assert_allclose(one.after.covariance, expected, rtol=1e-7, atol=1e-12)
+        np.testing.assert_allclose(
+            one.after.covariance, expected, rtol=1e-7, atol=1e-12
+        )
         assert (one.after.covariance == one.after.covariance.T).all()
 
 
@@ -176,31 +237,46 @@ def test_eq_49_weights_fall_as_the_logarithm_of_the_rank() -> None:  # HANSEN201
 def bounds(dimensions: int, population: int) -> tuple[float, float, float, float]:
     """Return how much the negative weights sum to, and the three bounds (50), (51), (52) on that."""
     weights, rates = constants(dimensions, population)
-    raw = np.log((population + 1) / 2) - np.log(np.arange(population // 2 + 1, population + 1))
+    raw = np.log((population + 1) / 2) - np.log(
+        np.arange(population // 2 + 1, population + 1)
+    )
     worth = raw.sum() ** 2 / (raw**2).sum()
-    mu_eff, c_1, c_mu = rates.mu_eff, rates.c_1, rates.c_mu
+    mu_eff = rates.mu_eff
+    c_1 = rates.c_1
+    c_mu = rates.c_mu
     negative = -float(weights[weights < 0.0].sum())
-    return negative, 1 + c_1 / c_mu, 1 + 2 * worth / (mu_eff + 2), (1 - c_1 - c_mu) / (dimensions * c_mu)
+    return (
+        negative,
+        1 + c_1 / c_mu,
+        1 + 2 * worth / (mu_eff + 2),
+        (1 - c_1 - c_mu) / (dimensions * c_mu),
+    )
 
 
-def test_eq_50_bounds_the_negative_weights_of_a_middling_population_in_many_dimensions() -> None:  # HANSEN2016 (50)
+# HANSEN2016 (50)
+def test_eq_50_bounds_the_negative_weights_of_a_middling_population_in_many_dimensions() -> (
+    None
+):
     negative, *least = bounds(28, 40)
     assert min(least) == least[0] == pytest.approx(negative)
 
 
-def test_eq_51_bounds_the_negative_weights_of_a_small_population() -> None:  # HANSEN2016 (51)
+# HANSEN2016 (51)
+def test_eq_51_bounds_the_negative_weights_of_a_small_population() -> None:
     negative, *least = bounds(2, 6)
     assert min(least) == least[1] == pytest.approx(negative)
     # 1 + 2 x 2.431917 / 4.028615
     assert negative == pytest.approx(2.207318, abs=1e-4)
 
 
-def test_eq_52_bounds_the_negative_weights_of_a_large_population() -> None:  # HANSEN2016 (52)
+# HANSEN2016 (52)
+def test_eq_52_bounds_the_negative_weights_of_a_large_population() -> None:
     negative, *least = bounds(2, 100)
     assert min(least) == least[2] == pytest.approx(negative)
 
 
-def test_eq_53_the_better_half_sums_to_1_and_each_weight_is_by_hand() -> None:  # HANSEN2016 (53)
+# HANSEN2016 (53)
+def test_eq_53_the_better_half_sums_to_1_and_each_weight_is_by_hand() -> None:
     # 1.252763 / 1.966530 and so on; -0.133531 / 1.029203 x 2.207318 and so on
     expected = [0.637042, 0.284570, 0.078387, -0.286383, -0.764956, -1.155978]
     np.testing.assert_allclose(WEIGHTS, expected, atol=1e-5)
@@ -209,7 +285,9 @@ def test_eq_53_the_better_half_sums_to_1_and_each_weight_is_by_hand() -> None:  
 
 def test_eq_55_the_step_sizes_rate_and_damping() -> None:  # HANSEN2016 (55)
     # 4.028615 / 9.028615; and 1 more, as sqrt(1.028615 / 3) is below 1
-    np.testing.assert_allclose([SMALL.c_sigma, SMALL.d_sigma], [0.446205, 1.446205], atol=1e-5)
+    np.testing.assert_allclose(
+        [SMALL.c_sigma, SMALL.d_sigma], [0.446205, 1.446205], atol=1e-5
+    )
     # where it is above: mu_eff of 100 is 26.97, sqrt(25.97 / 3) = 2.942 and 28.97 / 33.97 = 0.853
     large = constants(2, 100)[1]
     assert large.mu_eff == pytest.approx(26.97, abs=0.01)
@@ -226,7 +304,8 @@ def test_eq_57_how_fast_the_covariance_follows_its_path() -> None:  # HANSEN2016
     assert pytest.approx(0.154815, abs=1e-5) == SMALL.c_1
 
 
-def test_eq_58_how_fast_the_covariance_follows_the_population() -> None:  # HANSEN2016 (58)
+# HANSEN2016 (58)
+def test_eq_58_how_fast_the_covariance_follows_the_population() -> None:
     # 2 (0.028615 + 0.492947) / (16 + 2.028615)
     assert pytest.approx(0.057859, abs=1e-5) == SMALL.c_mu
     # of a huge population it takes all that the path leaves
@@ -239,13 +318,17 @@ def test_chi_is_how_long_a_standard_normal_vector_is() -> None:  # HANSEN2016 (c
     # tutorial's series is good to a few in ten thousand
     exact = {1: 0.797885, 2: 1.253314, 3: 1.595769, 9: 2.9180}
     for d, long in exact.items():
-        assert constants(d, 10)[1].chi == pytest.approx(long, rel=8e-3 if d == 1 else 1e-3)
+        assert constants(d, 10)[1].chi == pytest.approx(
+            long, rel=8e-3 if d == 1 else 1e-3
+        )
 
 
-def test_b_2_axes_are_decomposed_every_so_many_generations() -> None:  # HANSEN2016 (B.2)
+# HANSEN2016 (B.2)
+def test_b_2_axes_are_decomposed_every_so_many_generations() -> None:
     # 200 dimensions, four proposals: 0.1 / (200 (c_1 + c_mu)), c_1 = 2 / (201.3^2 + 1.459792) = 4.9354e-5 and
     # c_mu = 2 (1.459792 - 2 + 0.685029) / (202^2 + 1.459792) = 7.0938e-6, is 8.86
-    strategy, rng = Strategy(np.zeros(200), np.ones(200), 4), np.random.default_rng(0)
+    strategy = Strategy(np.zeros(200), np.ones(200), 4)
+    rng = np.random.default_rng(0)
     changed = []
     for _ in range(24):
         axes = strategy.axes
@@ -255,14 +338,16 @@ def test_b_2_axes_are_decomposed_every_so_many_generations() -> None:  # HANSEN2
     assert np.flatnonzero(changed).tolist() == [7, 15, 23]
 
 
-def test_b_3_a_search_ends_where_nothing_changes_any_more_or_it_diverges() -> None:  # HANSEN2016 (B.3)
+# HANSEN2016 (B.3)
+def test_b_3_a_search_ends_where_nothing_changes_any_more_or_it_diverges() -> None:
     def initial() -> Strategy:
         strategy = Strategy(np.array([0.3, -0.2]), np.array([0.1, 0.1]), 6)
         assert not strategy.ended()
         return strategy
 
     flat, still, far, fixed, thin = (initial() for _ in range(5))
-    for _ in range(2 * (10 + 10)):  # TolFun: 10 + 30 d / lambda generations cost the same
+    # TolFun: 10 + 30 d / lambda generations cost the same
+    for _ in range(2 * (10 + 10)):
         assert flat.generation <= 20 or flat.ended()
         flat.learn(flat.sample(np.random.default_rng(flat.generation), 6), np.ones(6))
     assert flat.ended()
@@ -277,7 +362,8 @@ def test_b_3_a_search_ends_where_nothing_changes_any_more_or_it_diverges() -> No
     assert thin.ended()
 
 
-def test_a_search_that_stagnates_starts_again_with_twice_the_population() -> None:  # AUGER2005 (restart)
+# AUGER2005 (restart)
+def test_a_search_that_stagnates_starts_again_with_twice_the_population() -> None:
     optimiser = CMAES(Toy(3), np.random.default_rng(0))
     sizes = []
     for _ in range(400):

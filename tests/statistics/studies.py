@@ -17,7 +17,9 @@ DRAWS: dict[str, Callable[[np.random.Generator, tuple[int, ...]], Array]] = {
     "normal": lambda rng, shape: rng.normal(size=shape),
     "skewed": lambda rng, shape: rng.lognormal(0.0, 1.0, size=shape),
     "heavy-tailed": lambda rng, shape: rng.standard_t(3, size=shape),
-    "with lost runs": lambda rng, shape: rng.gamma(4.0, 0.25, size=shape) + 4.0 * (rng.random(shape) < LOST),
+    "with lost runs": lambda rng, shape: (
+        rng.gamma(4.0, 0.25, size=shape) + 4.0 * (rng.random(shape) < LOST)
+    ),
 }
 _EVEN = (np.arange(20000) + 0.5) / 20000
 _GAMMA = stats.gamma.ppf(_EVEN, 4.0, scale=0.25)
@@ -25,7 +27,9 @@ QUANTILES = {
     "normal": stats.norm.ppf(_EVEN),
     "skewed": stats.lognorm.ppf(_EVEN, 1.0),
     "heavy-tailed": stats.t.ppf(_EVEN, 3),
-    "with lost runs": np.concatenate([np.repeat(_GAMMA, 17), np.repeat(_GAMMA + 4.0, 3)]),
+    "with lost runs": np.concatenate(
+        [np.repeat(_GAMMA, 17), np.repeat(_GAMMA + 4.0, 3)]
+    ),
 }
 
 
@@ -35,7 +39,11 @@ def truth(kind: str) -> float:
     return float(runs[len(runs) // 4 : -(len(runs) // 4)].mean())
 
 
-def studies(kind: str, seeds: int, count: int, rng: np.random.Generator) -> Iterator[Array]:
+def studies(
+    kind: str, seeds: int, count: int, rng: np.random.Generator
+) -> Iterator[Array]:
     """Yield the runs (1, 12, seeds) of one method in each of some studies."""
     for _ in range(count):
-        yield (HARDNESS[:, None] + NOISE[:, None] * DRAWS[kind](rng, (INSTANCES, seeds)))[None]
+        yield (
+            HARDNESS[:, None] + NOISE[:, None] * DRAWS[kind](rng, (INSTANCES, seeds))
+        )[None]

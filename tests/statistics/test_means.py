@@ -11,43 +11,60 @@ from posefit.statistics.means import mean_interval
 def test_of_one_stratum_of_single_values_it_is_students_interval() -> None:
     interval = mean_interval([1.0, 2.0, 3.0, 4.0], [0] * 4, range(4))
     assert interval.value == 2.5
-    reach = 3.182446 * math.sqrt(5.0 / 3.0 / 4.0)  # t of 3 degrees of freedom at 97.5 %: any table
+    # t of 3 degrees of freedom at 97.5 %: any table
+    reach = 3.182446 * math.sqrt(5.0 / 3.0 / 4.0)
     assert (interval.low, interval.high) == pytest.approx((2.5 - reach, 2.5 + reach))
 
 
 def test_differences_between_strata_do_not_widen_it() -> None:
     # of each of two strata: 2 / (2 - 1) * (1 + 1) / 4^2 = 0.25, with 1 degree of freedom; of both 0.5, with
     # 0.5^2 / (0.25^2 + 0.25^2) = 2 of them, of which t at 97.5 % is 4.302653
-    interval = mean_interval([0.0, 2.0, 100.0, 102.0], ["a", "a", "b", "b"], [0, 1, 0, 1])
+    interval = mean_interval(
+        [0.0, 2.0, 100.0, 102.0], ["a", "a", "b", "b"], [0, 1, 0, 1]
+    )
     assert interval.value == 51.0
     assert interval.high - interval.value == pytest.approx(4.302653 * math.sqrt(0.5))
 
 
 def test_equal_values_of_a_cluster_count_once() -> None:
     once = mean_interval([1.0, 3.0, 8.0], [0] * 3, [0, 1, 2])
-    assert vars(mean_interval([1.0, 1.0, 3.0, 3.0, 8.0, 8.0], [0] * 6, [0, 0, 1, 1, 2, 2])) == pytest.approx(vars(once))
+    assert vars(
+        mean_interval([1.0, 1.0, 3.0, 3.0, 8.0, 8.0], [0] * 6, [0, 0, 1, 1, 2, 2])
+    ) == pytest.approx(vars(once))
 
 
 def test_one_cluster_gives_no_interval_and_equal_values_one_of_no_width() -> None:
     alone = mean_interval([1.0, 2.0, 5.0], [0, 0, 1], [0, 1, 0])
     assert alone.value == pytest.approx(8.0 / 3.0)
     assert np.isnan([alone.low, alone.high]).all()
-    assert tuple(vars(mean_interval([2.0, 2.0], [0, 0], [0, 1])).values()) == (2.0, 2.0, 2.0)
+    assert tuple(vars(mean_interval([2.0, 2.0], [0, 0], [0, 1])).values()) == (
+        2.0,
+        2.0,
+        2.0,
+    )
 
 
 def test_the_interval_holds_the_truth_at_its_level() -> None:
     rng = np.random.default_rng(0)
-    strata, clusters = np.repeat(np.arange(4), 10), np.tile(np.repeat(np.arange(5), 2), 4)
+    strata = np.repeat(np.arange(4), 10)
+    clusters = np.tile(np.repeat(np.arange(5), 2), 4)
     inside = 0
     for _ in range(400):
-        drawn = np.repeat(rng.normal(size=(4, 5)), 2) + 0.3 * rng.normal(size=40) + 3.0 * strata
+        drawn = (
+            np.repeat(rng.normal(size=(4, 5)), 2)
+            + 0.3 * rng.normal(size=40)
+            + 3.0 * strata
+        )
         interval = mean_interval(drawn, strata, clusters)
         inside += interval.low <= 4.5 <= interval.high
     assert 0.92 <= inside / 400 <= 0.98
 
 
 def test_unequal_lengths_and_values_that_are_not_finite_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"strata and clusters must have shape \(2,\), got \(1,\) and \(2,\)"):
+    with pytest.raises(
+        ValueError,
+        match=r"strata and clusters must have shape \(2,\), got \(1,\) and \(2,\)",
+    ):
         mean_interval([1.0, 2.0], [0], [0, 1])
     with pytest.raises(ValueError, match="values must be finite"):
         mean_interval([1.0, math.nan], [0, 0], [0, 1])

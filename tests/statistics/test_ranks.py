@@ -17,7 +17,9 @@ def block(runners):
 
 def test_wilcoxon_by_hand():
     # differences -1 to -5: the signed rank is 0, as extreme as it gets, 2 / 2**5
-    (pair,) = wilcoxon(block([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0], [4.0, 8.0], [5.0, 10.0]]))
+    (pair,) = wilcoxon(
+        block([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0], [4.0, 8.0], [5.0, 10.0]])
+    )
     assert (pair.first, pair.second, pair.difference) == (0, 1, -3.0)
     assert pair.p_value == pair.adjusted == pytest.approx(0.0625)
 
@@ -29,23 +31,34 @@ def test_a_medians_interval_is_that_of_the_sign_test():
     assert (pair.difference, pair.low, pair.high) == (4.5, 1.0, 8.0)
     interval = stats.quantile_test(values, q=0, p=0.5).confidence_interval(0.95)
     assert (pair.low, pair.high) == (interval.low, interval.high)
-    (pair,) = wilcoxon(np.stack([values, np.zeros(10)])[:, :5, None])  # 2 / 2**5 is more than 5 %
+    # 2 / 2**5 is more than 5 %
+    (pair,) = wilcoxon(np.stack([values, np.zeros(10)])[:, :5, None])
     assert np.isnan([pair.low, pair.high]).all()
 
 
 def test_wilcoxon_is_scipys_and_its_adjustment_holms():
-    errors = np.random.default_rng(0).gamma(2.0, size=(4, 3, 5)) * np.array([1.0, 1.2, 2.0, 3.0])[:, None, None]
-    pairs, numbers = wilcoxon(errors), list(combinations(range(4), 2))
+    errors = (
+        np.random.default_rng(0).gamma(2.0, size=(4, 3, 5))
+        * np.array([1.0, 1.2, 2.0, 3.0])[:, None, None]
+    )
+    pairs = wilcoxon(errors)
+    numbers = list(combinations(range(4), 2))
     assert [(pair.first, pair.second) for pair in pairs] == numbers
-    p_values = [stats.wilcoxon(errors[a].ravel(), errors[b].ravel()).pvalue for a, b in numbers]
+    p_values = [
+        stats.wilcoxon(errors[a].ravel(), errors[b].ravel()).pvalue for a, b in numbers
+    ]
     assert [pair.p_value for pair in pairs] == pytest.approx(p_values)
     assert [pair.adjusted for pair in pairs] == pytest.approx(holm(p_values).tolist())
 
 
 @each("seed", range(3))
 def test_with_ties_and_equal_blocks_wilcoxon_is_scipys_too(seed):
-    (pair,) = wilcoxon(errors := np.random.default_rng(seed).integers(0, 4, (2, 8, 1)).astype(float))
-    assert pair.p_value == pytest.approx(stats.wilcoxon(*errors[:, :, 0], zero_method="pratt").pvalue)
+    (pair,) = wilcoxon(
+        errors := np.random.default_rng(seed).integers(0, 4, (2, 8, 1)).astype(float)
+    )
+    assert pair.p_value == pytest.approx(
+        stats.wilcoxon(*errors[:, :, 0], zero_method="pratt").pvalue
+    )
 
 
 def test_blocks_without_a_difference_count_against_one():
@@ -67,8 +80,14 @@ def test_holm_by_hand():
 @each(
     ("call", "message"),
     [
-        (lambda: wilcoxon(np.ones((1, 2, 2))), r"errors must have shape .*, at least \(2, 1, 1\), got \(1, 2, 2\)"),
-        (lambda: wilcoxon(np.full((3, 2, 2), np.nan)), "errors must be finite, got 12 that are not"),
+        (
+            lambda: wilcoxon(np.ones((1, 2, 2))),
+            r"errors must have shape .*, at least \(2, 1, 1\), got \(1, 2, 2\)",
+        ),
+        (
+            lambda: wilcoxon(np.full((3, 2, 2), np.nan)),
+            "errors must be finite, got 12 that are not",
+        ),
     ],
 )
 def test_invalid_errors_and_pairs_are_refused(call, message):

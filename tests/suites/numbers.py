@@ -23,23 +23,41 @@ def areas_of(function: int, instance: int, dimension: int) -> list[list[list[int
     """Return R, B, Y of each of the fixed proposals, repaired, in each frame and view: whole numbers of pixels."""
     made = suite_instance(function, instance, dimension)
     proposals = made.repaired(fixed_proposals(dimension))
-    return [view.tolist() for frame in made.frames for view in frame.cost_and_areas(*frame.decode(proposals))[1]]
+    return [
+        view.tolist()
+        for frame in made.frames
+        for view in frame.cost_and_areas(*frame.decode(proposals))[1]
+    ]
 
 
 def mask_of(function: int, instance: int, dimension: int) -> str:
     """Return the beginning of the SHA-256 of what the cameras saw, damaged or not."""
     made = suite_instance(function, instance, dimension)
-    masks = [one.mask for frame in (*made.frames, *made.noisy) for one in frame.silhouettes]
-    return hashlib.sha256(b"".join(np.packbits(mask).tobytes() for mask in masks)).hexdigest()[:16]
+    masks = [
+        one.mask for frame in (*made.frames, *made.noisy) for one in frame.silhouettes
+    ]
+    return hashlib.sha256(
+        b"".join(np.packbits(mask).tobytes() for mask in masks)
+    ).hexdigest()[:16]
 
 
 def addresses() -> list[tuple[int, int, int]]:
-    return [(one.number, n, d) for one in FUNCTIONS for d in one.dimensions for n in INSTANCES]
+    return [
+        (one.number, n, d)
+        for one in FUNCTIONS
+        for d in one.dimensions
+        for n in INSTANCES
+    ]
 
 
 def main() -> None:
     rows = [[*one, mask_of(*one), areas_of(*one)] for one in addresses()]
-    FILE.write_text("[\n" + ",\n".join(json.dumps(row, separators=(",", ":")) for row in rows) + "\n]\n", "utf-8")
+    FILE.write_text(
+        "[\n"
+        + ",\n".join(json.dumps(row, separators=(",", ":")) for row in rows)
+        + "\n]\n",
+        "utf-8",
+    )
 
 
 if __name__ == "__main__":

@@ -24,7 +24,9 @@ from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mas
 ROWS = {tuple(row[:3]): row[3:] for row in json.loads(FILE.read_text("utf-8"))}
 
 
-def problem(function: int = 1, instance: int = 17, dimension: int = 9, **more: object) -> Problem:
+def problem(
+    function: int = 1, instance: int = 17, dimension: int = 9, **more: object
+) -> Problem:
     return posefit.suite(SUITE, function, instance, dimension, **more)  # type: ignore[arg-type]
 
 
@@ -42,7 +44,9 @@ def test_the_numbers_are_what_they_were_when_the_suite_was_made() -> None:
 
 
 @each("address", [(1, 17, 9), (3, 10_000, 40), (5, 17, 16), (7, 19_999, 66)])
-def test_a_cost_is_a_ratio_of_whole_numbers_of_pixels(address: tuple[int, int, int]) -> None:
+def test_a_cost_is_a_ratio_of_whole_numbers_of_pixels(
+    address: tuple[int, int, int],
+) -> None:
     missed, spilled, both = np.moveaxis(np.array(ROWS[address][1], dtype=float), 2, 0)
     shares = 0.5 * missed / (missed + both) + 0.5 * spilled / (spilled + both)
     costs = problem(*address)(fixed_proposals(address[2]))
@@ -65,19 +69,34 @@ def test_the_truth_cannot_be_written_to() -> None:
 
 
 def test_a_box_is_learned_from_other_people() -> None:
-    subjects = {number: suite_instance(1, number, 9).subject for number in (*range(40), *HELD_OUT[:40])}
-    assert {subjects[number] for number in subjects if number in TRAINING} == set(TRAINING_PEOPLE)
-    assert {subjects[number] for number in subjects if number in HELD_OUT} == set(HELD_OUT_PEOPLE)
-    means = {subject: learned_without(subject).mean.tobytes() for subject in (*TRAINING_PEOPLE, *HELD_OUT_PEOPLE)}
+    subjects = {
+        number: suite_instance(1, number, 9).subject
+        for number in (*range(40), *HELD_OUT[:40])
+    }
+    assert {subjects[number] for number in subjects if number in TRAINING} == set(
+        TRAINING_PEOPLE
+    )
+    assert {subjects[number] for number in subjects if number in HELD_OUT} == set(
+        HELD_OUT_PEOPLE
+    )
+    means = {
+        subject: learned_without(subject).mean.tobytes()
+        for subject in (*TRAINING_PEOPLE, *HELD_OUT_PEOPLE)
+    }
     assert len({means[subject] for subject in TRAINING_PEOPLE}) == len(TRAINING_PEOPLE)
     assert len({means[subject] for subject in HELD_OUT_PEOPLE}) == 1
 
 
 def test_a_noisy_call_has_noise_and_the_record_has_none() -> None:
     drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 9))
-    posed, other, quiet = problem(4), problem(4), problem(4).noise_free(drawn)
+    posed = problem(4)
+    other = problem(4)
+    quiet = problem(4).noise_free(drawn)
     costs = posed(drawn)
-    assert np.array_equal(costs, np.concatenate([other(drawn[:7]), [other(proposal) for proposal in drawn[7:]]]))
+    assert np.array_equal(
+        costs,
+        np.concatenate([other(drawn[:7]), [other(proposal) for proposal in drawn[7:]]]),
+    )
     posed.reset()
     assert np.array_equal(posed(drawn), costs)
     assert (costs != quiet).mean() > 0.9
@@ -91,16 +110,21 @@ def test_a_noisy_call_has_noise_and_the_record_has_none() -> None:
 
 def test_a_sequence_is_a_motion_along_a_few_components() -> None:
     posed = problem(5, 10_000, 40)
-    box, frames = posed.made.box, posed.made.frames
+    box = posed.made.box
+    frames = posed.made.frames
     motion = np.array([frame.decode(posed.made.truth[None])[0][0] for frame in frames])
     assert len(np.unique(motion[:, 3:], axis=0)) == len(frames) == 8
     assert np.ptp(motion[:, :3], axis=0).tolist() == [0.0] * 3
     latents = np.random.default_rng(0).uniform(box.low, box.high, (5, 37))
     for latent in latents:
-        angles = np.concatenate([frame.inverse_transform(latent[None]) for frame in box.frames])
+        angles = np.concatenate(
+            [frame.inverse_transform(latent[None]) for frame in box.frames]
+        )
         assert box.transform(angles)[0] == pytest.approx(latent, abs=0.02)
     drawn = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 40))
-    assert posed(drawn) == pytest.approx(np.mean([frame.evaluate(drawn) for frame in frames], axis=0))
+    assert posed(drawn) == pytest.approx(
+        np.mean([frame.evaluate(drawn) for frame in frames], axis=0)
+    )
 
 
 def test_mixed_components_have_two_to_sixteen_values_and_each_fifth_has_any() -> None:
@@ -114,9 +138,11 @@ def test_mixed_components_have_two_to_sixteen_values_and_each_fifth_has_any() ->
 
 
 def test_a_next_frame_starts_near_a_prediction_and_nearer_than_anywhere() -> None:
-    near, anywhere = [], []
+    near = []
+    anywhere = []
     for number in range(10_000, 10_008):
-        posed, rng = problem(2, number, 16), np.random.default_rng(0)
+        posed = problem(2, number, 16)
+        rng = np.random.default_rng(0)
         near.append(np.median(posed(draw_population(posed.space, rng, 60))))
         anywhere.append(np.median(posed(rng.uniform(-1.0, 1.0, (60, 16)))))
         assert np.array_equal(posed.initial_solution, posed.start.mean)
@@ -142,16 +168,21 @@ def test_what_is_not_feasible_costs_what_its_repair_costs() -> None:
         assert posed.space.feasible(mended).all()
         assert np.array_equal(posed(bad), posed(mended))
         assert np.array_equal(posed.repaired(mended), mended)
-        assert np.ptp(mended[:, 3:] / bad[:, 3:], axis=1).max() < 1e-9  # straight towards the middle
+        # straight towards the middle
+        assert np.ptp(mended[:, 3:] / bad[:, 3:], axis=1).max() < 1e-9
         assert posed(np.full(posed.dimension, 3.0)) == posed(np.ones(posed.dimension))
 
 
 def test_what_is_not_feasible_may_be_rejected_or_penalised_instead() -> None:
     bad = infeasible(problem())
     repaired = problem()(bad)
-    rejecting, penalising = problem(infeasible="reject"), problem(infeasible="penalise")
+    rejecting = problem(infeasible="reject")
+    penalising = problem(infeasible="penalise")
     assert np.isinf(rejecting(bad)).all()
-    assert (rejecting.evaluations, [len(part) for part in rejecting.trace]) == (20, [0, 0])
+    assert (rejecting.evaluations, [len(part) for part in rejecting.trace]) == (
+        20,
+        [0, 0],
+    )
     assert rejecting(np.zeros(9)) == problem()(np.zeros(9))
     assert rejecting.trace[0].tolist() == [21.0]
     far = np.linalg.norm(bad - penalising.repaired(bad), axis=1)
@@ -163,46 +194,74 @@ def test_a_budget_of_evaluations_holds() -> None:
     posed = problem(budget=5)
     for fits, left, beyond in ((3, 2, 3), (2, 0, 1)):
         posed(np.zeros((fits, 9)))
-        with pytest.raises(BudgetSpentError, match=f"{left} of 5 evaluations are left, got {beyond}"):
+        with pytest.raises(
+            BudgetSpentError, match=f"{left} of 5 evaluations are left, got {beyond}"
+        ):
             posed(np.zeros((beyond, 9)) if beyond > 1 else np.zeros(9))
         assert (posed.evaluations, posed.remaining_evaluations) == (5 - left, left)
 
 
 def test_targets_fall_to_a_quarter_above_the_cost_of_the_true_pose() -> None:
     for posed in (problem(1, 10_000, 9), problem(8, 10_000, 9)):
-        assert posed.targets - posed.truth_cost == pytest.approx([2.0 ** (5 - k / 4) for k in range(29)])
+        assert posed.targets - posed.truth_cost == pytest.approx(
+            [2.0 ** (5 - k / 4) for k in range(29)]
+        )
         assert not posed.final_target_hit
         posed(posed.made.truth)
         assert posed.final_target_hit
 
 
-def test_a_rotated_box_has_the_size_of_the_plain_one_and_no_coordinate_is_a_joint_angle() -> None:
+def test_a_rotated_box_has_the_size_of_the_plain_one_and_no_coordinate_is_a_joint_angle() -> (
+    None
+):
     """A rotation keeps lengths; rounded to four digits it does so to about one in a thousand."""
     plain, rotated = (problem(number, 10_000, 66).made.box for number in (7, 9))
     latents = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 63))
     away = (rotated.inverse_transform(latents) - plain.mean) / plain.reach
-    assert np.linalg.norm(away, axis=1) == pytest.approx(np.linalg.norm(latents, axis=1), rel=2e-3)
+    assert np.linalg.norm(away, axis=1) == pytest.approx(
+        np.linalg.norm(latents, axis=1), rel=2e-3
+    )
     assert np.abs(rotated.components / plain.reach).max() < 0.8
-    assert rotated.transform(rotated.inverse_transform(latents)) == pytest.approx(latents, abs=1e-2)
+    assert rotated.transform(rotated.inverse_transform(latents)) == pytest.approx(
+        latents, abs=1e-2
+    )
     other = problem(9, 10_001, 66).made.box
     assert not np.array_equal(rotated.components, other.components)
 
 
 def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
-    suite = posefit.Suite(functions=[7, 1], dimensions=[9, 24, 66], instances=[3, 10_003])
+    suite = posefit.Suite(
+        functions=[7, 1], dimensions=[9, 24, 66], instances=[3, 10_003]
+    )
     order = ((1, 9), (7, 24), (1, 24), (7, 66))
-    expected = [f"f{function:03d}_i{n:05d}_d{d:02d}" for function, d in order for n in (3, 10_003)]
+    expected = [
+        f"f{function:03d}_i{n:05d}_d{d:02d}"
+        for function, d in order
+        for n in (3, 10_003)
+    ]
     assert [posed.id.partition("_")[2] for posed in suite] == expected
     assert [posed.index for posed in suite] == list(range(len(suite)))
-    assert [function.name for function in suite.functions] == ["single image", "high-dimensional"]
-    assert len(posefit.Suite()) == 15 * sum(len(function.dimensions) for function in FUNCTIONS)
+    assert [function.name for function in suite.functions] == [
+        "single image",
+        "high-dimensional",
+    ]
+    assert len(posefit.Suite()) == 15 * sum(
+        len(function.dimensions) for function in FUNCTIONS
+    )
     assert suite[0] is not suite[0]  # nothing evaluated yet, each time
 
 
-def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_not_be_counted() -> None:
+def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_not_be_counted() -> (
+    None
+):
     posed = problem()
-    with pytest.raises(PicklingError, match="cannot be sent to another: make it there with posefit.suite"):
-        differential_evolution(posed, [(-1.0, 1.0)] * 9, workers=2, updating="deferred", maxiter=1)
+    with pytest.raises(
+        PicklingError,
+        match="cannot be sent to another: make it there with posefit.suite",
+    ):
+        differential_evolution(
+            posed, [(-1.0, 1.0)] * 9, workers=2, updating="deferred", maxiter=1
+        )
     with pytest.raises(PicklingError, match="counts evaluations in its own process"):
         copy(posed)
     posed(np.zeros(9))
@@ -215,16 +274,40 @@ def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_no
 @each(
     ("make", "message"),
     [
-        (lambda: posefit.suite("posefit-2025", 1, 0, 9), "suite must be one of posefit-2026.3, got 'posefit-2025'"),
-        (lambda: problem(10), "function must be one of 1, 2, 3, 4, 5, 6, 7, 8, 9, got 10"),
-        (lambda: problem(np.array([1, 2])), r"function must be a whole number of at least 1, got array\(\[1, 2\]\)"),  # type: ignore[arg-type]
+        (
+            lambda: posefit.suite("posefit-2025", 1, 0, 9),
+            "suite must be one of posefit-2026.3, got 'posefit-2025'",
+        ),
+        (
+            lambda: problem(10),
+            "function must be one of 1, 2, 3, 4, 5, 6, 7, 8, 9, got 10",
+        ),
+        (
+            lambda: problem(np.array([1, 2])),
+            r"function must be a whole number of at least 1, got array\(\[1, 2\]\)",
+        ),  # type: ignore[arg-type]
         (lambda: problem(1, 20_000), "instance must be at most 19999, got 20000"),
-        (lambda: problem(7, 0, 9), "dimension of function 7 must be one of 20, 24, 40, 66, got 9"),
-        (lambda: problem(infeasible="ignore"), "infeasible must be one of repair, reject, penalise, got 'ignore'"),
+        (
+            lambda: problem(7, 0, 9),
+            "dimension of function 7 must be one of 20, 24, 40, 66, got 9",
+        ),
+        (
+            lambda: problem(infeasible="ignore"),
+            "infeasible must be one of repair, reject, penalise, got 'ignore'",
+        ),
         (lambda: problem(budget=0), "budget must be at least 1, got 0"),
-        (lambda: posefit.Suite(functions=[1], dimensions=[66]), r"at least one problem, got none in \[66\] dimensions"),
-        (lambda: posefit.Suite(dimensions=[11]), "dimension must be one of 9, 10, 16, 20, 24, 40, 66, got 11"),
-        (lambda: posefit.Suite(functions=9), "functions must be a list of numbers, got 9"),  # type: ignore[arg-type]
+        (
+            lambda: posefit.Suite(functions=[1], dimensions=[66]),
+            r"at least one problem, got none in \[66\] dimensions",
+        ),
+        (
+            lambda: posefit.Suite(dimensions=[11]),
+            "dimension must be one of 9, 10, 16, 20, 24, 40, 66, got 11",
+        ),
+        (
+            lambda: posefit.Suite(functions=9),
+            "functions must be a list of numbers, got 9",
+        ),  # type: ignore[arg-type]
     ],
 )
 def test_what_is_no_problem_is_named(make: Callable[[], object], message: str) -> None:
@@ -241,7 +324,9 @@ def test_what_is_no_problem_is_named(make: Callable[[], object], message: str) -
         ("abc", "proposals must be numbers, got 'abc'"),
     ],
 )
-def test_wrong_proposals_are_refused_and_not_counted(proposals: object, message: str) -> None:
+def test_wrong_proposals_are_refused_and_not_counted(
+    proposals: object, message: str
+) -> None:
     posed = problem()
     with pytest.raises(ValueError, match=message):
         posed(proposals)
@@ -264,19 +349,36 @@ def test_iohexperimenter_has_the_trace_of_a_plain_loop_in_each_run() -> None:
         assert result.cost == plain.best_observed_fvalue1 == plain.trace[1][-1]
         wrapped = ioh_problem(posed)
         meta = wrapped.meta_data
-        assert (meta.problem_id, meta.instance, meta.n_variables) == (26_300 + address[0], *address[1:])
-        assert np.array_equal((wrapped.bounds.lb, wrapped.bounds.ub), (posed.lower_bounds, posed.upper_bounds))
-        assert wrapped.optimum.y == 0.0 if posed.optimum == 0.0 else not np.isfinite(wrapped.optimum.y)
+        assert (meta.problem_id, meta.instance, meta.n_variables) == (
+            26_300 + address[0],
+            *address[1:],
+        )
+        assert np.array_equal(
+            (wrapped.bounds.lb, wrapped.bounds.ub),
+            (posed.lower_bounds, posed.upper_bounds),
+        )
+        assert (
+            wrapped.optimum.y == 0.0
+            if posed.optimum == 0.0
+            else not np.isfinite(wrapped.optimum.y)
+        )
         for _ in range(2):
             search = swarm(posed.space)
             for _ in range(BUDGET // 20):
                 proposals = search.ask()
-                search.tell(proposals, np.array([wrapped(proposal) for proposal in proposals]))
+                search.tell(
+                    proposals, np.array([wrapped(proposal) for proposal in proposals])
+                )
             assert np.array_equal(posed.trace, plain.trace)
             assert wrapped.state.evaluations == posed.evaluations == BUDGET
             assert wrapped.state.current_best.y == posed.best_observed_fvalue1
             wrapped.reset()
-            assert wrapped.state.evaluations == posed.evaluations == len(posed.trace[0]) == 0
+            assert (
+                wrapped.state.evaluations
+                == posed.evaluations
+                == len(posed.trace[0])
+                == 0
+            )
 
 
 def test_iohexperimenter_finds_the_optimum_and_keeps_a_budget() -> None:
@@ -293,7 +395,9 @@ def test_cocos_own_solver_and_printer_run_on_a_suite(capsys) -> None:
     suite = posefit.Suite(functions=[1, 7], dimensions=[9, 24], instances=[10_000])
     printer = cocoex.utilities.MiniPrint()
     for problem in suite:
-        cocoex.solvers.random_search(problem, problem.lower_bounds, problem.upper_bounds, 30)
+        cocoex.solvers.random_search(
+            problem, problem.lower_bounds, problem.upper_bounds, 30
+        )
         printer(problem, final=problem.index == len(suite) - 1)
         assert problem.evaluations == 30
         assert problem.best_observed_fvalue1 < 60.0

@@ -29,7 +29,13 @@ from posefit.sweep.ledger import Ledger
 from tests.sweep.fake import SLOW, SLOW_SECONDS, STARTS, bad, cells, result, starts
 
 ROOT = Path(__file__).parents[2]
-EVENTS = ("kill a worker", "kill the driver", "kill the group", "stop and go on", "start a second driver")
+EVENTS = (
+    "kill a worker",
+    "kill the driver",
+    "kill the group",
+    "stop and go on",
+    "start a second driver",
+)
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.3, 1.5  # seconds between two events, at least and at most
 CONNECT_TIMEOUT_SECONDS = 60.0  # seconds for a driver to begin cells, or to end
@@ -48,24 +54,32 @@ class Chaos:
     seconds: float = 0.5  # that a cell takes
     happened: Counter[str] = field(default_factory=Counter)
     refused: int = 0
-    copies: list[int] = field(default_factory=list)  # the rows of each copy, -1 where it does not open
+    # the rows of each copy, -1 where it does not open
+    copies: list[int] = field(default_factory=list)
     fewer: int = 0  # copies with fewer rows than there were when they were begun
 
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
-        self._ledger, self._starts = self.folder / "results", self.folder / "starts"
+        self._ledger = self.folder / "results"
+        self._starts = self.folder / "starts"
         self._driver: subprocess.Popen[bytes] | None = None
 
     def run(self) -> dict[str, object]:
         """Return what happened, and what became of the cells."""
-        start, drivers, status = time.monotonic(), 0, -1
+        start = time.monotonic()
+        drivers = 0
+        status = -1
         try:
             while drivers < STARTED and status not in (0, 1):
                 before = len(starts(self._starts))
                 self._driver = self._begun()
                 drivers += 1
                 until = time.monotonic() + CONNECT_TIMEOUT_SECONDS
-                while self._driver.poll() is None and len(starts(self._starts)) == before and time.monotonic() < until:
+                while (
+                    self._driver.poll() is None
+                    and len(starts(self._starts)) == before
+                    and time.monotonic() < until
+                ):
                     time.sleep(0.1)
                 while self._driver.poll() is None:
                     if sum(self.happened.values()) < self.events:
@@ -80,7 +94,9 @@ class Chaos:
         ledger = Ledger(self._ledger)
         rows = list(ledger.rows())
         keys = Counter(row["key"] for row in rows)
-        wanted = {cell.key: _figures(result(cell).row) for cell in cells(self.count, SLOW)}
+        wanted = {
+            cell.key: _figures(result(cell).row) for cell in cells(self.count, SLOW)
+        }
         quarantined = {row["key"] for row in ledger.quarantined()}
         return {
             "seed": self.seed,
@@ -89,10 +105,14 @@ class Chaos:
             "drivers": drivers,
             "starts": len(starts(self._starts)),
             "lost": len(wanted.keys() - keys.keys()),
-            "doubled": sum(number > 1 for number in keys.values()) + len(keys.keys() - wanted.keys()),
+            "doubled": sum(number > 1 for number in keys.values())
+            + len(keys.keys() - wanted.keys()),
             "changed": sum(_figures(row) != wanted.get(row["key"]) for row in rows),
-            "wrong in quarantine": len(quarantined ^ {cell.key for cell in bad(self.count)}),
-            "second drivers that ran": self.happened["start a second driver"] - self.refused,
+            "wrong in quarantine": len(
+                quarantined ^ {cell.key for cell in bad(self.count)}
+            ),
+            "second drivers that ran": self.happened["start a second driver"]
+            - self.refused,
             "copies": len(self.copies),
             "copies that do not open": self.copies.count(-1),
             "copies with rows missing": self.fewer,
@@ -100,15 +120,29 @@ class Chaos:
         }
 
     def _begun(self) -> subprocess.Popen[bytes]:
-        words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), str(self.count), str(LIMIT)]
-        own = {STARTS: str(self._starts), SLOW_SECONDS: str(self.seconds), "PYTHONPATH": str(ROOT)}
+        words = [
+            sys.executable,
+            "-m",
+            "tests.sweep.fake",
+            str(self._ledger),
+            str(self.count),
+            str(LIMIT),
+        ]
+        own = {
+            STARTS: str(self._starts),
+            SLOW_SECONDS: str(self.seconds),
+            "PYTHONPATH": str(ROOT),
+        }
         how = {"cwd": ROOT, "env": os.environ | own, "start_new_session": True}
         with (self.folder / "output.txt").open("ab") as output:
-            return subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT, **how)
+            return subprocess.Popen(
+                words, stdout=output, stderr=subprocess.STDOUT, **how
+            )
 
     def _event(self) -> None:
         assert self._driver is not None
-        event, driver = self._random.choice(EVENTS), self._driver.pid
+        event = self._random.choice(EVENTS)
+        driver = self._driver.pid
         with suppress(ProcessLookupError, FileNotFoundError):
             if event == "kill a worker":
                 done = self._signalled(self._running(), signal.SIGKILL, signal.SIGTERM)
@@ -129,7 +163,11 @@ class Chaos:
 
     def _copy(self) -> None:
         """Copy the ledger's files while their writer stands still, wherever in its writing it is, and open the copy."""
-        files = [path for path in self._ledger.glob("ledger.sqlite*") if path.suffix in (".sqlite", ".sqlite-wal")]
+        files = [
+            path
+            for path in self._ledger.glob("ledger.sqlite*")
+            if path.suffix in (".sqlite", ".sqlite-wal")
+        ]
         if self._driver is None or not files:
             return
         folder = self.folder / "copy"
@@ -156,7 +194,8 @@ class Chaos:
         """Send one of some signals to one of some processes; who is stopped goes on soon."""
         if not processes:
             return False
-        process, number = self._random.choice(processes), self._random.choice(signals)
+        process = self._random.choice(processes)
+        number = self._random.choice(signals)
         os.kill(process, number)
         if number == signal.SIGSTOP:
             time.sleep(STOPPED)
@@ -172,7 +211,10 @@ class Chaos:
 
 def _figures(row: Mapping[str, object]) -> dict[str, object]:
     """Return what an undisturbed run of a cell gives, to the bit."""
-    return {name: row[name] for name in ("spec", "cost", "error_degrees", "joint_errors_mm", "trace")}
+    return {
+        name: row[name]
+        for name in ("spec", "cost", "error_degrees", "joint_errors_mm", "trace")
+    }
 
 
 def _ancestors(process: int) -> list[int]:
@@ -180,7 +222,9 @@ def _ancestors(process: int) -> list[int]:
     ancestors = []
     while process > 1:
         try:
-            state, parent = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[:2]
+            state, parent = (
+                Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[:2]
+            )
         except (FileNotFoundError, ProcessLookupError):
             return ancestors
         process = 0 if state == "Z" else int(parent)
@@ -194,13 +238,17 @@ LOST = ("lost", "doubled", "changed", "wrong in quarantine", "second drivers tha
 
 def main() -> None:
     """Run what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     for name, default in (("cells", 300), ("events", 60), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--seconds", type=float, default=0.5)
     asked = parser.parse_args()
     with TemporaryDirectory() as folder:
-        outcome = Chaos(Path(folder), asked.cells, asked.events, asked.seed, asked.seconds).run()
+        outcome = Chaos(
+            Path(folder), asked.cells, asked.events, asked.seed, asked.seconds
+        ).run()
         output = (Path(folder) / "output.txt").read_text(errors="replace")
     print(json.dumps(outcome, indent=1))
     if any(outcome[name] for name in LOST):

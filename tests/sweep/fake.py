@@ -25,13 +25,25 @@ if TYPE_CHECKING:
 
 STARTS = "POSEFIT_STARTS"
 SLOW_SECONDS = "POSEFIT_SLOW_SECONDS"
-SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND, TOGETHER = 1001, 1002, 1003, 1004, 1005, 1006, 1007
-LEAVE, KILLED, EXIT, COMPILE = 1008, 1009, 1010, 1011
+SEGFAULT = 1001
+ENDLESS = 1002
+HOG = 1003
+RAISE = 1004
+SLOW = 1005
+SECOND = 1006
+TOGETHER = 1007
+LEAVE = 1008
+KILLED = 1009
+EXIT = 1010
+COMPILE = 1011
 
 
 def cells(count: int, frames: int = 60) -> list[TrackCell]:
     """Return so many cells that differ by their seed."""
-    return [TrackCell("random@pca", "walk", ("walk-a",), seed=seed, frames=frames) for seed in range(count)]
+    return [
+        TrackCell("random@pca", "walk", ("walk-a",), seed=seed, frames=frames)
+        for seed in range(count)
+    ]
 
 
 def behave(cell: TrackCell) -> CellResult:
@@ -122,7 +134,8 @@ class Instant:
         self.ended.append(Outcome(cell, result(cell)))
 
     def wait(self, seconds: float) -> list[Outcome]:
-        ended, self.ended = self.ended, []
+        ended = self.ended
+        self.ended = []
         return ended
 
     def close(self) -> None: ...
@@ -143,7 +156,9 @@ def starts(path: Path) -> list[tuple[str, int]]:
 def bad(seed: int) -> list[TrackCell]:
     """Return five cells that raise, exit, end their process, want all memory and never end."""
     kinds = (RAISE, LEAVE, SEGFAULT, HOG, ENDLESS)
-    return [replace(cells(1)[0], seed=seed + k, frames=kind) for k, kind in enumerate(kinds)]
+    return [
+        replace(cells(1)[0], seed=seed + k, frames=kind) for k, kind in enumerate(kinds)
+    ]
 
 
 def main() -> int:
@@ -155,7 +170,11 @@ def main() -> int:
     limits = Limits(float(seconds), 1.0)
     chosen = cells(int(many), SLOW)
 
-    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], Pool(2, limits, behave))
+    tally = swept(
+        Path(where),
+        [*chosen[::2], *bad(len(chosen)), *chosen[1::2]],
+        Pool(2, limits, behave),
+    )
     return 1 if tally.quarantined else 130 if tally.stopped else 0
 
 

@@ -21,8 +21,19 @@ ROOT = Path(__file__).parents[2]
 @contextmanager
 def driver(folder: Path, count: int) -> Iterator[subprocess.Popen[bytes]]:
     """Start a driver of its own process group; nothing of it is left over afterwards."""
-    words = [sys.executable, "-m", "tests.sweep.fake", str(folder / "results"), str(count), "300"]
-    environment = {**os.environ, STARTS: str(folder / "starts"), "PYTHONPATH": str(ROOT)}
+    words = [
+        sys.executable,
+        "-m",
+        "tests.sweep.fake",
+        str(folder / "results"),
+        str(count),
+        "300",
+    ]
+    environment = {
+        **os.environ,
+        STARTS: str(folder / "starts"),
+        "PYTHONPATH": str(ROOT),
+    }
     process = subprocess.Popen(words, cwd=ROOT, env=environment, start_new_session=True)
     try:
         yield process
@@ -39,21 +50,28 @@ def wait_for(what: Callable[[], bool], seconds: float = 600.0) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds a driver's processes in /proc")
+@pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(), reason="finds a driver's processes in /proc"
+)
 @pytest.mark.slow
-def test_a_sabotaged_sweep_loses_and_doubles_no_row_and_quarantines_no_healthy_cell(tmp_path: Path) -> None:
+def test_a_sabotaged_sweep_loses_and_doubles_no_row_and_quarantines_no_healthy_cell(
+    tmp_path: Path,
+) -> None:
     # `python -m tests.sweep.chaos` is the long version
     result = Chaos(tmp_path, 24, 8, 1).run()
     assert [result[name] for name in LOST] == [0] * len(LOST), result
 
 
 @pytest.mark.parametrize(("times", "lost"), [(1, 0), (2, 2)])
-def test_ctrl_c_finishes_the_running_cells_and_twice_stops_them_at_once(times: int, lost: int, tmp_path: Path) -> None:
+def test_ctrl_c_finishes_the_running_cells_and_twice_stops_them_at_once(
+    times: int, lost: int, tmp_path: Path
+) -> None:
     noted = tmp_path / "starts"
     with driver(tmp_path, 40) as process:
         wait_for(lambda: len(starts(noted)) > 5)
         for _ in range(times):
-            os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
+            # as a terminal does: to the workers too
+            os.killpg(process.pid, signal.SIGINT)
             time.sleep(0.05)
         assert process.wait(timeout=600) == 130
     rows = {row["key"] for row in Ledger(tmp_path / "results").rows()}

@@ -37,12 +37,16 @@ def plan(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(plan: Path, tmp_path: Path) -> None:
+def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(
+    plan: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "deep" / "out"
     first = run("sweep", plan, "--out", out, "--workers", 1)
     assert first.exit_code == 0, first.stderr
     report = f"results: posefit report {out} --out {out}.html\n"
-    assert first.stdout == f"8 of 8 cells done, 8 of them now, written to {out}\n{report}"
+    assert (
+        first.stdout == f"8 of 8 cells done, 8 of them now, written to {out}\n{report}"
+    )
     assert first.stderr == ""  # a bar is for a terminal alone
     again = run("sweep", plan, "--out", out, "--workers", 2, "--json")
     assert again.exit_code == 0, again.stderr
@@ -56,7 +60,9 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
     sapso = next(row for row in rows if row["spec"]["method"] == "sapso@pca")
     assert sapso["spec"]["settings"] == {"sapso.cooling": 0.9}
     assert len(sapso["joint_errors_mm"]) == 27
-    assert sum(sapso["joint_errors_mm"]) / 27 == pytest.approx(sapso["mpjpe_mm"], abs=1e-3)
+    assert sum(sapso["joint_errors_mm"]) / 27 == pytest.approx(
+        sapso["mpjpe_mm"], abs=1e-3
+    )
     assert set(sapso["skill"]) == {"mean_pose", "persistence", "nearest"}
     assert (sapso["evaluations_used"], sapso["dimensions"]) == (2 * 80, 9)
     assert Ledger(out).joints(sapso["key"])["estimate"].shape == (2, 27, 3)
@@ -80,9 +86,14 @@ def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) ->
     assert [cell["done"] for cell in listed["cells"]] == [True] * 8
 
 
-def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path, tmp_path: Path) -> None:
-    plan.write_text('[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nframes = 1\nevaluations = 80\n')
-    words, out = ["sweep", plan, "--out", tmp_path / "out", "--workers", 1], tmp_path / "out"
+def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(
+    plan: Path, tmp_path: Path
+) -> None:
+    plan.write_text(
+        '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nframes = 1\nevaluations = 80\n'
+    )
+    words = ["sweep", plan, "--out", tmp_path / "out", "--workers", 1]
+    out = tmp_path / "out"
     (cell,) = Plan.read(plan)
     with Writer(out / FILE) as ledger:
         ledger.plan([cell])
@@ -90,7 +101,10 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
             ledger.fail(cell.key, "the disk of its files was away")
     lost = run(*words)
     assert lost.exit_code == 1
-    assert f"written to {out}; 1 quarantined: posefit report names the reasons" in lost.stdout
+    assert (
+        f"written to {out}; 1 quarantined: posefit report names the reasons"
+        in lost.stdout
+    )
     again = run(*words, "--retry-quarantined")
     assert again.exit_code == 0, again.stderr
     assert "1 of 1 cells done, 1 of them now" in again.stdout
@@ -112,26 +126,39 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
         (["BAD", "--out", "OUT", "--dry-run"], "bad.toml: defaults must hold"),
     ],
 )  # fmt: skip
-def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str, plan: Path, tmp_path: Path) -> None:
+def test_mistakes_are_one_line_and_write_nothing(
+    words: list[str], message: str, plan: Path, tmp_path: Path
+) -> None:
     (tmp_path / "bad.toml").write_text("[defaults]\nframe = 3\n")
     places = {"PLAN": plan, "OUT": tmp_path / "out", "BAD": tmp_path / "bad.toml"}
     assert message in error_of("sweep", *(places.get(word, word) for word in words))
     assert not (tmp_path / "out").exists()
 
 
-def test_names_of_a_ledger_neither_steer_a_terminal_nor_forge_lines(tmp_path: Path) -> None:
+def test_names_of_a_ledger_neither_steer_a_terminal_nor_forge_lines(
+    tmp_path: Path,
+) -> None:
     cell = replace(cells(1)[0], method="sapso@\x1b[31m\nno method is better")
     other = replace(cell, seed=1)
-    folder = ledger(tmp_path / "results", [result(cell, 1.0)], [(other, ["it\x1b[2J\ntook ages"])])
+    folder = ledger(
+        tmp_path / "results", [result(cell, 1.0)], [(other, ["it\x1b[2J\ntook ages"])]
+    )
     shown = run("report", folder)
     assert shown.exit_code == 0, shown.output
     assert "\x1b" not in shown.output
     for name in (r"sapso@\x1b[31m\nno method is better", r"it\x1b[2J\ntook ages"):
         assert name in shown.stdout
-    assert not any(line.startswith(("no method", "took ages")) for line in shown.stdout.splitlines())
+    assert not any(
+        line.startswith(("no method", "took ages"))
+        for line in shown.stdout.splitlines()
+    )
 
 
-def test_without_distributed_dask_says_what_to_install(plan: Path, tmp_path: Path, monkeypatch: Any) -> None:
+def test_without_distributed_dask_says_what_to_install(
+    plan: Path, tmp_path: Path, monkeypatch: Any
+) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    line = error_of("sweep", plan, "--out", tmp_path / "out", "--scheduler", "tcp://a:1")
+    line = error_of(
+        "sweep", plan, "--out", tmp_path / "out", "--scheduler", "tcp://a:1"
+    )
     assert line.endswith("python -m pip install 'posefit[dask]'")

@@ -18,7 +18,10 @@ def cell(**fields: Any) -> TrackCell:
 
 def yaw_off(**fields: Any) -> float:
     """Return by how many radians the yaw that a method knows is off."""
-    off, true = (cell_scene(cell(yaw_off_degrees=degrees, **fields)).yaw for degrees in (25.0, 0.0))
+    off, true = (
+        cell_scene(cell(yaw_off_degrees=degrees, **fields)).yaw
+        for degrees in (25.0, 0.0)
+    )
     return off - true
 
 
@@ -30,7 +33,8 @@ def test_the_first_yaw_is_off_by_no_more_than_the_limit_and_unknown_at_180() -> 
 
 
 def test_the_body_is_off_and_neither_the_truth_nor_the_observations() -> None:
-    exact, off = cell_scene(cell()), cell_scene(cell(body_off_percent=10.0))
+    exact = cell_scene(cell())
+    off = cell_scene(cell(body_off_percent=10.0))
     shares = off.body.skeleton.lengths / exact.body.skeleton.lengths
     assert 1e-3 < np.abs(shares - 1.0).max() <= 0.1
     assert np.array_equal(off.truth.skeleton.offsets, exact.truth.skeleton.offsets)
@@ -38,8 +42,15 @@ def test_the_body_is_off_and_neither_the_truth_nor_the_observations() -> None:
         assert np.array_equal(one.silhouettes[0].mask, other.silhouettes[0].mask)
 
 
-def test_the_yaw_is_off_by_the_same_for_every_method_and_seed_and_by_another_for_another_motion() -> None:
-    assert yaw_off() == yaw_off(seed=3) == yaw_off(method="random@full") == yaw_off(body_off_percent=5.0)
+def test_the_yaw_is_off_by_the_same_for_every_method_and_seed_and_by_another_for_another_motion() -> (
+    None
+):
+    assert (
+        yaw_off()
+        == yaw_off(seed=3)
+        == yaw_off(method="random@full")
+        == yaw_off(body_off_percent=5.0)
+    )
     assert yaw_off() != yaw_off(motion="run")
 
 
@@ -48,10 +59,16 @@ def test_the_yaw_is_off_by_the_same_for_every_method_and_seed_and_by_another_for
     [
         ("yaw_off_degrees", 181, "yaw_off_degrees must lie in 0 to 180, got 181"),
         ("yaw_off_degrees", -1, "yaw_off_degrees must lie in 0 to 180, got -1"),
-        ("yaw_off_degrees", "unknown", "yaw_off_degrees must be a finite number, got 'unknown'"),
+        (
+            "yaw_off_degrees",
+            "unknown",
+            "yaw_off_degrees must be a finite number, got 'unknown'",
+        ),
         ("body_off_percent", 51, "body_off_percent must lie in 0 to 50, got 51"),
     ],
 )
-def test_a_value_that_makes_no_sense_is_named(field: str, value: object, message: str) -> None:
+def test_a_value_that_makes_no_sense_is_named(
+    field: str, value: object, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         cell(**{field: value})

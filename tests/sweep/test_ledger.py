@@ -44,21 +44,35 @@ def test_rows_and_joints_come_back_as_they_were_written(tmp_path: Path) -> None:
         np.testing.assert_array_equal(joints["truth"], np.full((1, 27, 3), cell.seed))
 
 
-def test_a_frame_has_a_row_a_cell_in_the_order_of_the_specs(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_frame_has_a_row_a_cell_in_the_order_of_the_specs(
+    tmp_path: Path, monkeypatch: Any
+) -> None:
     pytest.importorskip("pandas")
     folder = filled(tmp_path / "results", 3, start=2)
     filled(folder, 2)
     bad = cells(6)[5]
     with Writer(folder / FILE) as ledger:
         ledger.plan([bad])
-        assert [ledger.fail(bad.key, "it had to") for _ in range(ATTEMPTS)] == [False, False, True]
+        assert [ledger.fail(bad.key, "it had to") for _ in range(ATTEMPTS)] == [
+            False,
+            False,
+            True,
+        ]
     table = Ledger(folder).frame()
     assert table["seed"].tolist() == [0, 1, 2, 3, 4, 5]
     assert table["status"].tolist() == ["done"] * 5 + ["quarantined"]
     assert table["reason"].iloc[5] == "it had to; it had to; it had to"
-    for name, value in (("version", posefit_build()), ("view_degrees", "45"), ("evaluations", 2440), ("kind", "track")):
+    for name, value in (
+        ("version", posefit_build()),
+        ("view_degrees", "45"),
+        ("evaluations", 2440),
+        ("kind", "track"),
+    ):
         assert table[name].unique().tolist() == [value]
-    assert table["error_degrees.mean"].iloc[0] == result(cells(1)[0]).row["error_degrees"]["mean"]
+    assert (
+        table["error_degrees.mean"].iloc[0]
+        == result(cells(1)[0]).row["error_degrees"]["mean"]
+    )
     assert table["joint_errors_mm.rhand"].iloc[4] == 4.0
     assert np.isnan(table["cost"].iloc[5])
     monkeypatch.setitem(sys.modules, "pandas", None)
@@ -66,20 +80,36 @@ def test_a_frame_has_a_row_a_cell_in_the_order_of_the_specs(tmp_path: Path, monk
         Ledger(folder).frame()
 
 
-ROW = {name: value for name, value in result(cells(1)[0]).row.items() if name not in ("key", "spec", "status")}
+ROW = {
+    name: value
+    for name, value in result(cells(1)[0]).row.items()
+    if name not in ("key", "spec", "status")
+}
 SPEC = cells(1)[0].spec
 
 
 @each(
     ("column", "change", "reason"),
     [
-        ("row", {"cost": "low"}, "cost must be a number that a cell can measure, got 'low'"),
+        (
+            "row",
+            {"cost": "low"},
+            "cost must be a number that a cell can measure, got 'low'",
+        ),
         ("row", {"cost": float("nan")}, "finite numbers"),
-        ("row", {"trace": {"evaluations": [1, 1], "cost": [2, 1]}}, "trace must be rising evaluations"),
+        (
+            "row",
+            {"trace": {"evaluations": [1, 1], "cost": [2, 1]}},
+            "trace must be rising evaluations",
+        ),
         ("row", {"joint_errors_mm": [0.0] * 26}, "joint_errors_mm must be 27 numbers"),
         ("row", {"warnings": "none"}, "warnings must be"),
         ("row", {"warnings": ["\ud800"]}, "whole characters"),
-        ("row", {"mode_reliability": [[1, -1.0, 0.5]]}, "the probability of mode_reliability must lie in 0 to 1"),
+        (
+            "row",
+            {"mode_reliability": [[1, -1.0, 0.5]]},
+            "the probability of mode_reliability must lie in 0 to 1",
+        ),
         ("spec", {"seed": "0\nEND\nrm -r x"}, "seed must be"),
         ("spec", {"frames": 10**7}, "frames must lie in 1 to 100000"),
         ("spec", {"settings": {"a": {}}}, "settings must be"),
@@ -87,8 +117,11 @@ SPEC = cells(1)[0].spec
         ("spec", {"more": 1}, "got one more: 'more'"),
     ],
 )
-def test_a_row_that_posefit_did_not_write_is_named_with_what_to_do(column, change, reason, tmp_path: Path) -> None:
-    folder, key = filled(tmp_path / "results", 2), cells(1)[0].key
+def test_a_row_that_posefit_did_not_write_is_named_with_what_to_do(
+    column, change, reason, tmp_path: Path
+) -> None:
+    folder = filled(tmp_path / "results", 2)
+    key = cells(1)[0].key
     text = json.dumps({**(ROW if column == "row" else SPEC), **change})
     changed(folder, f"UPDATE cells SET {column} = ? WHERE key = ?", text, key)
     with pytest.raises(ValueError, match=reason) as caught:
@@ -105,22 +138,32 @@ def test_a_row_that_posefit_did_not_write_is_named_with_what_to_do(column, chang
 def test_damaged_joints_are_named(content: bytes, tmp_path: Path) -> None:
     folder = filled(tmp_path / "results", 1)
     changed(folder, "UPDATE cells SET arrays = ?", content)
-    with pytest.raises(ValueError, match=r"\.sqlite: the joints of cell .* must be whole, got damaged ones"):
+    with pytest.raises(
+        ValueError,
+        match=r"\.sqlite: the joints of cell .* must be whole, got damaged ones",
+    ):
         Ledger(folder).joints(cells(1)[0].key)
 
 
-def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(tmp_path: Path) -> None:
+def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(
+    tmp_path: Path,
+) -> None:
     folder = filled(tmp_path / "results", 200)
     path = folder / FILE
     whole = path.read_bytes()
     for content, reason in (
         (b"no database, whatever its name says" * 100, "file is not a database"),
-        (whole[:4096] + b"\0" * (len(whole) - 8192) + whole[-4096:], "malformed|btreeInitPage|never used|invalid page"),
+        (
+            whole[:4096] + b"\0" * (len(whole) - 8192) + whole[-4096:],
+            "malformed|btreeInitPage|never used|invalid page",
+        ),
         (whole[: len(whole) // 2], "malformed|invalid page|not a database"),
     ):
         path.write_bytes(content)
         for read in (lambda: list(Ledger(folder).rows()), lambda: Writer(path)):
-            with pytest.raises(ValueError, match="expected a whole SQLite file, got ") as caught:
+            with pytest.raises(
+                ValueError, match="expected a whole SQLite file, got "
+            ) as caught:
                 read()
             assert str(path) in str(caught.value)
             assert "sqlite3 ledger.sqlite .recover" in str(caught.value)
@@ -128,12 +171,22 @@ def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(tmp_p
 
 
 def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
-    other, short, empty = (tmp_path / f"{name}.sqlite" for name in ("other", "short", "empty"))
+    other, short, empty = (
+        tmp_path / f"{name}.sqlite" for name in ("other", "short", "empty")
+    )
     (mine := tmp_path / "mine.txt").write_text("mine")
     for opened, path, message in (
-        (Ledger, tmp_path / "nowhere", r"expected a ledger, a folder or .sqlite file .*, got none"),
+        (
+            Ledger,
+            tmp_path / "nowhere",
+            r"expected a ledger, a folder or .sqlite file .*, got none",
+        ),
         (Ledger, tmp_path, "got a folder without one"),
-        (Writer, tmp_path / FILE, "expected a new folder or a ledger, got one with mine.txt"),
+        (
+            Writer,
+            tmp_path / FILE,
+            "expected a new folder or a ledger, got one with mine.txt",
+        ),
         (Writer, mine / FILE, "expected a folder for the ledger, got a file"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -147,13 +200,19 @@ def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
     changed(folder, "PRAGMA user_version = 9")
     for path, message in (
         (other, "expected a ledger that posefit sweep wrote, got another SQLite file"),
-        (short, "a whole SQLite file, got a file of 1 byte, too short to be one: take it"),
+        (
+            short,
+            "a whole SQLite file, got a file of 1 byte, too short to be one: take it",
+        ),
         (folder / FILE, "expected a ledger of format 1, got 9"),
     ):
         for opened in (Ledger, Writer):
             with pytest.raises(ValueError, match=message):
                 opened(path)
-    with pytest.raises(ValueError, match="expected a ledger that posefit sweep wrote, got an empty file"):
+    with pytest.raises(
+        ValueError,
+        match="expected a ledger that posefit sweep wrote, got an empty file",
+    ):
         Ledger(empty)
     Writer(empty).close()  # as where a driver was killed at once
 
@@ -169,56 +228,92 @@ with Writer(sys.argv[1]):
 
 def test_a_driver_that_was_killed_holds_nothing(tmp_path: Path) -> None:
     path = tmp_path / "results" / FILE
-    with subprocess.Popen([sys.executable, "-c", HOLD, str(path)], cwd=ROOT, stdout=subprocess.PIPE) as held:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(path)], cwd=ROOT, stdout=subprocess.PIPE
+    ) as held:
         assert held.stdout.readline() == b"open\n"
-        with pytest.raises(ValueError, match=f"got one that process {held.pid} of .* drives; --shard I/N"):
+        with pytest.raises(
+            ValueError,
+            match=f"got one that process {held.pid} of .* drives; --shard I/N",
+        ):
             Writer(path)
         held.send_signal(signal.SIGKILL)
         held.wait()
     Writer(path).close()
 
 
-def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(tmp_path: Path) -> None:
+def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
+    tmp_path: Path,
+) -> None:
     from posefit.sweep.drive import drive
 
     folder = filled(tmp_path / "results", 3)
     with Writer(folder / FILE) as ledger:
         ledger.plan(cells(50))
         pages = ledger._db.execute("PRAGMA page_count").fetchone()[0]
-        ledger._db.execute(f"PRAGMA max_page_count = {pages + 2}")  # SQLite's own "database or disk is full"
-        with pytest.raises(ValueError, match=r"got database or disk is full; \d+ of 50 cells are done and safe"):
+        # SQLite's own "database or disk is full"
+        ledger._db.execute(f"PRAGMA max_page_count = {pages + 2}")
+        with pytest.raises(
+            ValueError,
+            match=r"got database or disk is full; \d+ of 50 cells are done and safe",
+        ):
             drive(ledger, Instant(), print)
     assert 3 <= len(list(Ledger(folder).rows())) < 50
     filled(folder, 50)
 
 
-def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_losses_are_too_many(tmp_path: Path) -> None:
+def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_losses_are_too_many(
+    tmp_path: Path,
+) -> None:
     cell, lost = cells(2)
     with Writer(tmp_path / "results" / FILE) as ledger:
         ledger.plan([cell, lost])
-        outcomes = [ledger.fail(cell.key, "its own", own) for own in (False, True, False, True, False, True)]
+        outcomes = [
+            ledger.fail(cell.key, "its own", own)
+            for own in (False, True, False, True, False, True)
+        ]
         assert outcomes == [False] * 5 + [True]
-        losses = [ledger.fail(lost.key, "killed", is_own_fault=False) for _ in range(LOSSES)]
+        losses = [
+            ledger.fail(lost.key, "killed", is_own_fault=False) for _ in range(LOSSES)
+        ]
         assert losses == [False] * (LOSSES - 1) + [True]
         assert ledger.counts() == {"quarantined": 2}
-        reasons = {row["key"]: row["reasons"] for row in Ledger(tmp_path / "results").quarantined()}
-        assert reasons == {cell.key: ["its own"] * 3, lost.key: ["something outside ended it 50 times", "killed"]}
+        reasons = {
+            row["key"]: row["reasons"]
+            for row in Ledger(tmp_path / "results").quarantined()
+        }
+        assert reasons == {
+            cell.key: ["its own"] * 3,
+            lost.key: ["something outside ended it 50 times", "killed"],
+        }
         assert ledger.release_quarantined() == 2
         assert len(ledger.planned()) == 2
 
 
-def test_what_ran_twice_is_written_once_and_a_cell_that_failed_is_run_last(tmp_path: Path) -> None:
+def test_what_ran_twice_is_written_once_and_a_cell_that_failed_is_run_last(
+    tmp_path: Path,
+) -> None:
     chosen = cells(3)
     with Writer(tmp_path / "results" / FILE) as ledger:
         ledger.plan(chosen)
         ledger.fail(chosen[0].key, "it had to")
-        assert [ledger.cell(place) for place in ledger.planned()] == [chosen[1], chosen[2], chosen[0]]
+        assert [ledger.cell(place) for place in ledger.planned()] == [
+            chosen[1],
+            chosen[2],
+            chosen[0],
+        ]
         other = replace(result(chosen[1]), row={**result(chosen[1]).row, "cost": 9.0})
-        assert [ledger.finish(chosen[1].key, done) for done in (result(chosen[1]), other)] == [True, False]
-    assert [row["cost"] for row in Ledger(tmp_path / "results").rows()] == [result(chosen[1]).row["cost"]]
+        assert [
+            ledger.finish(chosen[1].key, done) for done in (result(chosen[1]), other)
+        ] == [True, False]
+    assert [row["cost"] for row in Ledger(tmp_path / "results").rows()] == [
+        result(chosen[1]).row["cost"]
+    ]
 
 
-def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(tmp_path: Path) -> None:
+def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(
+    tmp_path: Path,
+) -> None:
     folder = tmp_path / "results"
     for k, count in enumerate((3, 5)):
         with Writer(folder / f"ledger-{k + 1}-of-2.sqlite") as ledger:
@@ -226,7 +321,8 @@ def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(tmp_path: 
             for cell in chosen[:count]:
                 ledger.finish(cell.key, result(cell))
             ledger.fail(chosen[5].key, "it had to")
-    one, several = Ledger(folder), Ledger(folder / "ledger-1-of-2.sqlite", folder)
+    one = Ledger(folder)
+    several = Ledger(folder / "ledger-1-of-2.sqlite", folder)
     for merged in (one, several):
         assert len(merged) == 5
         assert sorted(row["spec"]["seed"] for row in merged.rows()) == [0, 1, 2, 3, 4]
@@ -234,34 +330,53 @@ def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(tmp_path: 
 
 
 def test_a_name_changes_no_key_and_the_latest_plans_name_counts(tmp_path: Path) -> None:
-    folder, cell = filled(tmp_path / "results", 1), cells(1)[0]
+    folder = filled(tmp_path / "results", 1)
+    cell = cells(1)[0]
     with Writer(folder / FILE) as ledger:
         ledger.plan([replace(cell, name="cold")])
         assert ledger.counts() == {"done": 1}
     assert [row["spec"]["name"] for row in Ledger(folder).rows()] == ["cold"]
 
 
-def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(tmp_path: Path) -> None:
+def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(
+    tmp_path: Path,
+) -> None:
     folder = tmp_path / "results"
-    fake.swept(folder, [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)], Instant())
+    fake.swept(
+        folder,
+        [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)],
+        Instant(),
+    )
     assert Ledger(folder).version == "0.0.9 a1"
     messages: list[str] = []
     assert swept(cells(3), folder, Instant(), messages.append).ran == 3
-    assert messages == [f"2 rows in {folder} are of another version, posefit 0.0.9 a1, and do not count here"]
+    assert messages == [
+        f"2 rows in {folder} are of another version, posefit 0.0.9 a1, and do not count here"
+    ]
     ledger = Ledger(folder)
     assert len(ledger) == 5
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
 
 
-def test_a_version_is_another_one_where_any_part_of_it_is_not_the_installed_one() -> None:
+def test_a_version_is_another_one_where_any_part_of_it_is_not_the_installed_one() -> (
+    None
+):
     swarm = registry().offer("optimiser", "sapso").origin
-    versions = [f"{posefit_build()}, {swarm}", f"{posefit_build()}, posefit_swarm 0ld", f"posefit 0.0.9 a1, {swarm}"]
-    versions += [f"{posefit_build()}, posefit_elsewhere 1.0"]  # a plugin that is not installed here
-    assert [v for v in versions if any(map(other_version, v.split(", ")))] == versions[1:3]
+    versions = [
+        f"{posefit_build()}, {swarm}",
+        f"{posefit_build()}, posefit_swarm 0ld",
+        f"posefit 0.0.9 a1, {swarm}",
+    ]
+    # a plugin that is not installed here
+    versions += [f"{posefit_build()}, posefit_elsewhere 1.0"]
+    assert [v for v in versions if any(map(other_version, v.split(", ")))] == versions[
+        1:3
+    ]
 
 
 def test_a_ledger_is_read_while_its_driver_writes(tmp_path: Path) -> None:
-    path, chosen = tmp_path / "results" / FILE, cells(4)
+    path = tmp_path / "results" / FILE
+    chosen = cells(4)
     with Writer(path) as ledger:
         ledger.plan(chosen)
         ledger.finish(chosen[0].key, result(chosen[0]))

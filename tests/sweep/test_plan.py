@@ -30,7 +30,13 @@ from tests.cases import each
 from tests.effort import effort
 from tests.testing.planted import Holds
 
-SMALL = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
+SMALL = {
+    "method": "random@pca",
+    "motion": "walk",
+    "frames": 2,
+    "size": [80, 60],
+    "evaluations": 80,
+}
 PRODUCT: dict[str, Any] = {"methods": ["sapso@pca"], "motions": ["walk"]}
 COLD = {"method": "sapso@pca", "name": "cold", "settings": {"sapso.cooling": 0.8}}
 
@@ -40,16 +46,28 @@ def planned(**tables: Any) -> Plan:
 
 
 def test_methods_change_soonest_so_that_a_sweep_under_way_compares_them() -> None:
-    plan = planned(product={"methods": ["random@pca", "pso@pca"], "motions": ["walk", "run"], "seeds": 2})
+    plan = planned(
+        product={
+            "methods": ["random@pca", "pso@pca"],
+            "motions": ["walk", "run"],
+            "seeds": 2,
+        }
+    )
     assert [(cell.method, cell.motion, cell.seed) for cell in plan] == [
-        (method, motion, seed) for motion in ("walk", "run") for seed in (0, 1) for method in ("random@pca", "pso@pca")
+        (method, motion, seed)
+        for motion in ("walk", "run")
+        for seed in (0, 1)
+        for method in ("random@pca", "pso@pca")
     ]
 
 
 def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
     shared = {"sapso": {"cooling": 0.9}, "tracker.floor": 0.1}
     own = {"method": "sapso@pca", "settings": {"sapso": {"cooling": 0.8}}}
-    plan = planned(defaults={"settings": shared}, product={**PRODUCT, "methods": ["sapso@pca", "cma@pca", own]})
+    plan = planned(
+        defaults={"settings": shared},
+        product={**PRODUCT, "methods": ["sapso@pca", "cma@pca", own]},
+    )
     assert [dict(cell.settings) for cell in plan] == [
         {"sapso.cooling": 0.9, "tracker.floor": 0.1},
         {"tracker.floor": 0.1},
@@ -57,18 +75,41 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
     ]
 
 
-def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant_has_a_name() -> None:
+def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant_has_a_name() -> (
+    None
+):
     product = {**PRODUCT, "methods": [COLD, "cma@pca", "random@full"]}
-    plan = planned(grid={"sapso.inertia": [0.7, 0.9], "pca.components": [4, 5]}, product=product)
+    plan = planned(
+        grid={"sapso.inertia": [0.7, 0.9], "pca.components": [4, 5]}, product=product
+    )
     sets = [(i, c) for i in (0.7, 0.9) for c in (4, 5)]
     assert [(cell.name, cell.method, dict(cell.settings)) for cell in plan] == [
-        *(("cold", "sapso@pca", {"pca.components": c, "sapso.cooling": 0.8, "sapso.inertia": i}) for i, c in sets),
+        *(
+            (
+                "cold",
+                "sapso@pca",
+                {"pca.components": c, "sapso.cooling": 0.8, "sapso.inertia": i},
+            )
+            for i, c in sets
+        ),
         *(("", "cma@pca", {"pca.components": c}) for c in (4, 5)),
         ("", "random@full", {}),
     ]
-    suite = {"suite": SUITE, "methods": ["cma", "sapso"], "functions": [1], "instances": 1}
-    searches = [(cell.method, cell.settings) for cell in Plan.of({**suite, "grid": {"sapso.inertia": [0.7, 0.9]}})]
-    assert searches == [("cma", {}), ("sapso", {"inertia": 0.7}), ("sapso", {"inertia": 0.9})]
+    suite = {
+        "suite": SUITE,
+        "methods": ["cma", "sapso"],
+        "functions": [1],
+        "instances": 1,
+    }
+    searches = [
+        (cell.method, cell.settings)
+        for cell in Plan.of({**suite, "grid": {"sapso.inertia": [0.7, 0.9]}})
+    ]
+    assert searches == [
+        ("cma", {}),
+        ("sapso", {"inertia": 0.7}),
+        ("sapso", {"inertia": 0.9}),
+    ]
 
 
 @each(
@@ -122,7 +163,11 @@ def test_mistakes_are_named(tables: dict[str, Any], message: str) -> None:
 def test_a_file_that_is_no_plan_is_named(tmp_path: Path) -> None:
     path = tmp_path / "plan.toml"
     for place, content, message in (
-        (Path("nowhere.toml"), None, r"nowhere.toml: expected a plan \(.toml\) or default, got no file of that name"),
+        (
+            Path("nowhere.toml"),
+            None,
+            r"nowhere.toml: expected a plan \(.toml\) or default, got no file of that name",
+        ),
         (tmp_path, None, "expected a plan .* got a folder"),
         (path, b"[product\n", r"plan.toml: .*line 1"),
         (path, b"\xff", "expected a plan in TOML"),
@@ -133,21 +178,41 @@ def test_a_file_that_is_no_plan_is_named(tmp_path: Path) -> None:
             Plan.read(place)
 
 
-def test_a_cells_version_has_digests_of_posefit_and_of_its_methods_plugins_and_no_others() -> None:
-    sapso, cma = (cell_of({"method": name, "motion": "walk"}).version.split(", ") for name in ("sapso@pca", "cma@full"))
+def test_a_cells_version_has_digests_of_posefit_and_of_its_methods_plugins_and_no_others() -> (
+    None
+):
+    sapso, cma = (
+        cell_of({"method": name, "motion": "walk"}).version.split(", ")
+        for name in ("sapso@pca", "cma@full")
+    )
     assert sapso[0] == cma[0] == posefit_build()
-    assert [part.partition(" ")[0] for part in sapso[1:]] == ["posefit_priors", "posefit_swarm"]
-    assert [part.partition(" ")[0] for part in cma[1:]] == ["posefit_priors"]  # cma is a part of posefit
-    assert all(re.fullmatch(r"\w+ [0-9a-f]{8}", part) for part in (*sapso[1:], *cma[1:]))
+    assert [part.partition(" ")[0] for part in sapso[1:]] == [
+        "posefit_priors",
+        "posefit_swarm",
+    ]
+    # cma is a part of posefit
+    assert [part.partition(" ")[0] for part in cma[1:]] == ["posefit_priors"]
+    assert all(
+        re.fullmatch(r"\w+ [0-9a-f]{8}", part) for part in (*sapso[1:], *cma[1:])
+    )
 
 
-def test_a_digest_changes_with_every_file_that_results_depend_on(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_digest_changes_with_every_file_that_results_depend_on(
+    tmp_path: Path, monkeypatch: Any
+) -> None:
     package = tmp_path / "package"
     (package / "report").mkdir(parents=True)
     (package / "__init__.py").write_text("")
-    monkeypatch.setitem(sys.modules, "package", SimpleNamespace(__file__=str(package / "__init__.py")))
+    monkeypatch.setitem(
+        sys.modules, "package", SimpleNamespace(__file__=str(package / "__init__.py"))
+    )
     digests = [source_digest.__wrapped__("package", ("report",))]
-    for name, counts in (("search.py", True), ("model.npz", True), ("notes.txt", False), ("report/page.py", False)):
+    for name, counts in (
+        ("search.py", True),
+        ("model.npz", True),
+        ("notes.txt", False),
+        ("report/page.py", False),
+    ):
         (package / name).write_text("1")
         digests.append(source_digest.__wrapped__("package", ("report",)))
         assert (digests[-1] != digests[-2]) == counts, name
@@ -156,7 +221,9 @@ def test_a_digest_changes_with_every_file_that_results_depend_on(tmp_path: Path,
 def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -> None:
     def observed(**spec: Any) -> tuple[bytes, bytes]:
         scene = cell_scene(cell_of({**SMALL, "frames": 4, **spec}))
-        return scene.truth.poses.tobytes(), scene.observations[2].silhouettes[0].mask.tobytes()
+        return scene.truth.poses.tobytes(), scene.observations[2].silhouettes[
+            0
+        ].mask.tobytes()
 
     assert observed(instance=0)[0] == built_in.motion("walk", frames=4).poses.tobytes()
     assert observed(instance=1) == observed(instance=1, method="cma@full", seed=5)
@@ -173,8 +240,12 @@ def test_a_share_of_the_frames_is_dropped() -> None:
     assert 15 <= usable.count(False) <= 45  # of 60
 
 
-def test_a_file_that_changed_after_it_was_planned_is_not_followed(tmp_path: Path) -> None:
-    motion, asf, amc = built_in.motion("walk-b", frames=12), tmp_path / "one.asf", tmp_path / "one.amc"
+def test_a_file_that_changed_after_it_was_planned_is_not_followed(
+    tmp_path: Path,
+) -> None:
+    motion = built_in.motion("walk-b", frames=12)
+    asf = tmp_path / "one.asf"
+    amc = tmp_path / "one.amc"
     write_asf(asf, motion.skeleton)
     write_amc(amc, motion)
     spec = {**SMALL, "motion": str(amc), "frames": 1, "fps": 120}
@@ -188,14 +259,21 @@ def test_a_file_that_changed_after_it_was_planned_is_not_followed(tmp_path: Path
         run_cell(cell)
 
 
-def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_evaluations() -> None:
+def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_evaluations() -> (
+    None
+):
     def frame(costs: list[float], step: int) -> Frame:
         trace = np.column_stack([step * np.arange(1, len(costs) + 1), costs])
-        return Frame(np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), step * len(costs), trace)
+        return Frame(
+            np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), step * len(costs), trace
+        )
 
     # by hand: after 20 evaluations the frames have 6 and 9, after 30: 4 and 9, after 40: 4 and 1
     frames = [frame([8.0, 6.0, 4.0], 10), frame([9.0, 1.0], 20), frame([], 1)]
-    assert anytime_trace(frames) == {"evaluations": [20, 30, 40], "cost": [7.5, 6.5, 2.5]}
+    assert anytime_trace(frames) == {
+        "evaluations": [20, 30, 40],
+        "cost": [7.5, 6.5, 2.5],
+    }
     assert anytime_trace([frame([], 1)]) == {"evaluations": [], "cost": []}
     long = anytime_trace([frame(list(range(500, 0, -1)), 1)])
     assert len(long["cost"]) <= 64
@@ -206,35 +284,59 @@ def test_a_worker_of_another_version_does_not_run_a_cell() -> None:
     installed = f"posefit {posefit.__version__} "
     for version, message in (
         ("posefit 0.0.9 a1", f"a worker must have posefit 0.0.9 a1, got {installed}"),
-        (f"{posefit_build()}, posefit_swarm 00000000", "must have posefit_swarm 00000000, got posefit_swarm "),
+        (
+            f"{posefit_build()}, posefit_swarm 00000000",
+            "must have posefit_swarm 00000000, got posefit_swarm ",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             run_cell(TrackCell("random@pca", "walk", ("walk-a",), version=version))
 
 
-def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(monkeypatch: Any) -> None:
+def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(
+    monkeypatch: Any,
+) -> None:
     offer = Offer("tracker", "hold+still", Holds, "posefit-hold", "2.5")
-    installed = Registry((Plugin("hold", "posefit-hold", "2.5", "loaded", offers=(offer,)),))
+    installed = Registry(
+        (Plugin("hold", "posefit-hold", "2.5", "loaded", offers=(offer,)),)
+    )
     for module in (check, method):
         monkeypatch.setattr(module, "registry", lambda: installed)
-    cell = cell_of({"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]})
-    assert cell.version == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
+    cell = cell_of(
+        {"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]}
+    )
+    assert (
+        cell.version
+        == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
+    )
     row = run_cell(cell).row
-    assert (row["prior_floor_degrees"], row["trace"]) == (None, {"evaluations": [], "cost": []})  # it does not search
+    # it does not search
+    assert (row["prior_floor_degrees"], row["trace"]) == (
+        None,
+        {"evaluations": [], "cost": []},
+    )
 
 
 PLAIN = '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\n'
 
 
-def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(tmp_path: Path) -> None:
+def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "plan.toml"
     path.write_bytes(b"\xef\xbb\xbf" + PLAIN.encode())
     assert len(Plan.read(path)) == 1
     for line, message in (
         (f"view_degrees = {10**400}", "view_degrees must be a finite number, got 1000"),
-        ("view_degrees = 999999999999999999999", "view_degrees must lie in -360 to 360 degrees, got 9999"),
+        (
+            "view_degrees = 999999999999999999999",
+            "view_degrees must lie in -360 to 360 degrees, got 9999",
+        ),
         ("frames = 100001", "frames must lie in 1 to 100000, got 100001"),
-        (f"seed = 0x{'f' * 9000}", "seed must be a whole number of at least 0, got one int that is too long"),
+        (
+            f"seed = 0x{'f' * 9000}",
+            "seed must be a whole number of at least 0, got one int that is too long",
+        ),
         ("fps = 1e-320", "fps must lie in 0.001 to 1e[+]06, got 1e-320"),
         (f'"{"n" * 300}" = 1', "got 'n{76}[.]{3}$"),
         ("train = " + "[" * 9000, "not nested so deeply"),
@@ -246,22 +348,36 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(t
 
 def test_a_plan_on_standard_input_is_read_whole_or_refused(monkeypatch: Any) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO(PLAIN + "#" * 1_000_000))
-    with pytest.raises(ValueError, match="-: expected a plan of at most 1,000,000 characters, got more"):
+    with pytest.raises(
+        ValueError, match="-: expected a plan of at most 1,000,000 characters, got more"
+    ):
         Plan.read("-")
     monkeypatch.setattr("sys.stdin", io.StringIO(PLAIN))
     assert len(Plan.read("-")) == 1
 
 
 def tracks(seeds: int) -> Plan:
-    return Plan.of({"product": {"methods": ["random@pca"], "motions": ["walk"], "seeds": seeds}})
+    return Plan.of(
+        {"product": {"methods": ["random@pca"], "motions": ["walk"], "seeds": seeds}}
+    )
 
 
 def searches(seeds: int) -> Plan:
-    return Plan.of({"suite": SUITE, "methods": ["random"], "functions": [1], "instances": 1, "seeds": seeds})
+    return Plan.of(
+        {
+            "suite": SUITE,
+            "methods": ["random"],
+            "functions": [1],
+            "instances": 1,
+            "seeds": seeds,
+        }
+    )
 
 
 @each("of", [tracks, searches])
-def test_a_large_plan_is_held_in_a_few_bytes_a_cell_and_no_signature_is_read_a_cell(of: Callable[[int], Plan]) -> None:
+def test_a_large_plan_is_held_in_a_few_bytes_a_cell_and_no_signature_is_read_a_cell(
+    of: Callable[[int], Plan],
+) -> None:
     of(10)
     calls = [effort(lambda seeds=seeds: of(seeds)).calls for seeds in (200, 400)]  # type: ignore[misc]
     assert (calls[1] - calls[0]) / 200 < 1000  # of Python and of C, a cell

@@ -26,9 +26,12 @@ from posefit.sweep.pool import Pool
 from tests.sweep import fake
 from tests.sweep.fake import behave, cells, swept
 
-TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
-LIMITS = Limits(seconds=300.0, gigabytes=0.6)  # a slow machine takes seconds to start a worker
-CONNECT_TIMEOUT_SECONDS = 300.0  # seconds for workers to come; these tests mean something else
+# the figures that two runs of a cell differ by
+TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
+# a slow machine takes seconds to start a worker
+LIMITS = Limits(seconds=300.0, gigabytes=0.6)
+# seconds for workers to come; these tests mean something else
+CONNECT_TIMEOUT_SECONDS = 300.0
 ROOT = Path(__file__).parents[2]
 Make = Callable[..., Engine]
 
@@ -40,10 +43,17 @@ def make(request: pytest.FixtureRequest) -> Iterator[Make]:
         yield lambda workers, limits=LIMITS: Pool(workers, limits, behave)
         return
     with ExitStack() as served:
-        yield lambda workers, limits=LIMITS: cluster(served.enter_context(scheduler(workers)), limits)
+        yield lambda workers, limits=LIMITS: cluster(
+            served.enter_context(scheduler(workers)), limits
+        )
 
 
-def cluster(address: str, limits: Limits, run: Any = behave, patience: float = CONNECT_TIMEOUT_SECONDS) -> Engine:
+def cluster(
+    address: str,
+    limits: Limits,
+    run: Any = behave,
+    patience: float = CONNECT_TIMEOUT_SECONDS,
+) -> Engine:
     """Return Dask as an engine, or skip the test where it is not installed."""
     pytest.importorskip("distributed")
     from posefit.sweep.cluster import Cluster
@@ -55,14 +65,43 @@ def cluster(address: str, limits: Limits, run: Any = behave, patience: float = C
 def scheduler(workers: int) -> Iterator[str]:
     """Yield the address of a Dask scheduler with so many workers of one thread, or skip the test."""
     pytest.importorskip("distributed")
-    address, started = f"tcp://127.0.0.1:{(place := port())}", []
-    words = [["dask_scheduler", "--port", str(place), "--host", "127.0.0.1", "--no-dashboard", "--no-show"]]
-    words += [["dask_worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "300"]] * workers
+    address = f"tcp://127.0.0.1:{(place := port())}"
+    started = []
+    words = [
+        [
+            "dask_scheduler",
+            "--port",
+            str(place),
+            "--host",
+            "127.0.0.1",
+            "--no-dashboard",
+            "--no-show",
+        ]
+    ]
+    words += [
+        [
+            "dask_worker",
+            address,
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+            "--death-timeout",
+            "300",
+        ]
+    ] * workers
     try:
         for name, *more in words:
             command = [sys.executable, "-m", f"distributed.cli.{name}", *more]
             quiet = subprocess.DEVNULL
-            started.append(subprocess.Popen(command, stdout=quiet, stderr=quiet, cwd=ROOT, start_new_session=True))
+            started.append(
+                subprocess.Popen(
+                    command,
+                    stdout=quiet,
+                    stderr=quiet,
+                    cwd=ROOT,
+                    start_new_session=True,
+                )
+            )
         yield address
     finally:
         for process in started:
@@ -89,19 +128,28 @@ def one_by_one(engine: Engine, chosen: Sequence[TrackCell]) -> list[Outcome]:
     return outcomes
 
 
-def test_exceptions_exits_and_limits_of_memory_and_time_are_the_cells_own_faults(make: Make) -> None:
+def test_exceptions_exits_and_limits_of_memory_and_time_are_the_cells_own_faults(
+    make: Make,
+) -> None:
     reasons = {
         fake.RAISE: "ZeroDivisionError: one by none",
         fake.EXIT: "SystemExit: 0",
         fake.HOG: "it wanted more memory than its limit of 0.6 GB",
     }
     ended = one_by_one(make(1), [replace(cells(1)[0], frames=n) for n in reasons])
-    ended += one_by_one(make(1, Limits(5.0, 0.6)), [replace(cells(1)[0], frames=fake.ENDLESS)])
-    assert [outcome.reason for outcome in ended] == [*reasons.values(), "it ran past its limit of 5 s"]
+    ended += one_by_one(
+        make(1, Limits(5.0, 0.6)), [replace(cells(1)[0], frames=fake.ENDLESS)]
+    )
+    assert [outcome.reason for outcome in ended] == [
+        *reasons.values(),
+        "it ran past its limit of 5 s",
+    ]
     assert all(outcome.is_own_fault for outcome in ended)
 
 
-def test_a_process_that_ends_itself_or_dies_is_noticed_at_once_and_a_kill_costs_no_attempt(make: Make) -> None:
+def test_a_process_that_ends_itself_or_dies_is_noticed_at_once_and_a_kill_costs_no_attempt(
+    make: Make,
+) -> None:
     bad = [replace(cells(1)[0], frames=n) for n in (fake.LEAVE, fake.SEGFAULT)]
     ended = one_by_one(make(1, Limits(3600.0, 0.6)), [*bad, *cells(2, fake.KILLED)])
     assert [(outcome.reason, outcome.is_own_fault) for outcome in ended] == [
@@ -112,17 +160,25 @@ def test_a_process_that_ends_itself_or_dies_is_noticed_at_once_and_a_kill_costs_
     ]
 
 
-def test_a_bad_cell_is_quarantined_after_three_attempts_and_tried_again_where_that_is_asked(tmp_path: Path) -> None:
-    bad, folder = cells(1, fake.RAISE), tmp_path / "results"
+def test_a_bad_cell_is_quarantined_after_three_attempts_and_tried_again_where_that_is_asked(
+    tmp_path: Path,
+) -> None:
+    bad = cells(1, fake.RAISE)
+    folder = tmp_path / "results"
     tally = swept(folder, [*bad, *cells(3)], Pool(1, LIMITS, behave))
     assert (tally.done, tally.quarantined, tally.failed) == (3, 1, ATTEMPTS)
-    assert Ledger(folder).quarantined()[0]["reasons"] == ["ZeroDivisionError: one by none"] * 3
+    assert (
+        Ledger(folder).quarantined()[0]["reasons"]
+        == ["ZeroDivisionError: one by none"] * 3
+    )
     assert swept(folder, bad, Pool(1, LIMITS, behave)).failed == 0
     again = sweep(bad, folder, Pool(1, LIMITS, behave), print, retry_quarantined=True)  # type: ignore[arg-type]
     assert again.failed == 3
 
 
-def test_two_workers_run_two_cells_at_once(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_workers_run_two_cells_at_once(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # each of the two ends once both have begun
     monkeypatch.setenv(fake.STARTS, str(tmp_path / "starts"))
     tally = swept(tmp_path / "results", cells(2, fake.TOGETHER), make(2))
@@ -130,7 +186,9 @@ def test_two_workers_run_two_cells_at_once(make: Make, tmp_path: Path, monkeypat
     assert len({worker for _, worker in fake.starts(tmp_path / "starts")}) == 2
 
 
-def test_where_numba_is_loaded_already_a_worker_leaves_its_number_of_threads_alone() -> None:
+def test_where_numba_is_loaded_already_a_worker_leaves_its_number_of_threads_alone() -> (
+    None
+):
     code = """
 import os
 os.environ["NUMBA_NUM_THREADS"] = "2"
@@ -158,7 +216,13 @@ def test_a_script_may_compare_without_a_guard(tmp_path: Path) -> None:
         "    seeds=1, frames=1, size=(80, 60), evaluations=2, workers=1)\n"
         "print(result.tally.done, [row['spec']['method'] for row in result.ledger.rows()])\n"
     )
-    done = subprocess.run([sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.stdout == "2 ['Middle@pca', 'Middle@pca']\n", done.stderr
 
 
@@ -170,32 +234,62 @@ PRODUCT = {
 
 def test_a_pool_gives_the_rows_of_this_process_bit_for_bit(tmp_path: Path) -> None:
     methods = ("random", "sapso")
-    searches = [SearchCell(name, SUITE, 1, 9, 10_000, 100, seed=seed) for name in methods for seed in (0, 1)]
+    searches = [
+        SearchCell(name, SUITE, 1, 9, 10_000, 100, seed=seed)
+        for name in methods
+        for seed in (0, 1)
+    ]
     assert swept(tmp_path, searches, Pool(2, Limits(), run_cell)).done == len(searches)
     rows = {row["key"]: row for row in Ledger(tmp_path).rows()}
-    assert len({json.dumps(row["trace"]) for row in rows.values()}) == len(searches)  # no two are the same search
+    # no two are the same search
+    assert len({json.dumps(row["trace"]) for row in rows.values()}) == len(searches)
     for search in searches:
         expected = json.loads(json.dumps(run_cell(search).row))
         same = [name for name in expected if name not in TIMES]
-        assert [rows[search.key][name] for name in same] == [expected[name] for name in same]
+        assert [rows[search.key][name] for name in same] == [
+            expected[name] for name in same
+        ]
 
 
 @pytest.mark.slow
-def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(tmp_path: Path) -> None:
-    plan = Plan.of({"defaults": {"frames": 3, "size": [80, 60], "evaluations": 200, "instance": 1}, "product": PRODUCT})
+def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(
+    tmp_path: Path,
+) -> None:
+    plan = Plan.of(
+        {
+            "defaults": {
+                "frames": 3,
+                "size": [80, 60],
+                "evaluations": 200,
+                "instance": 1,
+            },
+            "product": PRODUCT,
+        }
+    )
 
     def rows_in(folder: Path) -> Any:
         ledger = Ledger(folder)
-        rows = {row["key"]: {name: row[name] for name in row if name not in TIMES} for row in ledger.rows()}
-        return rows, {key: {k: v.tobytes() for k, v in ledger.joints(key).items()} for key in rows}
+        rows = {
+            row["key"]: {name: row[name] for name in row if name not in TIMES}
+            for row in ledger.rows()
+        }
+        return rows, {
+            key: {k: v.tobytes() for k, v in ledger.joints(key).items()} for key in rows
+        }
 
-    assert sweep(plan, tmp_path / "one", Pool(2, Limits(), run_cell), print).done == len(plan)
+    assert sweep(
+        plan, tmp_path / "one", Pool(2, Limits(), run_cell), print
+    ).done == len(plan)
     for shard in ("2/3", "1/3", "3/3"):
-        sweep(plan, tmp_path / "shards", Pool(1, Limits(), run_cell), print, shard=shard)
+        sweep(
+            plan, tmp_path / "shards", Pool(1, Limits(), run_cell), print, shard=shard
+        )
     names = sorted(path.name for path in (tmp_path / "shards").glob("*.sqlite"))
     assert names == [f"ledger-{k}-of-3.sqlite" for k in (1, 2, 3)]
     with scheduler(2) as address:
-        assert swept(tmp_path / "dask", list(plan)[::-1], cluster(address, Limits(), run_cell)).done == len(plan)
+        assert swept(
+            tmp_path / "dask", list(plan)[::-1], cluster(address, Limits(), run_cell)
+        ).done == len(plan)
     first = rows_in(tmp_path / "one")
     assert len(first[0]) == len(plan)
     assert rows_in(tmp_path / "shards") == rows_in(tmp_path / "dask") == first
@@ -203,12 +297,17 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(tmp_
 
 def test_a_scheduler_that_is_not_there_is_named() -> None:
     address = f"tcp://127.0.0.1:{port()}"
-    with pytest.raises(InputError, match=f"scheduler must be one with workers that answers, got {address}"):
+    with pytest.raises(
+        InputError,
+        match=f"scheduler must be one with workers that answers, got {address}",
+    ):
         cluster(address, LIMITS, patience=1.0)
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on(tmp_path: Path) -> None:
+def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on(
+    tmp_path: Path,
+) -> None:
     with ExitStack() as served, Writer(tmp_path / "results" / FILE) as ledger:
         engine = cluster(served.enter_context(scheduler(1)), LIMITS)
 
@@ -217,6 +316,9 @@ def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on
                 served.close()
 
         ledger.plan(cells(10))
-        with pytest.raises(ValueError, match=r"127.*went away; \d+ of 10 cells are done and safe: the same command"):
+        with pytest.raises(
+            ValueError,
+            match=r"127.*went away; \d+ of 10 cells are done and safe: the same command",
+        ):
             drive(ledger, engine, print, watch)
     assert swept(tmp_path / "results", cells(10), Pool(2, LIMITS, behave)).done == 10

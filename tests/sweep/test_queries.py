@@ -11,7 +11,9 @@ import pytest
 from tests.report.browser import ledger, result
 from tests.sweep.fake import cells
 
-PAGE = (Path(__file__).parents[2] / "docs" / "howto" / "report.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "howto" / "report.md").read_text(
+    encoding="utf-8"
+)
 FIRST = cells(1)[0]
 
 
@@ -30,24 +32,35 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def block(word: str) -> str:
     """Return the block of code that has a word."""
-    (found,) = [code for code in re.findall(r"```(?:python|sh)\n(.*?)```", PAGE, re.DOTALL) if word in code]
+    (found,) = [
+        code
+        for code in re.findall(r"```(?:python|sh)\n(.*?)```", PAGE, re.DOTALL)
+        if word in code
+    ]
     return str(found)
 
 
 def test_sqlite3_says_which_method_has_the_lowest_error(folder: Path) -> None:
     ((file, query),) = re.findall(r'^sqlite3 (\S+) "(.*)"\n$', block("sqlite3 results"))
     with closing(sqlite3.connect(file)) as database:
-        assert database.execute(query).fetchall() == [("sapso@pca", "", 2, 1.5), ("cma@pca", "", 2, 2.5)]
+        assert database.execute(query).fetchall() == [
+            ("sapso@pca", "", 2, 1.5),
+            ("cma@pca", "", 2, 2.5),
+        ]
 
 
-def test_pandas_says_which_settings_are_best(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pandas_says_which_settings_are_best(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("pandas")
     exec(block("pandas"), {})
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[-1] for line in lines if "{}" in line] == ["1.5", "2.5"]
 
 
-def test_duckdb_says_which_cells_failed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_duckdb_says_which_cells_failed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     duckdb = pytest.importorskip("duckdb")
     try:
         duckdb.sql("INSTALL sqlite; LOAD sqlite")

@@ -26,18 +26,32 @@ class Planted:
     ends: ClassVar[str]
 
     def __init_subclass__(cls, breaks: str = "", ends: str = "") -> None:
-        cls.breaks, cls.ends = tuple(breaks.split()), ends
+        cls.breaks = tuple(breaks.split())
+        cls.ends = ends
 
 
 class Sound(Planted):
     """Shrinks a cloud around the best point; nothing is wrong with it, and the others each spoil one thing."""
 
-    def __init__(self, space: SearchSpace, rng: Rng, *, population_size: int = 40, shrink: float = 0.9) -> None:
+    def __init__(
+        self,
+        space: SearchSpace,
+        rng: Rng,
+        *,
+        population_size: int = 40,
+        shrink: float = 0.9,
+    ) -> None:
         if population_size < 1:
-            raise ValueError(f"population_size must be at least 1, got {population_size}")
-        self.space, self.rng, self.shrink = space, rng, shrink
+            raise ValueError(
+                f"population_size must be at least 1, got {population_size}"
+            )
+        self.space = space
+        self.rng = rng
+        self.shrink = shrink
         self.population = draw_population(space, rng, population_size)
-        self.best, self.cost, self.width = self.population[0].copy(), np.inf, 0.5
+        self.best = self.population[0].copy()
+        self.cost = np.inf
+        self.width = 0.5
 
     def ask(self) -> Array:
         return self.population.copy()
@@ -48,7 +62,9 @@ class Sound(Planted):
             self.best, self.cost = proposals[costs.argmin()].copy(), float(costs.min())
         self.width *= self.shrink
         spread = np.full(self.space.dimensions, self.width)
-        self.population = sample_normal(self.space, self.rng, np.tile(self.best, (len(self.population), 1)), spread)
+        self.population = sample_normal(
+            self.space, self.rng, np.tile(self.best, (len(self.population), 1)), spread
+        )
 
 
 class SwallowsSettings(Sound, breaks="construction unknown_setting"):
@@ -69,13 +85,17 @@ class AsksFloat32(Sound, breaks="dtype"):
 class LeavesTheBox(Sound, breaks="box"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, costs)
-        self.population = self.best + 0.6 * self.rng.standard_normal(self.population.shape)
+        self.population = self.best + 0.6 * self.rng.standard_normal(
+            self.population.shape
+        )
 
 
 class ForgetsFeasible(Sound, breaks="feasible"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, costs)
-        self.population = np.clip(self.best + 0.3 * self.rng.standard_normal(self.population.shape), -1.0, 1.0)
+        self.population = np.clip(
+            self.best + 0.3 * self.rng.standard_normal(self.population.shape), -1.0, 1.0
+        )
 
 
 class WaitsForFeasible(Sound, breaks="hardly_feasible"):
@@ -109,7 +129,12 @@ class DrawsInSecret(Sound, breaks="evaluations"):
         super().tell(proposals, costs)
         if isinstance(self.space, SearchSpace):
             poses, places = self.space.decode(proposals)
-            project(Body.of(built_in.average_skeleton()), Camera.around(places[0], 0.0, 3.0), poses[0], places[0])
+            project(
+                Body.of(built_in.average_skeleton()),
+                Camera.around(places[0], 0.0, 3.0),
+                poses[0],
+                places[0],
+            )
 
 
 class HasUntypedSettings(Sound, breaks="construction"):
@@ -193,7 +218,9 @@ class NeverReturns(Sound, ends="it must end within 1 s, and did not"):
                 continue
 
 
-class FillsTheMemory(Sound, ends="it must not fail, got MemoryError: Unable to allocate"):
+class FillsTheMemory(
+    Sound, ends="it must not fail, got MemoryError: Unable to allocate"
+):
     def tell(self, proposals: Array, costs: Array) -> None:
         self.hoard = np.ones((10**11,))
 
@@ -201,7 +228,9 @@ class FillsTheMemory(Sound, ends="it must not fail, got MemoryError: Unable to a
 class FewDimensionsOnly(Sound, breaks="dimensions"):
     def __init__(self, space: SearchSpace, rng: Rng) -> None:
         super().__init__(space, rng)
-        self.corners = np.zeros((9, 9))[: space.dimensions, : space.dimensions] + np.eye(space.dimensions)
+        self.corners = np.zeros((9, 9))[
+            : space.dimensions, : space.dimensions
+        ] + np.eye(space.dimensions)
 
 
 class UsesGlobalNumpy(Sound, breaks="global_randomness"):
@@ -226,7 +255,9 @@ class HashesNames(Sound, breaks="new_process"):
     def __init__(self, space: SearchSpace, rng: Rng) -> None:
         shuffled = abs(hash("posefit"))
         super().__init__(space, np.random.default_rng(shuffled))
-        self.population = draw_population(space, np.random.default_rng([shuffled, int(rng.integers(9**9))]), 40)
+        self.population = draw_population(
+            space, np.random.default_rng([shuffled, int(rng.integers(9**9))]), 40
+        )
 
 
 class SortsInPlace(Sound, breaks="inputs"):
@@ -273,7 +304,9 @@ class Slow(Sound, breaks="speed"):
 
 
 class HangsOnNonsense(Sound, breaks="nonsense_settings"):
-    def __init__(self, space: SearchSpace, rng: Rng, *, population_size: int = 40, tries: int = 5) -> None:
+    def __init__(
+        self, space: SearchSpace, rng: Rng, *, population_size: int = 40, tries: int = 5
+    ) -> None:
         super().__init__(space, rng, population_size=population_size)
         while tries != 0:
             tries -= 1
@@ -303,7 +336,8 @@ class ShiftsWithTheCompany(Learned, breaks="same_bits"):
 class NarrowRange(Learned, breaks="training_in_range"):
     def fit(self, angles: Array, skeleton: Any = None) -> Any:
         super().fit(angles)
-        self.low, self.high = 0.5 * self.low, 0.5 * self.high
+        self.low = 0.5 * self.low
+        self.high = 0.5 * self.high
         return self
 
 
@@ -348,13 +382,26 @@ class Holds(Planted):
 
     def frame(self, observation: Any) -> Frame:
         where = observation.translation
-        counts = areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], self.pose[None], where[None])
+        counts = areas(
+            self.task.body,
+            self.task.cameras[0],
+            observation.silhouettes[0],
+            self.pose[None],
+            where[None],
+        )
         return Frame(self.pose, where, float(mismatch(counts)[0]), counts, 1)
 
     def draw(self, observation: Any, poses: int) -> None:
         """Draw so many poses, for nothing."""
-        many, places = np.tile(self.pose, (poses, 1)), np.tile(observation.translation, (poses, 1))
-        areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], many, places)
+        many = np.tile(self.pose, (poses, 1))
+        places = np.tile(observation.translation, (poses, 1))
+        areas(
+            self.task.body,
+            self.task.cameras[0],
+            observation.silhouettes[0],
+            many,
+            places,
+        )
 
     def track(self, observations: Any, rng: Any) -> Any:
         for observation in observations:
@@ -468,6 +515,8 @@ class FacesTheSide(Guesses, breaks="gain"):
 
 RIGHT: tuple[type, ...] = (Sound, KnowsItsRows)
 OPTIMISERS, PRIORS, TRACKERS, STARTS = (
-    [kind for kind in base.__subclasses__() if kind.breaks] for base in (Sound, Learned, Holds, Guesses)
+    [kind for kind in base.__subclasses__() if kind.breaks]
+    for base in (Sound, Learned, Holds, Guesses)
 )
-APART = [kind for kind in Sound.__subclasses__() if kind.ends]  # what only a process of its own survives
+# what only a process of its own survives
+APART = [kind for kind in Sound.__subclasses__() if kind.ends]

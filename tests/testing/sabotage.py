@@ -17,14 +17,21 @@ def install(folder: Path, module: str = __name__, name: str = "sabotage") -> Pat
     """Return the folder with a distribution `posefit-NAME` 1.0 in it, whose plugin is a module."""
     metadata = folder / f"posefit_{name}-1.0.dist-info"
     metadata.mkdir(parents=True)
-    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: posefit-{name}\nVersion: 1.0\n")
+    (metadata / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: posefit-{name}\nVersion: 1.0\n"
+    )
     (metadata / "entry_points.txt").write_text(f"[posefit]\n{name} = {module}\n")
     return folder
 
 
 @hookimpl
 def posefit_register_optimisers(register: Any) -> None:
-    for kind in (*planted.OPTIMISERS, *planted.RIGHT, *planted.APART, planted.LeavesAThread):
+    for kind in (
+        *planted.OPTIMISERS,
+        *planted.RIGHT,
+        *planted.APART,
+        planted.LeavesAThread,
+    ):
         register(named(kind), kind)
 
 

@@ -10,7 +10,15 @@ import pytest
 from posefit.arrays import Array
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
-from posefit.testing import check_optimiser, check_prior, check_start, check_tracker, checks_of, results, run_checks
+from posefit.testing import (
+    check_optimiser,
+    check_prior,
+    check_start,
+    check_tracker,
+    checks_of,
+    results,
+    run_checks,
+)
 from posefit_priors.pca import PCA
 from posefit_swarm.random import Random
 from posefit_swarm.sapso import SAPSO
@@ -42,7 +50,9 @@ def test_it_passes_every_shipped_prior(name: str) -> None:
 
 def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
     make = partial(SAPSO, population_size=20, iterations=task.evaluations // 20 - 1)
-    return SynthesisTracker(task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor))
+    return SynthesisTracker(
+        task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor)
+    )
 
 
 @pytest.mark.slow
@@ -59,7 +69,11 @@ class Chance(Random):
 def test_chance_does_not_beat_chance_and_need_not_where_it_is_the_baseline() -> None:
     def outcomes(factory: Any) -> list[tuple[str, str]]:
         checks = checks_of("optimiser", factory, None, "forget")
-        ran = [check.run() for check in checks if check.name in ("sphere_problem", "real_problem")]
+        ran = [
+            check.run()
+            for check in checks
+            if check.name in ("sphere_problem", "real_problem")
+        ]
         return [(result.outcome, result.detail) for result in ran]
 
     assert [outcome for outcome, _ in outcomes(Chance)] == ["failed", "failed"]
@@ -83,23 +97,35 @@ def test_it_passes_sound_plugins() -> None:
 def test_it_fails_each_bug_planted_in_an_optimiser(monkeypatch: Any) -> None:
     monkeypatch.setattr(results, "SECONDS", 3.0)
     for bug in planted.OPTIMISERS:
-        wanted = [check for check in checks_of("optimiser", bug) if check.name in bug.breaks]
+        wanted = [
+            check for check in checks_of("optimiser", bug) if check.name in bug.breaks
+        ]
         assert len(wanted) == len(bug.breaks), bug
         assert {check.run().outcome for check in wanted} == {"failed"}, bug
 
 
 def test_it_fails_each_bug_planted_in_a_tracker_or_a_start() -> None:
-    for check, bugs in ((check_tracker, planted.TRACKERS), (check_start, planted.STARTS)):
+    for check, bugs in (
+        (check_tracker, planted.TRACKERS),
+        (check_start, planted.STARTS),
+    ):
         for bug in bugs:
-            assert set(bug.breaks) <= {result.name for result in check(bug).of("failed")}, bug
+            assert set(bug.breaks) <= {
+                result.name for result in check(bug).of("failed")
+            }, bug
 
 
 @pytest.mark.slow
 def test_it_fails_each_bug_planted_in_a_prior_or_a_filter() -> None:
     for bug in planted.PRIORS:
-        assert set(bug.breaks) <= {result.name for result in check_prior(bug).of("failed")}, bug
+        assert set(bug.breaks) <= {
+            result.name for result in check_prior(bug).of("failed")
+        }, bug
     for factory in (planted.ForgetsParticles, planted.Sound):
-        failed = {result.name for result in check_optimiser(factory, next_frame="carry").of("failed")}
+        failed = {
+            result.name
+            for result in check_optimiser(factory, next_frame="carry").of("failed")
+        }
         assert "next_frame" in failed, factory
 
 
@@ -107,15 +133,17 @@ def test_a_prior_of_which_hardly_anything_is_feasible_passes_with_a_warning() ->
     def checked(share: float) -> str:
         class Picky(PCA):
             def feasible(self, latents: Array) -> Any:
-                return (latents[:, 0] - self.low[0]) < share * (self.high[0] - self.low[0])
+                return (latents[:, 0] - self.low[0]) < share * (
+                    self.high[0] - self.low[0]
+                )
 
-        check = next(check for check in checks_of("prior", Picky) if check.name == "searchable")
+        check = next(
+            check for check in checks_of("prior", Picky) if check.name == "searchable"
+        )
         return check.run().detail
 
     # a proposal is drawn 100 times: at 0.6 % feasible 0.994^100 = 55 % of them never are, at 50 % none
-    warning = (
-        r"warning: only (0\.\d+) % of the box is feasible: of a first population about (\d+) % are copies of the others"
-    )
+    warning = r"warning: only (0\.\d+) % of the box is feasible: of a first population about (\d+) % are copies of the others"
     ((feasible, copies),) = re.findall(f"^{warning}$", checked(0.006))
     assert 0.3 < float(feasible) < 1.0
     assert int(copies) == pytest.approx(100 * (1 - float(feasible) / 100) ** 100, abs=1)
@@ -128,29 +156,48 @@ def test_one_cause_ends_the_checks() -> None:
     _, shape, dtype = failed = report.of("failed")
     assert [result.name for result in failed] == ["construction", "shape", "dtype"]
     assert shape.detail == dtype.detail
-    assert {result.detail for result in report.of("skipped")} == {"not run: shape and dtype fail for one cause"}
+    assert {result.detail for result in report.of("skipped")} == {
+        "not run: shape and dtype fail for one cause"
+    }
     assert len(report.results) == len(checks_of("optimiser", planted.WrongSignature))
     assert str(report).count("takes 2 positional arguments but 3") == 2
     assert run_checks("nothing", [])
 
 
 def test_settings_by_position_are_named() -> None:
-    def by_position(space: Any, rng: Any, population_size: int = 40, spread: float = 1.0) -> Any: ...
+    def by_position(
+        space: Any, rng: Any, population_size: int = 40, spread: float = 1.0
+    ) -> Any: ...
 
     def too_few(space: Any) -> Any: ...
 
     wanted = r"a factory must take \(space, rng\) and keyword-only settings, got "
-    for factory, came in ((by_position, r"population_size, spread before the \*"), (too_few, r"\(space\)")):
-        check = next(check for check in checks_of("optimiser", factory) if check.name == "construction")
+    for factory, came in (
+        (by_position, r"population_size, spread before the \*"),
+        (too_few, r"\(space\)"),
+    ):
+        check = next(
+            check
+            for check in checks_of("optimiser", factory)
+            if check.name == "construction"
+        )
         assert re.fullmatch(f"{wanted}{came}", check.run().detail)
 
 
 def test_a_traceback_begins_in_the_plugins_own_code_and_is_there_once_a_cause() -> None:
-    check = next(check for check in checks_of("optimiser", planted.DividesByTheRange) if check.name == "costs")
+    check = next(
+        check
+        for check in checks_of("optimiser", planted.DividesByTheRange)
+        if check.name == "costs"
+    )
     trace = check.run().traceback
     assert trace.splitlines()[1].strip().startswith(f'File "{planted.__file__}"')
     assert 'assert not np.isnan(rank).any(), "costs are all equal"' in trace
-    both = [check for check in checks_of("optimiser", planted.ExitsInTell) if check.name in ("dtype", "box")]
+    both = [
+        check
+        for check in checks_of("optimiser", planted.ExitsInTell)
+        if check.name in ("dtype", "box")
+    ]
     report = run_checks("it", both)
     assert len(report.of("failed")) == 2
     assert str(report).count("sys.exit(0)") == 1

@@ -25,37 +25,61 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have every planted plugin installed, for this process and those that it starts."""
     monkeypatch.syspath_prepend(ROOT)
     monkeypatch.syspath_prepend(install(tmp_path / "site"))
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "site"), str(ROOT)]))
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join([str(tmp_path / "site"), str(ROOT)])
+    )
 
 
 def posefit(*words: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([sys.executable, "-m", "posefit", *words], capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, "-m", "posefit", *words], capture_output=True, text=True
+    )
 
 
 @pytest.mark.parametrize("bug", planted.APART, ids=named)
 @pytest.mark.usefixtures("installed")
-def test_what_ends_a_process_fails_the_check_that_ran(bug: Any, monkeypatch: Any, capfd: Any) -> None:
+def test_what_ends_a_process_fails_the_check_that_ran(
+    bug: Any, monkeypatch: Any, capfd: Any
+) -> None:
     if bug is planted.NeverReturns:
         monkeypatch.setattr(results, "SECONDS", 1.0)
         monkeypatch.setattr(process, "OVERRUN_SECONDS", 1.0)
-    report = check_in_process("optimiser", named(bug), only=["construction", "shape", "dtype"])
+    report = check_in_process(
+        "optimiser", named(bug), only=["construction", "shape", "dtype"]
+    )
     assert [result.name for result in report.of("passed")] == ["construction", "shape"]
     (failed,) = report.of("failed")
     assert failed.name == "dtype"
     assert failed.detail.startswith(bug.ends)
-    if bug in (planted.Crashes, planted.NeverReturns):  # where Python could not say it, the process does
+    # where Python could not say it, the process does
+    if bug in (planted.Crashes, planted.NeverReturns):
         assert f'File "{planted.__file__}"' in capfd.readouterr().err
 
 
 @pytest.mark.usefixtures("installed")
-def test_the_checks_go_on_after_one_that_ended_the_process_until_another_fails_alike() -> None:
-    report = check_in_process("optimiser", "ends-the-process", only=["shape", "dtype", "dimensions", "speed"])
-    outcomes = {"shape": "passed", "dtype": "failed", "dimensions": "failed", "speed": "skipped"}
-    assert [(result.name, result.outcome) for result in report.results] == list(outcomes.items())
-    assert report.results[-1].detail == "not run: dtype and dimensions fail for one cause"
+def test_the_checks_go_on_after_one_that_ended_the_process_until_another_fails_alike() -> (
+    None
+):
+    report = check_in_process(
+        "optimiser", "ends-the-process", only=["shape", "dtype", "dimensions", "speed"]
+    )
+    outcomes = {
+        "shape": "passed",
+        "dtype": "failed",
+        "dimensions": "failed",
+        "speed": "skipped",
+    }
+    assert [(result.name, result.outcome) for result in report.results] == list(
+        outcomes.items()
+    )
+    assert (
+        report.results[-1].detail == "not run: dtype and dimensions fail for one cause"
+    )
 
 
-def test_a_name_that_two_plugins_register_is_checked_once_one_has_another(monkeypatch: Any, tmp_path: Path) -> None:
+def test_a_name_that_two_plugins_register_is_checked_once_one_has_another(
+    monkeypatch: Any, tmp_path: Path
+) -> None:
     (tmp_path / "mine.py").write_text(
         "from posefit.plugin import hookimpl\n@hookimpl\n"
         "def posefit_register_optimisers(register):\n    register('sapso', dict)\n"
@@ -73,9 +97,21 @@ def test_a_name_that_two_plugins_register_is_checked_once_one_has_another(monkey
 
 @pytest.mark.usefixtures("installed")
 def test_what_a_plugin_prints_is_in_no_result() -> None:
-    checked = posefit("check", "optimiser", "talks", "--only", "shape", "--only", "new_process", "--json")
+    checked = posefit(
+        "check",
+        "optimiser",
+        "talks",
+        "--only",
+        "shape",
+        "--only",
+        "new_process",
+        "--json",
+    )
     assert checked.returncode == 0
-    assert [result["outcome"] for result in json.loads(checked.stdout)["results"]] == ["passed", "passed"]
+    assert [result["outcome"] for result in json.loads(checked.stdout)["results"]] == [
+        "passed",
+        "passed",
+    ]
     tracked = posefit(*TRACK, "talks", "--json")
     assert tracked.returncode == 0, tracked.stderr
     assert json.loads(tracked.stdout)["method"] == "talks@pca"
@@ -86,20 +122,31 @@ def test_what_a_plugin_prints_is_in_no_result() -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
-    for kind, name, what in (("optimiser", "exits-in-tell", "tell"), ("tracker", "exits-in-track", "it")):
+    for kind, name, what in (
+        ("optimiser", "exits-in-tell", "tell"),
+        ("tracker", "exits-in-track", "it"),
+    ):
         ran = posefit(*TRACK, name)
         assert (ran.returncode, ran.stdout) == (2, "")
-        (line,) = [line for line in ran.stderr.splitlines() if line.startswith("posefit: ")]
+        (line,) = [
+            line for line in ran.stderr.splitlines() if line.startswith("posefit: ")
+        ]
         blame = f"posefit: {kind} '{name}' of posefit-sabotage 1.0: {what}"
         assert line.startswith(f"{blame} must not end the program, got SystemExit: 0")
         assert "Traceback" not in ran.stderr
 
 
 @pytest.mark.usefixtures("installed")
-def test_the_process_of_a_check_ends_with_the_one_that_started_it(tmp_path: Path) -> None:
+def test_the_process_of_a_check_ends_with_the_one_that_started_it(
+    tmp_path: Path,
+) -> None:
     words = ["check", "optimiser", "never-returns", "--only", "dtype"]
     with (tmp_path / "err").open("w") as err:
-        ran = subprocess.Popen([sys.executable, "-m", "posefit", *words], stdout=subprocess.DEVNULL, stderr=err)
+        ran = subprocess.Popen(
+            [sys.executable, "-m", "posefit", *words],
+            stdout=subprocess.DEVNULL,
+            stderr=err,
+        )
         try:
             wait_until(lambda: children(ran.pid))
             (child,) = children(ran.pid)
@@ -112,7 +159,10 @@ def test_the_process_of_a_check_ends_with_the_one_that_started_it(tmp_path: Path
 
 def children(process: int) -> list[int]:
     """Return the processes that one has started."""
-    return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    return [
+        int(word)
+        for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    ]
 
 
 def wait_until(condition: Callable[[], Any]) -> None:
@@ -124,10 +174,15 @@ def wait_until(condition: Callable[[], Any]) -> None:
 
 
 @pytest.mark.usefixtures("installed")
-def test_a_thread_that_a_plugin_leaves_running_does_not_keep_a_track_from_ending() -> None:
+def test_a_thread_that_a_plugin_leaves_running_does_not_keep_a_track_from_ending() -> (
+    None
+):
     ran = posefit(*TRACK, "leaves-a-thread", "--threads", "2")
     assert ran.returncode == 0
-    assert ran.stderr.splitlines()[-1] == "posefit: not waiting for what a plugin left running: planted"
+    assert (
+        ran.stderr.splitlines()[-1]
+        == "posefit: not waiting for what a plugin left running: planted"
+    )
 
 
 @pytest.mark.usefixtures("installed")
@@ -135,5 +190,7 @@ def test_a_rule_is_checked_alone_and_one_that_is_not_there_is_named() -> None:
     report = check_in_process("optimiser", "sound", only=["speed"])
     assert [result.name for result in report.results] == ["speed"]
     assert report.plugin == "optimiser 'sound' of posefit-sabotage 1.0"
-    with pytest.raises(ValueError, match="--only must be one of construction, shape, .*, got 'sped'"):
+    with pytest.raises(
+        ValueError, match="--only must be one of construction, shape, .*, got 'sped'"
+    ):
         check_in_process("optimiser", "sound", only=["sped"])

@@ -26,12 +26,17 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 
 SPREAD = Recalibration(joint_spreads=np.full(len(JOINTS), 0.02))
-MAXWELL = {"50": 1.5382, "80": 2.1544, "95": 2.7955}  # quantiles of the distance of points that a unit normal scatters
+# quantiles of the distance of points that a unit normal scatters
+MAXWELL = {"50": 1.5382, "80": 2.1544, "95": 2.7955}
 SIZE = (320, 240)
 
 
-def walk(frames: int, views: Sequence[float] = (45.0,), size: tuple[int, int] = SIZE) -> Scene:
-    return synthetic(built_in.motion("walk", frames=frames), views, size, [], (None, None))
+def walk(
+    frames: int, views: Sequence[float] = (45.0,), size: tuple[int, int] = SIZE
+) -> Scene:
+    return synthetic(
+        built_in.motion("walk", frames=frames), views, size, [], (None, None)
+    )
 
 
 def masks_of(scene: Scene, view: int = 0) -> list[Array]:
@@ -39,15 +44,24 @@ def masks_of(scene: Scene, view: int = 0) -> list[Array]:
     return [observation.silhouettes[view].mask for observation in scene.observations]
 
 
-def rows_of(some: Iterable[Observation], observations: Sequence[Observation]) -> list[int]:
+def rows_of(
+    some: Iterable[Observation], observations: Sequence[Observation]
+) -> list[int]:
     """Return the numbers that some of the observations have."""
-    return [next(k for k, other in enumerate(observations) if other is one) for one in some]
+    return [
+        next(k for k, other in enumerate(observations) if other is one) for one in some
+    ]
 
 
-def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observation) -> Frame:
+def frame_of(
+    scene: Scene, pose: Array, translation: Array, observation: Observation
+) -> Frame:
     """Return the frame of a tracker that estimates a pose."""
     views = zip(scene.cameras, observation.silhouettes, strict=True)
-    counts = [areas(scene.body, camera, mask, pose[None], translation[None])[0] for camera, mask in views]
+    counts = [
+        areas(scene.body, camera, mask, pose[None], translation[None])[0]
+        for camera, mask in views
+    ]
     return Frame(pose, translation, 0.0, np.array(counts), 1)
 
 
@@ -65,25 +79,39 @@ def uncertain_frames(
     frames = []
     for frame, weight in zip(exact_frames(scene), mirrored, strict=True):
         pose = frame.pose[None]
-        poses = np.concatenate([pose, mirrored_poses(scene.body.skeleton, pose), turned_poses(pose)])
+        poses = np.concatenate(
+            [pose, mirrored_poses(scene.body.skeleton, pose), turned_poses(pose)]
+        )
         weights = np.array([1.0 - weight - turned, weight, turned])
-        posterior = Posterior(poses, np.tile(frame.translation, (3, 1)), weights, coherent, SPREAD)
+        posterior = Posterior(
+            poses, np.tile(frame.translation, (3, 1)), weights, coherent, SPREAD
+        )
         frames.append(replace(frame, posterior=posterior))
     return frames
 
 
-def tracked(scene: Scene, frames: Sequence[Frame], recorder: Recorder | None = None) -> Track:
+def tracked(
+    scene: Scene, frames: Sequence[Frame], recorder: Recorder | None = None
+) -> Track:
     """Return the track of a scene whose tracker yields just these frames, with its files where there is a folder."""
 
-    def follow(_: object, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        resumed = len(task.before) if len(task.before) > 1 else 0  # a single one is what a track is begun with
+    def follow(
+        _: object,
+        task: Task,
+        observations: Iterable[Observation],
+        rng: np.random.Generator,
+    ) -> Iterator[Frame]:
+        # a single one is what a track is begun with
+        resumed = len(task.before) if len(task.before) > 1 else 0
         for k, _ in enumerate(observations, resumed):
             yield frames[k]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(method.Method, "follow", follow)
         options = completed(TrackOptions(method="annealed@pca"), scene.truth)
-        track = track_scene(scene, [built_in.motion("walk-b", frames=20)], options, recorder=recorder)
+        track = track_scene(
+            scene, [built_in.motion("walk-b", frames=20)], options, recorder=recorder
+        )
     if recorder is not None:
         recorder.finish(track.content)
     return track

@@ -20,24 +20,34 @@ QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200
 
 
 def camera(azimuth: float) -> posefit.Camera:
-    return posefit.Camera.around(built_in.motion("walk").translations[0], azimuth, 4.0, (120, 90))
+    return posefit.Camera.around(
+        built_in.motion("walk").translations[0], azimuth, 4.0, (120, 90)
+    )
 
 
 @each("method", ["sapso", "vsmm"])
-def test_a_track_goes_on_as_if_it_had_not_ended_too_early(method: str, tmp_path: Path) -> None:
+def test_a_track_goes_on_as_if_it_had_not_ended_too_early(
+    method: str, tmp_path: Path
+) -> None:
     assert repr(camera(0.5)) == repr(camera(1.5))  # which is why texts are not enough
     options: dict[str, Any] = {**QUICK, "method": method, "out": tmp_path / "out"}
     with pytest.raises(KeyboardInterrupt):
         posefit.track("walk", camera=camera(0.5), progress=stopping(4), **options)
-    with pytest.raises(ValueError, match="camera must be .* as it was, to resume, got one with another content"):
+    with pytest.raises(
+        ValueError,
+        match="camera must be .* as it was, to resume, got one with another content",
+    ):
         posefit.track("walk", camera=camera(1.5), resume=True, **options)
-    resumed = posefit.track("walk", camera=camera(0.5), resume=True, **options)  # another object, the same camera
+    # another object, the same camera
+    resumed = posefit.track("walk", camera=camera(0.5), resume=True, **options)
     whole = posefit.track("walk", camera=camera(0.5), **{**options, "out": None})
     if method == "sapso":  # vsmm begins with new particles
         np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
     for before, after in zip(whole.frames, resumed.frames, strict=True):
         assert after.details.keys() == before.details.keys()
-    first, again = (track.frames[0].details.get("probabilities", 0.0) for track in (whole, resumed))
+    first, again = (
+        track.frames[0].details.get("probabilities", 0.0) for track in (whole, resumed)
+    )
     np.testing.assert_array_equal(first, again)
     activities = [row["activity"] for row in csv_rows(tmp_path / "out" / "frames.csv")]
     assert [activity or None for activity in activities] == resumed.activity
@@ -45,13 +55,17 @@ def test_a_track_goes_on_as_if_it_had_not_ended_too_early(method: str, tmp_path:
 
 
 def test_a_file_or_a_folder_is_what_it_holds(tmp_path: Path) -> None:
-    file, folder = tmp_path / "a.npz", tmp_path / "b"
+    file = tmp_path / "a.npz"
+    folder = tmp_path / "b"
     folder.mkdir()
     for path, inside in ((file, file), (folder, folder / "0.png")):
         digests = set()
         for content in (b"masks", b"maskz"):
             inside.write_bytes(content)
-            digests |= {digest_of(path, files=True)["digest"], digest_of(str(path), files=True)["digest"]}
+            digests |= {
+                digest_of(path, files=True)["digest"],
+                digest_of(str(path), files=True)["digest"],
+            }
         assert len(digests | {digest_of(path)["digest"]}) == 3
 
 
@@ -75,9 +89,12 @@ def test_different_values_have_different_digests(first: Any, second: Any) -> Non
 def test_a_first_frame_that_was_being_written_is_cut_off(tmp_path: Path) -> None:
     lines = written(tmp_path)["frames"].splitlines(keepends=True)
     (unfinished,) = (tmp_path / "made").iterdir()
-    file, messages = unfinished / "frames.jsonl", list[str]()
+    file = unfinished / "frames.jsonl"
+    messages = list[str]()
     file.write_bytes(lines[0][:-9])
-    folder = OutputFolder(tmp_path / "made" / "subject", False, True, SPEC, messages.append)
+    folder = OutputFolder(
+        tmp_path / "made" / "subject", False, True, SPEC, messages.append
+    )
     with suppress(KeyboardInterrupt), folder as output:
         assert output.earlier() == ([], None)
         with file.open("ab") as record:  # a frame that is tracked now
@@ -92,19 +109,40 @@ def test_a_first_frame_that_was_being_written_is_cut_off(tmp_path: Path) -> None
     ("old", "new", "right", "reason"),
     [
         (b"40", b"4\xff", False, "a damaged one"),
-        (b'"lost": 0.5', b'"lost": 2', True, "lost of a frame must lie in 0 to 1, got 2"),
-        (b'"bit_generator": "PCG64"', b'"bit_generator": "none"', True, "state must be for a PCG64"),
-        (b'"evaluations"', b'"evaluation"', True, "unexpected keyword argument 'evaluation'"),
+        (
+            b'"lost": 0.5',
+            b'"lost": 2',
+            True,
+            "lost of a frame must lie in 0 to 1, got 2",
+        ),
+        (
+            b'"bit_generator": "PCG64"',
+            b'"bit_generator": "none"',
+            True,
+            "state must be for a PCG64",
+        ),
+        (
+            b'"evaluations"',
+            b'"evaluation"',
+            True,
+            "unexpected keyword argument 'evaluation'",
+        ),
     ],
 )
-def test_frames_before_the_damage_are_kept(old: bytes, new: bytes, right: bool, reason: str, tmp_path: Path) -> None:
+def test_frames_before_the_damage_are_kept(
+    old: bytes, new: bytes, right: bool, reason: str, tmp_path: Path
+) -> None:
     lines = written(tmp_path)["frames"].splitlines(keepends=True)
     assert old in lines[1]
     lines[1] = lines[1].replace(old, new, 1)
     (unfinished,) = (tmp_path / "made").iterdir()
-    (unfinished / "frames.jsonl").write_bytes(mended(b"".join(lines)) if right else b"".join(lines))
+    (unfinished / "frames.jsonl").write_bytes(
+        mended(b"".join(lines)) if right else b"".join(lines)
+    )
     messages: list[str] = []
-    folder = OutputFolder(tmp_path / "made" / "subject", False, True, SPEC, messages.append)
+    folder = OutputFolder(
+        tmp_path / "made" / "subject", False, True, SPEC, messages.append
+    )
     with suppress(KeyboardInterrupt), folder as output:
         assert len(output.earlier()[0]) == 1
         raise KeyboardInterrupt

@@ -19,7 +19,9 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, unknown_sides
 from tests.tracking.scenes import exact_frames, tracked, walk
 
-FRAMES, PASSING = 24, 11  # of a walk from its side, and the one in which legs pass each other
+# of a walk from its side, and the one in which legs pass each other
+FRAMES = 24
+PASSING = 11
 ALL = np.ones(FRAMES, dtype=bool)
 
 
@@ -28,13 +30,20 @@ def film() -> tuple[Scene, list[Frame]]:
     """A film, and the frames of its truth."""
     scene = walk(FRAMES, (90.0,), (160, 160))
     frames = exact_frames(scene)
-    observations = [Observation(list(observation.silhouettes)) for observation in scene.observations]
+    observations = [
+        Observation(list(observation.silhouettes)) for observation in scene.observations
+    ]
     return replace(scene, truth=None, observations=observations), frames
 
 
 def exchanged(scene: Scene, frames: list[Frame], which: range) -> list[Frame]:
-    poses = exchanged_limbs(scene.body.skeleton, np.array([frame.pose for frame in frames]), "legs")
-    return [replace(frame, pose=poses[k]) if k in which else frame for k, frame in enumerate(frames)]
+    poses = exchanged_limbs(
+        scene.body.skeleton, np.array([frame.pose for frame in frames]), "legs"
+    )
+    return [
+        replace(frame, pose=poses[k]) if k in which else frame
+        for k, frame in enumerate(frames)
+    ]
 
 
 def changes(flags: NDArray[np.bool_]) -> list[int]:
@@ -44,11 +53,16 @@ def changes(flags: NDArray[np.bool_]) -> list[int]:
 def test_the_cheapest_sequence_is_that_of_trying_all() -> None:
     rng = np.random.default_rng(4)
     for _ in range(20):
-        costs, steps = rng.normal(0.0, 2.0, (6, 2)), rng.normal(1.0, 2.0, (5, 2, 2))
+        costs = rng.normal(0.0, 2.0, (6, 2))
+        steps = rng.normal(1.0, 2.0, (5, 2, 2))
 
-        def total(states: tuple[int, ...], costs: Array = costs, steps: Array = steps) -> float:
+        def total(
+            states: tuple[int, ...], costs: Array = costs, steps: Array = steps
+        ) -> float:
             of_steps = sum(steps[k, states[k], states[k + 1]] for k in range(5))
-            return float(sum(costs[k, state] for k, state in enumerate(states)) + of_steps)
+            return float(
+                sum(costs[k, state] for k, state in enumerate(states)) + of_steps
+            )
 
         best = min(product((0, 1), repeat=6), key=total)
         assert cheapest_sequence(costs, steps).tolist() == list(best)
@@ -56,15 +70,21 @@ def test_the_cheapest_sequence_is_that_of_trying_all() -> None:
 
 def test_legs_that_pass_are_doubtful(film: tuple[Scene, list[Frame]]) -> None:
     scene, frames = film
-    here, there = (scene.motion(each) for each in (frames, exchanged(scene, frames, range(FRAMES))))
+    here, there = (
+        scene.motion(each) for each in (frames, exchanged(scene, frames, range(FRAMES)))
+    )
     assert doubtful(here, there, np.ones(FRAMES), ALL) == [PASSING]
     costs = np.ones(FRAMES)
     costs[4] = 2.0  # legs are far apart there: nothing is tried however much it costs
     assert doubtful(here, there, costs, ALL) == [PASSING]
 
 
-@pytest.mark.parametrize("wrong", [range(PASSING, FRAMES), range(PASSING), range(16, 19)])
-def test_legs_that_went_back_pass(film: tuple[Scene, list[Frame]], wrong: range) -> None:
+@pytest.mark.parametrize(
+    "wrong", [range(PASSING, FRAMES), range(PASSING), range(16, 19)]
+)
+def test_legs_that_went_back_pass(
+    film: tuple[Scene, list[Frame]], wrong: range
+) -> None:
     """Which of the two goes ahead is not known from the side: all may be exchanged. Where they pass is, to a frame."""
     scene, frames = film
     found = legs_exchanged(scene, exchanged(scene, frames, wrong), ALL, BETA)
@@ -77,55 +97,88 @@ def test_right_legs_stay(film: tuple[Scene, list[Frame]]) -> None:
     assert not changes(legs_exchanged(scene, frames, ALL, BETA))
 
 
-def test_landmarks_say_which_leg_is_the_left_one(film: tuple[Scene, list[Frame]]) -> None:
+def test_landmarks_say_which_leg_is_the_left_one(
+    film: tuple[Scene, list[Frame]],
+) -> None:
     """Landmarks of half the frames are enough, and those of the others do not matter."""
     scene, frames = film
     joints = scene.motion(frames).joints
     pixels = np.array([scene.cameras[0].project(each)[0] for each in joints])
     marks = np.dstack([pixels, np.full(pixels.shape[:2], 0.9)])[:, None]
     observations = [
-        replace(observation, landmarks=marks[k] if k % 2 else None) for k, observation in enumerate(scene.observations)
+        replace(observation, landmarks=marks[k] if k % 2 else None)
+        for k, observation in enumerate(scene.observations)
     ]
     scene = replace(scene, observations=observations)
     assert not legs_exchanged(scene, frames, ALL, BETA).any()
-    assert legs_exchanged(scene, exchanged(scene, frames, range(FRAMES)), ALL, BETA).all()
+    assert legs_exchanged(
+        scene, exchanged(scene, frames, range(FRAMES)), ALL, BETA
+    ).all()
 
 
 def uncertain(frames: list[Frame]) -> list[Frame]:
     """Return frames with posteriors whose sides are said to be known."""
     model = Recalibration(second_side=1.0)
     return [
-        replace(frame, posterior=Posterior(frame.pose[None], frame.translation[None], np.ones(1), False, model))
+        replace(
+            frame,
+            posterior=Posterior(
+                frame.pose[None], frame.translation[None], np.ones(1), False, model
+            ),
+        )
         for frame in frames
     ]
 
 
-@pytest.mark.parametrize(("wrong", "share"), [(range(16, 22), 6 / FRAMES), (range(16, 19), 0.0)])
-def test_exchanged_frames_are_smoothed_again(film: tuple[Scene, list[Frame]], wrong: range, share: float) -> None:
+@pytest.mark.parametrize(
+    ("wrong", "share"), [(range(16, 22), 6 / FRAMES), (range(16, 19), 0.0)]
+)
+def test_exchanged_frames_are_smoothed_again(
+    film: tuple[Scene, list[Frame]], wrong: range, share: float
+) -> None:
     """Where a fifth of them were exchanged, sides are unknown."""
     scene, frames = film
     before = smooth(scene, uncertain(exchanged(scene, frames, wrong)), None, BETA)
     tracked = uncertain(exchanged(scene, frames, wrong))
     after, which = with_cheapest_legs(tracked, before, BETA)
     assert np.flatnonzero(which).tolist() == list(wrong)
-    costs = [np.mean([frame.cost for frame in each]) for each in (before.frames, after.frames)]
+    costs = [
+        np.mean([frame.cost for frame in each])
+        for each in (before.frames, after.frames)
+    ]
     assert costs[1] < 0.8 * costs[0]
     for frame in after.frames:
         assert frame.posterior is not None
         assert frame.posterior.poses[0] == pytest.approx(frame.pose)
-        assert frame.posterior.weights == pytest.approx([1.0 - share, share] if share else [1.0])
-        assert unknown_sides(scene.body.skeleton, frame.posterior, frame.pose) == (share > 0.0)
+        assert frame.posterior.weights == pytest.approx(
+            [1.0 - share, share] if share else [1.0]
+        )
+        assert unknown_sides(scene.body.skeleton, frame.posterior, frame.pose) == (
+            share > 0.0
+        )
 
 
-def test_frames_that_show_nothing_are_not_tried(film: tuple[Scene, list[Frame]]) -> None:
+def test_frames_that_show_nothing_are_not_tried(
+    film: tuple[Scene, list[Frame]],
+) -> None:
     scene, frames = film
-    here, there = (scene.motion(each) for each in (frames, exchanged(scene, frames, range(FRAMES))))
+    here, there = (
+        scene.motion(each) for each in (frames, exchanged(scene, frames, range(FRAMES)))
+    )
     assert not doubtful(here, there, np.ones(FRAMES), np.arange(FRAMES) != PASSING)
 
 
-def test_a_film_by_one_camera_is_tracked_with_legs_that_pass(film: tuple[Scene, list[Frame]]) -> None:
+def test_a_film_by_one_camera_is_tracked_with_legs_that_pass(
+    film: tuple[Scene, list[Frame]],
+) -> None:
     scene, frames = film
     track = tracked(scene, exchanged(scene, frames, range(PASSING, FRAMES)))
-    truth, turned = (scene.motion(each).joints for each in (frames, exchanged(scene, frames, range(FRAMES))))
-    off = [np.linalg.norm(track.motion.joints - joints, axis=2).mean() for joints in (truth, turned)]
+    truth, turned = (
+        scene.motion(each).joints
+        for each in (frames, exchanged(scene, frames, range(FRAMES)))
+    )
+    off = [
+        np.linalg.norm(track.motion.joints - joints, axis=2).mean()
+        for joints in (truth, turned)
+    ]
     assert min(off) < 0.03 < 0.1 < max(off)

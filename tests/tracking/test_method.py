@@ -30,9 +30,13 @@ QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200
 
 
 @each("name", ["sapso", "pso", "particle", "annealed", "cma", "random"])
-def test_every_method_gets_the_same_budget_and_reports_its_evaluations(name: str) -> None:
+def test_every_method_gets_the_same_budget_and_reports_its_evaluations(
+    name: str,
+) -> None:
     for budget in (200, 437):
-        summary = posefit.track("walk", method=name, **{**QUICK, "evaluations": budget}).summary
+        summary = posefit.track(
+            "walk", method=name, **{**QUICK, "evaluations": budget}
+        ).summary
         assert summary["evaluations_per_frame"] == budget
         used = summary["evaluations"] / summary["frames"]
         assert 0.85 * budget < used <= budget
@@ -45,14 +49,25 @@ def installed(monkeypatch: Any) -> Any:
     def install(kind: Any, factory: Any, name: str = "bad", **more: Any) -> None:
         mine = Offer(kind, name, factory, "posefit-bad", "1.0", **more)
         rest = tuple(offer for plugin in registry().plugins for offer in plugin.offers)
-        replaced = Registry((Plugin("bad", "posefit-bad", "1.0", "loaded", offers=(mine, *rest)),))
+        replaced = Registry(
+            (Plugin("bad", "posefit-bad", "1.0", "loaded", offers=(mine, *rest)),)
+        )
         monkeypatch.setattr(method, "registry", lambda: replaced)
 
     return install
 
 
-@each(("name", "later"), [("particle", []), ("sapso", ["start", "start"]), ("random", ["anywhere", "anywhere"])])
-def test_a_filter_carries_its_particles_and_others_are_built_again(name: str, later: list[str], installed: Any) -> None:
+@each(
+    ("name", "later"),
+    [
+        ("particle", []),
+        ("sapso", ["start", "start"]),
+        ("random", ["anywhere", "anywhere"]),
+    ],
+)
+def test_a_filter_carries_its_particles_and_others_are_built_again(
+    name: str, later: list[str], installed: Any
+) -> None:
     built: list[str] = []
     offer = registry().offer("optimiser", name)
 
@@ -63,13 +78,18 @@ def test_a_filter_carries_its_particles_and_others_are_built_again(name: str, la
 
     installed("optimiser", make, next_frame=offer.next_frame)
     posefit.track("walk", method="bad", **QUICK)
-    assert built == ["anywhere", "anywhere", *later]  # of the track to warm up, and of the track itself
+    # of the track to warm up, and of the track itself
+    assert built == ["anywhere", "anywhere", *later]
 
 
-def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(installed: Any) -> None:
+def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
+    installed: Any,
+) -> None:
     installed("optimiser", planted.WrongSignature)
     rule = "it must not fail, got TypeError: .*"
-    with pytest.raises(BrokenRuleError, match=f"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
+    with pytest.raises(
+        BrokenRuleError, match=f"^optimiser 'bad' of posefit-bad 1.0: {rule}$"
+    ):
         posefit.track("walk", method="bad", **QUICK)
     assert posefit.track("walk", **QUICK).summary["frames"] == 3
 
@@ -77,7 +97,10 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(in
 @each(
     ("change", "rule"),
     [
-        ({"low": np.zeros((2, 3))}, r"low and high must be finite and of shape \(m,\), got \(2, 3\), \(6,\)"),
+        (
+            {"low": np.zeros((2, 3))},
+            r"low and high must be finite and of shape \(m,\), got \(2, 3\), \(6,\)",
+        ),
         (
             {"inverse_transform": lambda z: np.zeros((len(z), 60))},
             r"inverse_transform must return shape \(3, 63\), got \(3, 60\)",
@@ -87,15 +110,23 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(in
             "inverse_transform must return finite numbers",
         ),
         ({"feasible": lambda z: True}, r"feasible must return shape \(3,\), got \(\)"),
-        ({"transform": lambda angles: 1 / 0}, "it must not fail, got ZeroDivisionError"),
-        ({"low": np.full(6, 9.0)}, "low must not be above high, got 9 and [0-9.]+ of latent 0"),
+        (
+            {"transform": lambda angles: 1 / 0},
+            "it must not fail, got ZeroDivisionError",
+        ),
+        (
+            {"low": np.full(6, 9.0)},
+            "low must not be above high, got 9 and [0-9.]+ of latent 0",
+        ),
         (
             {"feasible": lambda z: np.zeros(len(z), dtype=bool)},
             "feasible must allow some poses, got none of [0-9]+ training poses and 1000 of the range",
         ),
     ],
 )
-def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: Any) -> None:
+def test_a_broken_prior_is_named(
+    change: dict[str, Any], rule: str, installed: Any
+) -> None:
     class Bad(planted.PCA):
         def fit(self, angles: Any, skeleton: Any = None) -> Any:
             super().fit(angles)
@@ -103,7 +134,9 @@ def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: A
             return self
 
     installed("prior", Bad)
-    with pytest.raises(BrokenRuleError, match=f"prior 'bad' of posefit-bad 1.0: {rule}"):
+    with pytest.raises(
+        BrokenRuleError, match=f"prior 'bad' of posefit-bad 1.0: {rule}"
+    ):
         posefit.track("walk", method="@bad", **QUICK)
 
 
@@ -129,7 +162,10 @@ def test_a_prior_that_fails_in_a_search_is_named_and_not_the_optimiser_that_meet
 
     setattr(Tires, method, tires)
     installed("prior", Tires)
-    with pytest.raises(BrokenRuleError, match=f"^prior 'bad' of posefit-bad 1.0: {method} must not {rule}$"):
+    with pytest.raises(
+        BrokenRuleError,
+        match=f"^prior 'bad' of posefit-bad 1.0: {method} must not {rule}$",
+    ):
         posefit.track("walk", method="@bad", **QUICK)
 
 
@@ -143,13 +179,21 @@ def test_every_prior_can_be_searched(prior: str) -> None:
 def test_a_scene_is_tracked_as_it_is() -> None:
     motion = built_in.motion("walk", frames=3)
     scene = synthetic(motion, [45.0], (120, 90), [], (None, None))
-    how = {"method": "sapso", "train": built_in.other_styles("walk"), "evaluations": 200}
-    result, by_name = posefit.track(scene, **how), posefit.track(motion, **how, size=(120, 90))
+    how = {
+        "method": "sapso",
+        "train": built_in.other_styles("walk"),
+        "evaluations": 200,
+    }
+    result = posefit.track(scene, **how)
+    by_name = posefit.track(motion, **how, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
     assert [frame.cost for frame in result.frames] == result.table["cost"].tolist()
     with pytest.raises(ValueError, match="a scene must be tracked as it is, got fps"):
         posefit.track(scene, fps=20.0)
-    with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth is unknown"):
+    with pytest.raises(
+        ValueError,
+        match="a scene must be of a known motion, got walk, whose truth is unknown",
+    ):
         posefit.track(replace(scene, truth=None))
 
 
@@ -179,25 +223,68 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
 
 
 @each(
-    ("motion", "options", "evaluations", "restarts", "body_frames", "translation", "smooth"),
+    (
+        "motion",
+        "options",
+        "evaluations",
+        "restarts",
+        "body_frames",
+        "translation",
+        "smooth",
+    ),
     [
         ("walk", {}, 2440, 0, 0, "known", False),
         ("16_15", {}, 9760, 0, 0, "known", False),
-        (None, {}, 9760, 0, 12, "aligned", True),  # its tracker looks ahead, and searches the first pose by itself
+        # its tracker looks ahead, and searches the first pose by itself
+        (None, {}, 9760, 0, 12, "aligned", True),
         (None, {"method": "vsmm"}, 2440, 8, 12, "aligned", True),
-        (None, {"method": ("sapso", "pca"), "asf": "a.asf"}, 2440, 8, 0, "aligned", True),  # the build is known
-        (None, {"evaluations": 99, "restarts": 0, "body_frames": 0, "smooth": False}, 99, 0, 0, "aligned", False),
-        ("walk", {"translation": "searched", "restarts": 2, "smooth": True}, 2440, 2, 0, "searched", True),
+        # the build is known
+        (
+            None,
+            {"method": ("sapso", "pca"), "asf": "a.asf"},
+            2440,
+            8,
+            0,
+            "aligned",
+            True,
+        ),
+        (
+            None,
+            {"evaluations": 99, "restarts": 0, "body_frames": 0, "smooth": False},
+            99,
+            0,
+            0,
+            "aligned",
+            False,
+        ),
+        (
+            "walk",
+            {"translation": "searched", "restarts": 2, "smooth": True},
+            2440,
+            2,
+            0,
+            "searched",
+            True,
+        ),
     ],
 )
-def test_every_default_is_completed(motion: Any, options: dict[str, Any], **expected: Any) -> None:
+def test_every_default_is_completed(
+    motion: Any, options: dict[str, Any], **expected: Any
+) -> None:
     done = completed(TrackOptions(**options), motion)
     assert {name: getattr(done, name) for name in expected} == expected
     assert completed(done, motion) == done
 
 
-def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
+def test_footage_is_searched_where_the_tracker_is_not_installed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    without = replace(
+        registry(),
+        plugins=tuple(
+            plugin for plugin in registry().plugins if plugin.name != "exemplars"
+        ),
+    )
     monkeypatch.setattr(method, "registry", lambda: without)
     monkeypatch.setattr(defaults, "registry", lambda: without)
     options = completed(TrackOptions(), None)
@@ -205,47 +292,110 @@ def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pyt
 
 
 MISUSES: list[tuple[dict[str, Any], str]] = [
-    ({"evaluations": 1e3}, "evaluations must be a whole number of at least 1, got 1000.0"),
-    ({"frames": 5}, r"frames must be \(start, stop\), either of which may be None, got 5"),
+    (
+        {"evaluations": 1e3},
+        "evaluations must be a whole number of at least 1, got 1000.0",
+    ),
+    (
+        {"frames": 5},
+        r"frames must be \(start, stop\), either of which may be None, got 5",
+    ),
     ({"frames": (5, 2)}, "frames must choose some of the 60 frames, got 5:2"),
-    ({"size": (320.5, 240)}, "size must be from 1x1 to 16384x16384 pixels, got 320.5x240"),
+    (
+        {"size": (320.5, 240)},
+        "size must be from 1x1 to 16384x16384 pixels, got 320.5x240",
+    ),
     ({"seed": None}, "seed must be a whole number of at least 0, got None"),
     ({"threads": True}, "threads must be a whole number of at least 1, got True"),
     ({"fps": 10**400}, "fps must be a finite number, got 1000"),
     ({"view_degrees": "front"}, "view_degrees must be a finite number, got 'front'"),
     ({"train": "walk-a"}, "train must be a list of motions, got 'walk-a'"),
     ({"view_degrees": 361}, "view_degrees must lie in -360 to 360 degrees, got 361"),
-    ({"force": True}, "force must be given with out, the folder of the track, got none"),
-    ({"settings": ("sapso.cooling=0.9", "sapso.cooling=0.8")}, "must be given once, got 'sapso.cooling' twice"),
-    ({"asf": "a.asf"}, "asf must be given for .amc files and footage only, got 'a.asf'"),
-    ({"extraction": Extraction()}, "extraction must be given for video only, got Extraction.* for a motion"),
+    (
+        {"force": True},
+        "force must be given with out, the folder of the track, got none",
+    ),
+    (
+        {"settings": ("sapso.cooling=0.9", "sapso.cooling=0.8")},
+        "must be given once, got 'sapso.cooling' twice",
+    ),
+    (
+        {"asf": "a.asf"},
+        "asf must be given for .amc files and footage only, got 'a.asf'",
+    ),
+    (
+        {"extraction": Extraction()},
+        "extraction must be given for video only, got Extraction.* for a motion",
+    ),
     ({"up": "y"}, "up must be given for .amc and .bvh files only, got 'y'"),
     ({"unit": "cm"}, "unit must be given for .amc and .bvh files only, got 'cm'"),
     ({"unit": "ell"}, "unit must be one of m, cm, mm, inch, foot, cmu, got 'ell'"),
     ({"rate": 50.0}, "rate must be given for .amc files only, got 50.0"),
-    ({"evaluations": 30, "method": "sapso"}, "evaluations must hold one population of 40, got 30"),
-    ({"method": "sapzo"}, "method must be OPTIMISER@PRIOR, or one of .*, got 'sapzo'; did you mean 'sapso'"),
+    (
+        {"evaluations": 30, "method": "sapso"},
+        "evaluations must hold one population of 40, got 30",
+    ),
+    (
+        {"method": "sapzo"},
+        "method must be OPTIMISER@PRIOR, or one of .*, got 'sapzo'; did you mean 'sapso'",
+    ),
     ({"method": "sapzo@pca"}, "optimiser must be one of .*did you mean 'sapso'"),
     (
         {"method": "@pcb"},
         "prior must be one of full, gplvm, isomap, loose, pca, sklearn, got 'pcb'; did you mean 'pca'",
     ),
-    ({"method": 3}, "method must be a name, a factory, or a pair of optimiser and prior, got 3"),
+    (
+        {"method": 3},
+        "method must be a name, a factory, or a pair of optimiser and prior, got 3",
+    ),
     ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
-    ({"settings": {"sapso.coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
-    ({"settings": {"pca.components": "six"}}, "pca.components must be float, got 'six'"),
-    ({"settings": {"tracker.flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
-    ({"settings": {"tracker.relocalise_gap": -1}}, "relocalise_gap must be 0 or more, got -1"),
-    ({"settings": {"tracker.tilt": "upright"}}, r"tilt must be learned \| box \| none, got 'upright'"),
+    (
+        {"settings": {"sapso.coling": 1.0}},
+        "a setting of sapso must be one of .*did you mean 'cooling'",
+    ),
+    (
+        {"settings": {"pca.components": "six"}},
+        "pca.components must be float, got 'six'",
+    ),
+    (
+        {"settings": {"tracker.flor": 1.0}},
+        "a setting of tracker must be one of .*did you mean 'floor'",
+    ),
+    (
+        {"settings": {"tracker.relocalise_gap": -1}},
+        "relocalise_gap must be 0 or more, got -1",
+    ),
+    (
+        {"settings": {"tracker.tilt": "upright"}},
+        r"tilt must be learned \| box \| none, got 'upright'",
+    ),
     ({"settings": {"tracker.beta": 1.5}}, "beta must lie in 0 to 1, got 1.5"),
-    ({"settings": {"tracker.root_range_degrees": (9.0, -15.0, 9.0)}}, "root_range_degrees must be at least 0, got -15"),
-    ({"settings": {"tracker.start": "nowhere"}}, "start must be one of blind, lookup, got 'nowhere'"),
+    (
+        {"settings": {"tracker.root_range_degrees": (9.0, -15.0, 9.0)}},
+        "root_range_degrees must be at least 0, got -15",
+    ),
+    (
+        {"settings": {"tracker.start": "nowhere"}},
+        "start must be one of blind, lookup, got 'nowhere'",
+    ),
     ({"method": "exemplars"}, "evaluations must be at least 715 for exemplars, got 80"),
-    ({"method": "exemplars", "settings": {"spread": 0.0}}, "spread must be above 0, got 0"),
-    ({"method": "exemplars", "settings": {"temperature": np.nan}}, "temperature must be above 0, got nan"),
-    ({"method": "exemplars", "settings": {"lag": -1}}, "lag must be at least 0, got -1"),
+    (
+        {"method": "exemplars", "settings": {"spread": 0.0}},
+        "spread must be above 0, got 0",
+    ),
+    (
+        {"method": "exemplars", "settings": {"temperature": np.nan}},
+        "temperature must be above 0, got nan",
+    ),
+    (
+        {"method": "exemplars", "settings": {"lag": -1}},
+        "lag must be at least 0, got -1",
+    ),
     ({"method": "vsmm", "settings": {"structure": "some"}}, "structure must be"),
-    ({"method": "vsmm", "settings": {"joint_noise": 0.0}}, "joint_noise must be above 0, got 0"),
+    (
+        {"method": "vsmm", "settings": {"joint_noise": 0.0}},
+        "joint_noise must be above 0, got 0",
+    ),
     ({"method": "vsmm:letter"}, "variant must be one of default, patent, got 'letter'"),
     ({"hypotheses": 0}, "hypotheses must be .* got 0"),
     ({"restarts": -1}, "restarts must be 0 or more, got -1"),
@@ -261,37 +411,63 @@ def test_a_misuse_of_track_is_one_clear_error() -> None:
 @each("name", ["sapso", "annealed", "particle"])
 def test_a_search_that_ends_long_before_its_budget_says_so(name: str) -> None:
     optimiser = registry().optimiser(name)(Toy(9), np.random.default_rng(0))
-    with pytest.warns(UserWarning, match="ended its search after 24.. of 100000 evaluations: .* build it with it"):
+    with pytest.warns(
+        UserWarning,
+        match="ended its search after 24.. of 100000 evaluations: .* build it with it",
+    ):
         minimise(sphere, optimiser, 100_000)
 
 
-def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_path: Path) -> None:
-    scene, log = scene_of(["09_01"], frames=(0, 8), size=(120, 90)), list[str]()
+def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(
+    tmp_path: Path,
+) -> None:
+    scene = scene_of(["09_01"], frames=(0, 8), size=(120, 90))
+    log = list[str]()
     np.savez(tmp_path / "masks.npz", masks=masks_of(scene))
-    track = posefit.track(tmp_path / "masks.npz", evaluations=800, body_frames=5, progress=Progress(log.append))
+    track = posefit.track(
+        tmp_path / "masks.npz",
+        evaluations=800,
+        body_frames=5,
+        progress=Progress(log.append),
+    )
     assert track.summary["method"] == "exemplars"
     assert track.summary["train"] == [clip.name for clip in recorded.clips()]
     assert track.summary["build"] is not None
     assert not any("looking for the first pose" in line for line in log)
     assert "fitting the person's build to 5 frames" in log
-    assert not any("again" in line for line in log)  # one camera leaves open which of two poses is right
+    # one camera leaves open which of two poses is right
+    assert not any("again" in line for line in log)
     more = {"train": ["walk-a"], "restarts": 1, "body_frames": 0}
-    posefit.track(tmp_path / "masks.npz", evaluations=800, progress=Progress(log.append), **more)
+    posefit.track(
+        tmp_path / "masks.npz", evaluations=800, progress=Progress(log.append), **more
+    )
     assert "looking for the first pose around 1 pose with such a silhouette" in log
 
 
-def test_footage_by_several_cameras_is_tracked_again_where_evaluations_are_enough(tmp_path: Path) -> None:
+def test_footage_by_several_cameras_is_tracked_again_where_evaluations_are_enough(
+    tmp_path: Path,
+) -> None:
     scene = scene_of(["09_01"], frames=(0, 6), size=(120, 90), view_degrees=(0.0, 90.0))
-    paths, used = [tmp_path / "0.npz", tmp_path / "1.npz"], dict[int, int]()
+    paths = [tmp_path / "0.npz", tmp_path / "1.npz"]
+    used = dict[int, int]()
     for v, path in enumerate(paths):
         np.savez(path, masks=masks_of(scene, v))
-    given: dict[str, Any] = {"train": ["walk-a"], "body_frames": 0, "camera": scene.cameras}
+    given: dict[str, Any] = {
+        "train": ["walk-a"],
+        "body_frames": 0,
+        "camera": scene.cameras,
+    }
     for passes in (1, 2):  # of which each has as many evaluations
         log = list[str]()
-        known = {"evaluations": 2440 * passes, "progress": Progress(log.append), **given}
+        known = {
+            "evaluations": 2440 * passes,
+            "progress": Progress(log.append),
+            **given,
+        }
         track = posefit.track(paths, method="exemplars", **known)
         again = ["tracking the 6 frames again, back in time"] * (passes - 1)
         assert [line for line in log if "again" in line] == again
         assert track.summary["evaluations_per_frame"] == 2440 * passes
         used[passes] = track.measures.evaluations
-    assert 1.5 * used[1] < used[2] <= 6 * 4880  # the effort of both, and no more than is given
+    # the effort of both, and no more than is given
+    assert 1.5 * used[1] < used[2] <= 6 * 4880

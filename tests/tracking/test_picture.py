@@ -35,23 +35,36 @@ def row(**values: float) -> dict[str, float]:
 
 
 def painted(
-    scene: Scene, frame: Frame, values: dict[str, float] | None = None, filmed: Any = None, radii: Array | None = None
+    scene: Scene,
+    frame: Frame,
+    values: dict[str, float] | None = None,
+    filmed: Any = None,
+    radii: Array | None = None,
 ) -> Any:
     """Return the picture of the first frame, and how wide its left half is."""
-    image = Painter(scene).add(frame, scene.observations[0], values or row(), filmed, radii)
+    image = Painter(scene).add(
+        frame, scene.observations[0], values or row(), filmed, radii
+    )
     return image, image.shape[1] - PANEL
 
 
 def pixels(image: Any, colour: tuple[int, int, int], close: int = 0) -> int:
     """Return how many pixels have a colour, or nearly."""
-    return int((np.abs(image.astype(int) - np.array(colour)).max(axis=2) <= close).sum())
+    return int(
+        (np.abs(image.astype(int) - np.array(colour)).max(axis=2) <= close).sum()
+    )
 
 
-def test_an_unsure_limb_fades_on_the_masks_and_beside_them(scene: Scene, frame: Frame) -> None:
+def test_an_unsure_limb_fades_on_the_masks_and_beside_them(
+    scene: Scene, frame: Frame
+) -> None:
     plain, half = painted(scene, frame)
-    np.testing.assert_array_equal(plain, painted(scene, frame, radii=np.full((3, 27), 0.02))[0])
+    np.testing.assert_array_equal(
+        plain, painted(scene, frame, radii=np.full((3, 27), 0.02))[0]
+    )
     radii = np.full((3, 27), 0.02)
-    radii[1, [JOINTS.index(name) for name in ("lfoot", "ltoes", "ltibia")]] = 0.5  # of the 80 % interval
+    # of the 80 % interval
+    radii[1, [JOINTS.index(name) for name in ("lfoot", "ltoes", "ltibia")]] = 0.5
     changed = (plain != painted(scene, frame, radii=radii)[0]).any(axis=2)
     for side in (changed[:, :half], changed[:, half:]):
         assert 0.002 < side.mean() < 0.2
@@ -61,10 +74,17 @@ def test_an_unsure_limb_fades_on_the_masks_and_beside_them(scene: Scene, frame: 
 
 
 @each(("weight", "drawn"), [(0.19, False), (0.2, False), (0.21, True), (0.7, True)])
-def test_another_mode_is_drawn_if_it_has_over_a_fifth(scene: Scene, frame: Frame, weight: float, drawn: bool) -> None:
+def test_another_mode_is_drawn_if_it_has_over_a_fifth(
+    scene: Scene, frame: Frame, weight: float, drawn: bool
+) -> None:
     mirrored = mirrored_poses(scene.body.skeleton, frame.pose[None])[0]
-    modes = [Mode(1.0 - weight, frame.pose, frame.translation), Mode(weight, mirrored, frame.translation)]
-    posterior = Posterior(frame.pose[None], frame.translation[None], np.ones(1), modes=modes)
+    modes = [
+        Mode(1.0 - weight, frame.pose, frame.translation),
+        Mode(weight, mirrored, frame.translation),
+    ]
+    posterior = Posterior(
+        frame.pose[None], frame.translation[None], np.ones(1), modes=modes
+    )
     image, half = painted(scene, replace(frame, posterior=posterior))
     for part in (image[:, :half], image[: PANEL - 60, half:]):  # without the words
         assert (pixels(part, OTHER, close=12) > 100) == drawn
@@ -74,10 +94,15 @@ def test_the_summary_of_a_single_frame_has_each_pose_it_may_be_with_its_weight_a
     scene: Scene, frame: Frame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words: list[str] = []
-    monkeypatch.setattr(picture, "write", lambda image, text, *_, **__: words.append(text))
+    monkeypatch.setattr(
+        picture, "write", lambda image, text, *_, **__: words.append(text)
+    )
     poses = frame.pose + 0.3 * np.arange(6)[:, None] * np.eye(len(frame.pose))[6]
     weights = (0.5, 0.2, 0.1, 0.08, 0.07, 0.02)
-    modes = [Mode(weight, pose, frame.translation) for weight, pose in zip(weights, poses, strict=True)]
+    modes = [
+        Mode(weight, pose, frame.translation)
+        for weight, pose in zip(weights, poses, strict=True)
+    ]
     places = np.tile(frame.translation, (6, 1))
     posterior = Posterior(poses, places, np.array(weights), modes=modes)
     painter = Painter(scene)
@@ -89,11 +114,14 @@ def test_the_summary_of_a_single_frame_has_each_pose_it_may_be_with_its_weight_a
         "or this, 10 %",
         "or this, 8 %",
     ]
-    assert height == 2 * (PANEL // 2 + LABEL_HEIGHT) + LABEL_HEIGHT  # two rows of stills, and the legend
+    # two rows of stills, and the legend
+    assert height == 2 * (PANEL // 2 + LABEL_HEIGHT) + LABEL_HEIGHT
 
 
 @each(("lost", "marked"), [(np.nan, False), (0.49, False), (0.5, True), (1.0, True)])
-def test_a_lost_frame_has_a_border(scene: Scene, frame: Frame, lost: float, marked: bool) -> None:
+def test_a_lost_frame_has_a_border(
+    scene: Scene, frame: Frame, lost: float, marked: bool
+) -> None:
     image, _ = painted(scene, frame, row(lost=lost))
     edges = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
     assert (edges == MISSED).all(axis=1).all() == marked
@@ -105,20 +133,36 @@ def test_a_long_note_is_broken_into_lines_of_one_size() -> None:
     lines = wrapped(note, 300, 0.65)
     assert " ".join(lines) == note
     assert max(width_of(line, 0.65) for line in lines) <= 300
-    assert all(width_of(f"{line} {more.split()[0]}", 0.65) > 300 for line, more in pairwise(lines))
+    assert all(
+        width_of(f"{line} {more.split()[0]}", 0.65) > 300
+        for line, more in pairwise(lines)
+    )
 
 
-def test_peaks_do_not_flatten_a_curve_and_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_peaks_do_not_flatten_a_curve_and_are_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     texts: list[str] = []
-    monkeypatch.setattr(picture, "write", lambda image, text, *_, **__: texts.append(text))
+    monkeypatch.setattr(
+        picture, "write", lambda image, text, *_, **__: texts.append(text)
+    )
     values = 4.0 + np.sin(np.arange(100.0))
 
     def highest(values: Array) -> int:
         """Return the row of the curve's highest pixel in the part that has no peak."""
-        return int(np.flatnonzero((curve(values, "cost", 600, 180, 50)[:, 320:] == BOTH).all(axis=2).any(axis=1))[0])
+        return int(
+            np.flatnonzero(
+                (curve(values, "cost", 600, 180, 50)[:, 320:] == BOTH)
+                .all(axis=2)
+                .any(axis=1)
+            )[0]
+        )
 
     calm = highest(values)
     assert texts[-1] == "cost, frame by frame: 0, mean and maximum"
     values[[10, 11, 30]] = [80.0, 90.0, 40.0]
     assert highest(values) < calm + 70  # of 180; 110 where the axis goes to 90
-    assert texts[-1] == "cost, frame by frame: 0, mean, and the top; above it 90.0 in frame 61, 40.0 in frame 80"
+    assert (
+        texts[-1]
+        == "cost, frame by frame: 0, mean, and the top; above it 90.0 in frame 61, 40.0 in frame 80"
+    )

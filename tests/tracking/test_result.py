@@ -17,11 +17,22 @@ from posefit.silhouette.cost import project
 from tests.cases import each
 from tests.files import arrays
 
-QUICK: dict[str, Any] = {"method": "random@loose", "evaluations": 40, "restarts": 1, "body_frames": 0, "smooth": False}
+QUICK: dict[str, Any] = {
+    "method": "random@loose",
+    "evaluations": 40,
+    "restarts": 1,
+    "body_frames": 0,
+    "smooth": False,
+}
 MOTION = built_in.motion("walk", frames=3)
 BODY = posefit.Body.of(MOTION.skeleton)
 CAMERA = posefit.Camera.around(MOTION.translations[0], 0.5, 3.6, (80, 60))
-MASKS = np.array([project(BODY, CAMERA, *pose) for pose in zip(MOTION.poses, MOTION.translations, strict=True)])
+MASKS = np.array(
+    [
+        project(BODY, CAMERA, *pose)
+        for pose in zip(MOTION.poses, MOTION.translations, strict=True)
+    ]
+)
 
 
 @pytest.fixture(scope="module")
@@ -29,14 +40,24 @@ def track() -> posefit.Track:
     return posefit.track(MASKS, camera=CAMERA, fps=25, **QUICK)
 
 
-def test_the_same_masks_give_the_same_track(track: posefit.Track, tmp_path: Path) -> None:
+def test_the_same_masks_give_the_same_track(
+    track: posefit.Track, tmp_path: Path
+) -> None:
     np.save(tmp_path / "masks.npy", MASKS)
     images = [tmp_path / f"{k}.png" for k in range(len(MASKS))]
     for path, mask in zip(images, MASKS, strict=True):
         cv2.imwrite(str(path), 255 * mask.astype(np.uint8))
-    for source in (tmp_path / "masks.npy", images, list(MASKS), 255 * MASKS.astype(np.uint8), tmp_path):
+    for source in (
+        tmp_path / "masks.npy",
+        images,
+        list(MASKS),
+        255 * MASKS.astype(np.uint8),
+        tmp_path,
+    ):
         again = posefit.track(source, camera=CAMERA, fps=25, **QUICK)
-        np.testing.assert_array_equal(again.joints, track.joints, err_msg=f"{type(source)}")
+        np.testing.assert_array_equal(
+            again.joints, track.joints, err_msg=f"{type(source)}"
+        )
 
 
 @each(
@@ -46,7 +67,10 @@ def test_the_same_masks_give_the_same_track(track: posefit.Track, tmp_path: Path
         (np.zeros((2, 6, 8), bool), "a mask with a person"),
         ([np.zeros((6, 8)), np.zeros((8, 6))], "masks must have one shape"),
         (["missing.png"], "missing.png: expected a file"),
-        (np.moveaxis(MASKS, 0, 2), "must have shape .frames, height, width., got 3 as the width"),
+        (
+            np.moveaxis(MASKS, 0, 2),
+            "must have shape .frames, height, width., got 3 as the width",
+        ),
     ],
 )
 def test_arrays_that_are_no_masks_are_named(masks: Any, words: str) -> None:
@@ -59,21 +83,31 @@ def test_a_track_of_masks_and_one_of_a_motion_pickle(track: posefit.Track) -> No
         copied = pickle.loads(pickle.dumps(result))
         assert copied.summary == result.summary
         np.testing.assert_array_equal(copied.joints, result.joints)
-        before, after = (each.scene.observations[1].silhouettes[0].mask for each in (result, copied))
+        before, after = (
+            each.scene.observations[1].silhouettes[0].mask for each in (result, copied)
+        )
         np.testing.assert_array_equal(after, before)
 
 
-def test_warnings_are_shown_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_warnings_are_shown_without_a_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     posefit.track(~MASKS, camera=CAMERA, **QUICK)
     assert "warning: " in capsys.readouterr().err
 
 
-def test_joints_angles_and_the_table_are_those_of_the_motion(track: posefit.Track) -> None:
+def test_joints_angles_and_the_table_are_those_of_the_motion(
+    track: posefit.Track,
+) -> None:
     table = track.to_pandas()
     assert track.joints.shape == (3, 27, 3)
-    np.testing.assert_array_equal(table["left_knee_flexion"], track.angles("left_knee_flexion"))
+    np.testing.assert_array_equal(
+        table["left_knee_flexion"], track.angles("left_knee_flexion")
+    )
     np.testing.assert_allclose(table["seconds"], [0.0, 0.04, 0.08])
-    np.testing.assert_array_equal(table["left_knee_y"], track.joints[:, track.joint_names.index("left_knee"), 1])
+    np.testing.assert_array_equal(
+        table["left_knee_y"], track.joints[:, track.joint_names.index("left_knee"), 1]
+    )
     with pytest.raises(InputError, match="did you mean 'left_knee_flexion'"):
         track.angles("left_knee_flexio")
 
@@ -95,8 +129,11 @@ def test_a_mask_is_fitted() -> None:
     assert fit.pose.shape == (66,)
 
 
-def test_files_and_a_page_come_later_too(track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(time, "strftime", lambda _: "1 July 2026")  # no midnight between the two
+def test_files_and_a_page_come_later_too(
+    track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # no midnight between the two
+    monkeypatch.setattr(time, "strftime", lambda _: "1 July 2026")
     track.save(tmp_path / "out")
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", opened.append)
@@ -107,14 +144,31 @@ def test_files_and_a_page_come_later_too(track: posefit.Track, tmp_path: Path, m
 
 def test_the_files_of_a_track_have_the_build_that_was_fitted(tmp_path: Path) -> None:
     motion = built_in.motion("walk", frames=6)
-    masks = [project(BODY, CAMERA, *pose) for pose in zip(motion.poses, motion.translations, strict=True)]
-    track = posefit.track(masks, camera=CAMERA, fps=25, out=tmp_path / "out", **{**QUICK, "body_frames": 6})
+    masks = [
+        project(BODY, CAMERA, *pose)
+        for pose in zip(motion.poses, motion.translations, strict=True)
+    ]
+    track = posefit.track(
+        masks,
+        camera=CAMERA,
+        fps=25,
+        out=tmp_path / "out",
+        **{**QUICK, "body_frames": 6},
+    )
     assert track.log.build is not None
-    np.testing.assert_array_equal(arrays(tmp_path / "out" / "poses.npz")["radii"], track.scene.body.radii)
+    np.testing.assert_array_equal(
+        arrays(tmp_path / "out" / "poses.npz")["radii"], track.scene.body.radii
+    )
 
 
 def test_methods_are_compared(tmp_path: Path) -> None:
-    compared = posefit.compare(["random@pca", "sapso@pca"], seeds=1, frames=2, evaluations=80, out=tmp_path / "kept")
+    compared = posefit.compare(
+        ["random@pca", "sapso@pca"],
+        seeds=1,
+        frames=2,
+        evaluations=80,
+        out=tmp_path / "kept",
+    )
     assert list(compared.to_pandas()["method"]) == ["random@pca", "sapso@pca"]
     compared.report(tmp_path / "report.html")
     assert (tmp_path / "report.html").stat().st_size > 1000

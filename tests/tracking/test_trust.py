@@ -35,7 +35,9 @@ from tests.cases import each
 from tests.tracking.scenes import exact_frames, tracked, viewed, walk
 
 ALL = np.ones(60, dtype=bool)
-FINE: dict[str, Any] = {name: sign.limits[0] if sign.limits else 90.0 for name, sign in SIGNS.items()}
+FINE: dict[str, Any] = {
+    name: sign.limits[0] if sign.limits else 90.0 for name, sign in SIGNS.items()
+}
 FINE |= {"frames": 100, "size_m": 1.8, "height_m": 1.8}
 
 
@@ -50,65 +52,92 @@ def test_the_longer_side_of_a_mask_is_that_of_its_bounding_box() -> None:
 
 def test_depth_scatters_by_what_no_smooth_path_explains() -> None:
     time = np.arange(60) / 30.0
-    assert depth_scatter(8.0 - 1.2 * time + 0.3 * time**2, ALL, 30.0) == pytest.approx(0.0, abs=1e-9)
-    alternating = 10.0 + 0.5 * (-1.0) ** np.arange(60)  # 5 % to either side of a path that stays at 10 m
+    assert depth_scatter(8.0 - 1.2 * time + 0.3 * time**2, ALL, 30.0) == pytest.approx(
+        0.0, abs=1e-9
+    )
+    # 5 % to either side of a path that stays at 10 m
+    alternating = 10.0 + 0.5 * (-1.0) ** np.arange(60)
     assert depth_scatter(alternating, ALL, 30.0) == pytest.approx(0.05, rel=0.15)
-    depths, usable = np.full(60, 8.0), ALL.copy()
+    depths = np.full(60, 8.0)
+    usable = ALL.copy()
     depths[30], usable[30] = 80.0, False
     assert depth_scatter(depths, usable, 30.0) == pytest.approx(0.0, abs=1e-9)
     assert depth_scatter(depths, ~ALL, 30.0) is None
 
 
 def test_stances_at_two_heights_are_half_of_that_apart() -> None:
-    joints, stands = np.zeros((16, len(JOINTS), 3)), np.zeros((16, 2), dtype=bool)
-    joints[:, BALLS[0], 1] = np.repeat([0.0, 2.0, 0.03, 2.03], 4)  # the left foot stands, is lifted, stands, is lifted
+    joints = np.zeros((16, len(JOINTS), 3))
+    stands = np.zeros((16, 2), dtype=bool)
+    # the left foot stands, is lifted, stands, is lifted
+    joints[:, BALLS[0], 1] = np.repeat([0.0, 2.0, 0.03, 2.03], 4)
     stands[0:4, 0] = stands[8:12, 0] = True
-    assert stance_spread(joints, stands) == pytest.approx(0.015)  # the standard deviation of 0 and 3 cm
+    # the standard deviation of 0 and 3 cm
+    assert stance_spread(joints, stands) == pytest.approx(0.015)
     assert stance_spread(joints[:8], stands[:8]) is None
 
 
 @each(
     ("usable", "cut", "held"),
     [
-        ("00101100", "00000000", 0.25),  # nobody is missed before the person comes and after they have gone
+        # nobody is missed before the person comes and after they have gone
+        ("00101100", "00000000", 0.25),
         ("00000000", "00000000", 1.0),
-        ("1100011011", "0001000000", 0.4),  # in the middle of a gap no mask beside it says that the person left
+        # in the middle of a gap no mask beside it says that the person left
+        ("1100011011", "0001000000", 0.4),
         ("1100011011", "0011000000", 0.1),  # they are out of the picture
     ],
 )
-def test_frames_between_others_that_show_too_little_are_held(usable: str, cut: str, held: float) -> None:
+def test_frames_between_others_that_show_too_little_are_held(
+    usable: str, cut: str, held: float
+) -> None:
     assert held_share(*(np.array([*digits]) == "1" for digits in (usable, cut))) == held
 
 
 def test_a_body_covers_half_of_what_moves() -> None:
-    then, now = np.zeros((80, 80, 3), dtype=np.uint8), np.zeros((80, 80, 3), dtype=np.uint8)
-    now[20:40, 10:20] = now[20:40, 40:50] = 255  # an arm and a leg of 20 by 10 pixels move
-    body, nothing = np.zeros((80, 80), dtype=bool), np.zeros((80, 80), dtype=bool)
+    then = np.zeros((80, 80, 3), dtype=np.uint8)
+    now = np.zeros((80, 80, 3), dtype=np.uint8)
+    # an arm and a leg of 20 by 10 pixels move
+    now[20:40, 10:20] = now[20:40, 40:50] = 255
+    body = np.zeros((80, 80), dtype=bool)
+    nothing = np.zeros((80, 80), dtype=bool)
     body[20:40, 10:20] = True
     inside, everything = covered_pixels(now, then, body, nothing, 60.0)
     assert everything == 2 * inside > 300  # but for the corners, which count as noise
-    assert covered_pixels(then, then + 5, ~nothing, ~nothing, 60.0) == (0, 0)  # light that flickers is no motion
+    # light that flickers is no motion
+    assert covered_pixels(then, then + 5, ~nothing, ~nothing, 60.0) == (0, 0)
     assert covered_pixels(now, then, nothing, nothing, 60.0) == (0, 0)
 
 
 @each(
     ("changes", "words"),
     [
-        ({"unknown": 0.92}, "doubtful: left and right are unknown in 92% of the frames"),
+        (
+            {"unknown": 0.92},
+            "doubtful: left and right are unknown in 92% of the frames",
+        ),
         (
             {"training_mm": 75.0},
             "doubtful: one camera leaves depth to the motions learned from, and the nearest are 75 mm away",
         ),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
-        ({"held": 0.4}, "doubtful: the person is mostly out of sight in 40% of the frames in between"),
+        (
+            {"held": 0.4},
+            "doubtful: the person is mostly out of sight in 40% of the frames in between",
+        ),
         (
             {"cropped": 1.0, "training_mm": 218.0},
             "do not use: the picture's border cuts the mask above and below in 100% of the frames: masks cropped to "
             "the person do not show where they are, and 1 more sign speaks against it",
         ),
         ({"iou": 0.41}, "do not use: the body and the mask overlap by 41% only"),
-        ({"size_ratio": 0.8, "size_m": 1.44}, "doubtful: the person seems to be 1.44 m tall, not 1.80 m"),
-        ({"size_ratio": 1.5, "size_m": 2.7}, "do not use: the person seems to be 2.70 m tall, not 1.80 m"),
+        (
+            {"size_ratio": 0.8, "size_m": 1.44},
+            "doubtful: the person seems to be 1.44 m tall, not 1.80 m",
+        ),
+        (
+            {"size_ratio": 1.5, "size_m": 2.7},
+            "do not use: the person seems to be 2.70 m tall, not 1.80 m",
+        ),
         ({"depth_scatter": 0.3}, "do not use: the distance jumps by 30%"),
         ({"foot_share": 0.1}, "doubtful: a foot stands in 10% of the frames only"),
         ({"stance_spread_m": 0.3}, "doubtful: feet stand at heights 0.30 m apart"),
@@ -121,7 +150,9 @@ def test_a_body_covers_half_of_what_moves() -> None:
         ),
     ],
 )
-def test_the_worst_sign_is_named_and_the_others_are_counted(changes: dict[str, Any], words: str) -> None:
+def test_the_worst_sign_is_named_and_the_others_are_counted(
+    changes: dict[str, Any], words: str
+) -> None:
     figures = FINE | changes
     assert sentence(figures, signs_against(figures)) == f"Trust: {words}."
 
@@ -136,18 +167,27 @@ def test_a_track_without_a_sign_against_it_is_good() -> None:
 
 
 def test_three_doubtful_signs_together_are_as_bad_as_a_useless_one() -> None:
-    signs = signs_against(FINE | {"unknown": 0.49, "lost": 0.24, "acceleration": 20.0})  # a person waves, one camera
+    # a person waves, one camera
+    signs = signs_against(FINE | {"unknown": 0.49, "lost": 0.24, "acceleration": 20.0})
     assert [grade for grade, _ in signs] == ["doubtful"] * 3
     assert grade_of(signs) == "useless"
     assert grade_of(signs[:2]) == "doubtful"
 
 
 def trusted(
-    scene: Scene, tracked: list[Frame] | None = None, reported: float = 0.0, training: Sequence[Motion] = ()
+    scene: Scene,
+    tracked: list[Frame] | None = None,
+    reported: float = 0.0,
+    training: Sequence[Motion] = (),
 ) -> Trust:
     """Return the trust in the true track of a scene that a tracker estimated as `tracked`."""
     frames = exact_frames(scene)
-    row = {"usable": 1.0, "lost": reported, "unknown_sides": reported, "interval_mm": 1e3 * reported}
+    row = {
+        "usable": 1.0,
+        "lost": reported,
+        "unknown_sides": reported,
+        "interval_mm": 1e3 * reported,
+    }
     table = {name: np.full(len(frames), value) for name, value in row.items()}
     return trust_of(scene, tracked or frames, frames, table, 0.9, training)
 
@@ -161,7 +201,8 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
         **dict.fromkeys(("training_mm", "frontal"), "several cameras see the depth"),
     }
     trust = trusted(replace(scene, body=scene.body.scaled(0.8, 0.8)))
-    assert trust.size_ratio == pytest.approx(1.25, abs=0.06)  # by perspective, and poses that rest on their root
+    # by perspective, and poses that rest on their root
+    assert trust.size_ratio == pytest.approx(1.25, abs=0.06)
     assert "the person seems to be" in trust.sentence
     trust = trusted(walk(30), reported=np.nan)
     assert trust.size_ratio is None
@@ -175,11 +216,17 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
 def test_motion_says_nothing_where_the_camera_moves() -> None:
     scene = walk(30, (20.0, 110.0))
     camera = scene.cameras[0]
-    pictures = [np.full((camera.height, camera.width, 3), 90 * (k // 3 % 2), dtype=np.uint8) for k in range(30)]
+    pictures = [
+        np.full((camera.height, camera.width, 3), 90 * (k // 3 % 2), dtype=np.uint8)
+        for k in range(30)
+    ]
     scene = replace(scene, pictures=lambda: iter(pictures))
     assert trusted(scene).grade == "useless"
     trust = trusted(replace(scene, camera_moves=True))
-    assert (trust.grade, trust.unknown_signs["explained"]) == ("good", "the camera moves")
+    assert (trust.grade, trust.unknown_signs["explained"]) == (
+        "good",
+        "the camera moves",
+    )
 
 
 def test_masks_cropped_to_the_person_are_the_reason() -> None:
@@ -188,21 +235,31 @@ def test_masks_cropped_to_the_person_are_the_reason() -> None:
     for observation in scene.observations:
         mask = observation.silhouettes[0].mask
         box = np.ix_(np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0)))
-        large = cv2.resize(mask[box].astype(np.uint8), mask.shape[::-1], interpolation=cv2.INTER_NEAREST)
+        large = cv2.resize(
+            mask[box].astype(np.uint8),
+            mask.shape[::-1],
+            interpolation=cv2.INTER_NEAREST,
+        )
         cropped.append(replace(observation, silhouettes=[Silhouette.of(large)]))
     assert trusted(scene).cropped == 0.0
     trust = trusted(replace(scene, observations=cropped))
-    assert "cuts the mask above and below in 100% of the frames: masks cropped" in trust.against[0]
+    assert (
+        "cuts the mask above and below in 100% of the frames: masks cropped"
+        in trust.against[0]
+    )
 
 
 def test_a_track_by_one_camera_is_doubtful_far_from_what_was_learned() -> None:
     scene = walk(30)
     motion = scene.truth
     assert trusted(scene, training=[motion]).grade == "good"
-    bent = replace(motion, poses=motion.poses + 0.1 * (np.arange(66) >= 3))  # radians, at every joint
+    # radians, at every joint
+    bent = replace(motion, poses=motion.poses + 0.1 * (np.arange(66) >= 3))
     trust = trusted(scene, training=[bent])
     assert trust.training_mm > 60.0
-    assert trust.against[0].startswith("one camera leaves depth to the motions learned from, and the nearest are ")
+    assert trust.against[0].startswith(
+        "one camera leaves depth to the motions learned from, and the nearest are "
+    )
     assert trust.grade == "doubtful"
     assert trusted(walk(30, (20.0, 110.0)), training=[bent]).training_mm is None
 
@@ -219,7 +276,10 @@ def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
     scene = walk(30)
     eye = scene.cameras[0].position
     shaken = [
-        replace(frame, translation=eye + (frame.translation - eye) * (1.0 + 0.1 * (-1.0) ** k))
+        replace(
+            frame,
+            translation=eye + (frame.translation - eye) * (1.0 + 0.1 * (-1.0) ** k),
+        )
         for k, frame in enumerate(exact_frames(scene))
     ]
     trust = trusted(scene, shaken)
@@ -227,15 +287,24 @@ def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
     assert "the distance jumps by 1" in trust.sentence
 
 
-def test_the_sentence_stands_on_top_of_every_output_where_the_truth_is_unknown(tmp_path: Path) -> None:
+def test_the_sentence_stands_on_top_of_every_output_where_the_truth_is_unknown(
+    tmp_path: Path,
+) -> None:
     scene = walk(3)
     viewed(tmp_path / "known", scene, exact_frames(scene))
-    assert json.loads((tmp_path / "known" / "summary.json").read_text())["trust"] is None
+    assert (
+        json.loads((tmp_path / "known" / "summary.json").read_text())["trust"] is None
+    )
     page = viewed(tmp_path / "unknown", replace(scene, truth=None), exact_frames(scene))
     summary = json.loads((tmp_path / "unknown" / "summary.json").read_text())
     expected = "Trust: doubtful: only 3 frames to judge the person by."
     assert summary["trust"]["sentence"] == expected
-    assert str(tracked(replace(scene, truth=None), exact_frames(scene))).splitlines()[0] == expected
-    assert f'"verdict":"{expected} The method does not report' in page.read_text("utf-8").replace('": "', '":"')
+    assert (
+        str(tracked(replace(scene, truth=None), exact_frames(scene))).splitlines()[0]
+        == expected
+    )
+    assert f'"verdict":"{expected} The method does not report' in page.read_text(
+        "utf-8"
+    ).replace('": "', '":"')
     image = cv2.imread(str(tmp_path / "unknown" / "summary.png"))
     assert (image[8:32].max(axis=2) > 200).any()  # of the sentence's letters

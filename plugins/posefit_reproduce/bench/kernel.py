@@ -32,7 +32,8 @@ def fastest(jobs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
         job()
     for _ in range(ROUNDS):
         for name, job in jobs.items():
-            until, ended = time.perf_counter() + TURN, -np.inf
+            until = time.perf_counter() + TURN
+            ended = -np.inf
             while ended < until:  # once at least, however late it is
                 began = time.perf_counter()
                 job()
@@ -47,13 +48,24 @@ def processor() -> dict[str, str]:
 
     listed = Path("/proc/cpuinfo")
     lines = listed.read_text().splitlines() if listed.exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    names = [
+        line.partition(":")[2].strip()
+        for line in lines
+        if line.startswith("model name")
+    ]
     _, compiled_for, _ = cpu_target.target_context.codegen().magic_tuple()
-    return {"name": names[0] if names else platform.processor() or platform.machine(), "compiled_for": compiled_for}
+    return {
+        "name": names[0] if names else platform.processor() or platform.machine(),
+        "compiled_for": compiled_for,
+    }
 
 
 def bench_problem(
-    threads: int = 1, *, width: int = SIZE[0], views: int = 1, components: int = COMPONENTS
+    threads: int = 1,
+    *,
+    width: int = SIZE[0],
+    views: int = 1,
+    components: int = COMPONENTS,
 ) -> PoseProblem:
     """Return the benchmark's problem: one frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
     motion = built_in.motion("walk", frames=1, fps=30.0)
@@ -61,12 +73,23 @@ def bench_problem(
     prior = PCA(components=components).fit(walking_angles())
     joints = motion.skeleton.joints(motion.poses, motion.translations)[0]
     yaws = motion.poses[0, 0] + np.radians(45.0 + 360.0 / views * np.arange(views))
-    cameras = [Camera.framing(joints, body.joint_radii(), yaw, (width, 3 * width // 4)) for yaw in yaws]
+    cameras = [
+        Camera.framing(joints, body.joint_radii(), yaw, (width, 3 * width // 4))
+        for yaw in yaws
+    ]
     space = SearchSpace(
-        prior, np.array([motion.poses[0, 0], 0.0, 0.0]), np.radians([45.0, 15.0, 15.0]), motion.translations[0]
+        prior,
+        np.array([motion.poses[0, 0], 0.0, 0.0]),
+        np.radians([45.0, 15.0, 15.0]),
+        motion.translations[0],
     )
-    masks = [project(body, camera, motion.poses[0], motion.translations[0]) for camera in cameras]
-    return PoseProblem(body, cameras, [Silhouette.of(mask) for mask in masks], space, threads=threads)
+    masks = [
+        project(body, camera, motion.poses[0], motion.translations[0])
+        for camera in cameras
+    ]
+    return PoseProblem(
+        body, cameras, [Silhouette.of(mask) for mask in masks], space, threads=threads
+    )
 
 
 def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
@@ -75,24 +98,39 @@ def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
     Kinematics, prior and outlines are computed for all n poses at once in NumPy; drawing is two circles and a
     quadrilateral a bone, at 1/16 pixel.
     """
-    body, camera, silhouette = problem.body, problem.cameras[0], problem.silhouettes[0]
+    body = problem.body
+    camera = problem.cameras[0]
+    silhouette = problem.silhouettes[0]
     poses, translations = problem.decode(proposals)
     pixels, depths = camera.project(body.skeleton.joints(poses, translations))
     scale = np.sqrt(camera.focal.prod()) / depths
     parents = np.array(PARENTS[1:])
-    first, second = pixels[:, parents], pixels[:, 1:]
-    radius0, radius1 = scale[:, parents] * body.radii[:, 0], scale[:, 1:] * body.radii[:, 1]
+    first = pixels[:, parents]
+    second = pixels[:, 1:]
+    radius0 = scale[:, parents] * body.radii[:, 0]
+    radius1 = scale[:, 1:] * body.radii[:, 1]
     axis = second - first
     square = (axis**2).sum(axis=-1)
     along = ((radius0 - radius1) / square)[..., None]
-    across = (np.sqrt(np.maximum(square - (radius0 - radius1) ** 2, 0.0)) / square)[..., None]
+    across = (np.sqrt(np.maximum(square - (radius0 - radius1) ** 2, 0.0)) / square)[
+        ..., None
+    ]
     normal = np.stack([-axis[..., 1], axis[..., 0]], axis=-1)
-    up, down = along * axis + across * normal, along * axis - across * normal
-    r0, r1 = radius0[..., None], radius1[..., None]
-    corners = np.stack([first + r0 * up, second + r1 * up, second + r1 * down, first + r0 * down], axis=2)
+    up = along * axis + across * normal
+    down = along * axis - across * normal
+    r0 = radius0[..., None]
+    r1 = radius1[..., None]
+    corners = np.stack(
+        [first + r0 * up, second + r1 * up, second + r1 * down, first + r0 * down],
+        axis=2,
+    )
     corners = np.rint((corners - 0.5) * 16).astype(np.int32)
-    starts, ends = (np.rint((points - 0.5) * 16).astype(int).tolist() for points in (first, second))
-    start_radii, end_radii = (np.rint(radii * 16).astype(int).tolist() for radii in (radius0, radius1))
+    starts, ends = (
+        np.rint((points - 0.5) * 16).astype(int).tolist() for points in (first, second)
+    )
+    start_radii, end_radii = (
+        np.rint(radii * 16).astype(int).tolist() for radii in (radius0, radius1)
+    )
     observed = silhouette.mask.view(np.uint8)
     total = cv2.countNonZero(observed)
     image = np.zeros_like(observed)

@@ -15,10 +15,18 @@ from posefit.fitting.space import SearchSpace
 from posefit.registry import Offer, registry
 from posefit.settings import planned
 from posefit.sweep.pool import cores
-from posefit_reproduce.bench.kernel import SIZE, bench_problem, fastest, opencv_costs, processor
+from posefit_reproduce.bench.kernel import (
+    SIZE,
+    bench_problem,
+    fastest,
+    opencv_costs,
+    processor,
+)
 
 POSES = 1000  # in a call
-PARTICLES, EVALUATIONS = 40, 2440  # of a search
+# of a search
+PARTICLES = 40
+EVALUATIONS = 2440
 SEARCHES = 5  # of each optimiser, of which the fastest counts
 SLOW_SECONDS = 3.0  # after which an optimiser begins no other search
 
@@ -30,14 +38,17 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
     kinematics and outlines computed for 200 poses at once, the fastest way that still draws with OpenCV.
     """
     many = threads or cores()
-    alone, together = bench_problem(), bench_problem(many)
+    alone = bench_problem()
+    together = bench_problem(many)
     proposals = draw_population(alone.space, np.random.default_rng(0), POSES)
     few = proposals[: POSES // 5]
     jobs: dict[str, Callable[[], object]] = {
         "one": lambda: alone.evaluate(proposals),
         "all": lambda: together.evaluate(proposals),
         "population": lambda: alone.evaluate(proposals[:PARTICLES]),
-        "opencv": lambda: [opencv_costs(alone, few[i : i + 1]) for i in range(len(few))],
+        "opencv": lambda: [
+            opencv_costs(alone, few[i : i + 1]) for i in range(len(few))
+        ],
         "opencv_batched": lambda: opencv_costs(alone, few),
     }
     opencv_threads = cv2.getNumThreads()
@@ -65,10 +76,12 @@ def ask_and_tell(space: SearchSpace) -> dict[str, float]:
     Populations are of 40 where their size can be set. The best of several searches, on one thread.
     """
     figures = {}
-    with threadpool_limits(1):  # as a track has it: BLAS is slower with more threads where matrices are small
+    # as a track has it: BLAS is slower with more threads where matrices are small
+    with threadpool_limits(1):
         for name, offer in registry().offers["optimiser"].items():
             if not offer.missing:
-                ended, seconds = time.perf_counter() + SLOW_SECONDS, [search_seconds(space, offer, 0)]
+                ended = time.perf_counter() + SLOW_SECONDS
+                seconds = [search_seconds(space, offer, 0)]
                 while len(seconds) < SEARCHES and time.perf_counter() < ended:
                     seconds.append(search_seconds(space, offer, len(seconds)))
                 figures[name] = 1e6 * min(seconds)
@@ -77,13 +90,23 @@ def ask_and_tell(space: SearchSpace) -> dict[str, float]:
 
 def search_seconds(space: SearchSpace, offer: Offer, seed: int) -> float:
     """Return the seconds of a search, a proposal; of a filter, those of ten frames with the steps between them."""
-    sizes = {setting.name: PARTICLES for setting in offer.settings if setting.name == "population_size"}
+    sizes = {
+        setting.name: PARTICLES
+        for setting in offer.settings
+        if setting.name == "population_size"
+    }
     carries = offer.next_frame == "carry"
     evaluations = EVALUATIONS // 10 if carries else EVALUATIONS
-    optimiser = offer.factory(space, np.random.default_rng(seed), **planned(offer.factory, sizes, evaluations))
-    count, began = 0, time.perf_counter()
+    optimiser = offer.factory(
+        space, np.random.default_rng(seed), **planned(offer.factory, sizes, evaluations)
+    )
+    count = 0
+    began = time.perf_counter()
     for _ in range(10 if carries else 1):
-        count += sum(len(proposals) for proposals, _ in populations(optimiser, _cost, evaluations))
+        count += sum(
+            len(proposals)
+            for proposals, _ in populations(optimiser, _cost, evaluations)
+        )
         if carries:
             cast(Filter, optimiser).advance(space)
     return (time.perf_counter() - began) / count

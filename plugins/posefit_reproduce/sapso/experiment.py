@@ -33,12 +33,23 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS
 from posefit_reproduce.experiment import Arrays, Run
-from posefit_reproduce.sapso.methods import LETTER, METHODS, OTHERS, OURS, PAPER, PARTS, TURNING
+from posefit_reproduce.sapso.methods import (
+    LETTER,
+    METHODS,
+    OTHERS,
+    OURS,
+    PAPER,
+    PARTS,
+    TURNING,
+)
 from posefit_reproduce.sapso.motions import PaperMotion, paper_motions, paper_scene
 from posefit_reproduce.sapso.paper import FRAMES, SWARMS
 
-PARTICLES, ITERATIONS = 40, 60  # section 5.2
-OCCLUDER = 0.5  # strength of the occluder that hides a part of the silhouette, as in figure 8
+# section 5.2
+PARTICLES = 40
+ITERATIONS = 60
+# strength of the occluder that hides a part of the silhouette, as in figure 8
+OCCLUDER = 0.5
 BOTH = (OURS, LETTER)
 COMPARED = {
     "walk": (*PAPER, *OTHERS, *PARTS),
@@ -69,12 +80,20 @@ class Scale:
             for view, method in product(self.views, (*COMPARED[motion], *BASELINES)):
                 yield Run("track", motion, method, view, seed)
             if motion != "turn":
-                yield from (Run("first", motion, method, view, seed) for view, method in product(self.views, BOTH))
+                yield from (
+                    Run("first", motion, method, view, seed)
+                    for view, method in product(self.views, BOTH)
+                )
             if seed % 2:
                 continue
             methods = (OURS,) if seed else BOTH
-            yield from (Run("image", motion, method, view, seed) for view, method in product(self.around, methods))
-            for kind, view, method in product(("hidden", "unknown"), self.views, methods):
+            yield from (
+                Run("image", motion, method, view, seed)
+                for view, method in product(self.around, methods)
+            )
+            for kind, view, method in product(
+                ("hidden", "unknown"), self.views, methods
+            ):
                 yield Run(kind, motion, method, view, seed)
 
 
@@ -98,9 +117,13 @@ def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
     else:
         observations: Sequence[Observation] = scene.observations
         if run.kind == "hidden":
-            observations = with_corruption(observations, {"occluder": OCCLUDER}, 0.0, run.seed)
+            observations = with_corruption(
+                observations, {"occluder": OCCLUDER}, 0.0, run.seed
+            )
         images = dict(enumerate(observations))
-        frames = estimate_images(scene, images, motion.training, run.method, scale.iterations, run.seed)
+        frames = estimate_images(
+            scene, images, motion.training, run.method, scale.iterations, run.seed
+        )
     return {
         "poses": np.array([frame.pose for frame in frames]),
         "cpu_seconds": np.median([frame.cpu_seconds or 0.0 for frame in frames]),
@@ -108,12 +131,20 @@ def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
     }
 
 
-def options_of(name: str, training: Sequence[Motion], iterations: int) -> dict[str, Any]:
+def options_of(
+    name: str, training: Sequence[Motion], iterations: int
+) -> dict[str, Any]:
     """Return the options of a method's tracks, all with N (C + 1) evaluations a frame."""
-    options = {"train": training, "evaluations": PARTICLES * (iterations + 1), **METHODS[name].options}
+    options = {
+        "train": training,
+        "evaluations": PARTICLES * (iterations + 1),
+        **METHODS[name].options,
+    }
     method = options["method"]
     if isinstance(method, tuple) and isinstance(method[1], type):
-        learned = method[1]().fit(np.concatenate([motion.poses[:, 3:] for motion in training]))
+        learned = method[1]().fit(
+            np.concatenate([motion.poses[:, 3:] for motion in training])
+        )
         options["method"] = method[0], learned
     return options
 
@@ -122,40 +153,69 @@ def follow(scene: Scene, motion: PaperMotion, scale: Scale, run: Run) -> list[Fr
     """Track a motion; the first pose is searched, from any yaw if it is unknown, and the translation is known."""
     options = options_of(run.method, motion.training, scale.iterations)
     if run.kind == "unknown":
-        return track(replace(scene, yaw=None), restarts=RESTARTS, seed=run.seed, **options).frames
+        return track(
+            replace(scene, yaw=None), restarts=RESTARTS, seed=run.seed, **options
+        ).frames
     return track(scene, seed=run.seed, **options).frames
 
 
 def estimate_images(
-    scene: Scene, images: Mapping[int, Observation], training: Sequence[Motion], name: str, iterations: int, seed: int
+    scene: Scene,
+    images: Mapping[int, Observation],
+    training: Sequence[Motion],
+    name: str,
+    iterations: int,
+    seed: int,
 ) -> list[Frame]:
     """Return the pose in each image by itself, whichever way the person faces: a full circle of yaws. Section 5.3.
 
     `images` are observations of the scene by their frames' numbers; a method is run that `METHODS` names.
     """
-    options = completed(TrackOptions(**options_of(name, training, iterations), seed=seed), scene.truth)
+    options = completed(
+        TrackOptions(**options_of(name, training, iterations), seed=seed), scene.truth
+    )
     task = replace(task_of(scene, options, training), yaw=None)  # Interpretation S17
-    method, frames = prepare(options, task), list[Frame]()
+    method = prepare(options, task)
+    frames = list[Frame]()
     for k, image in images.items():
         known = image.translation
-        anchor = place_of(image.silhouettes, scene.cameras, scene.body.stature) if known is None else np.asarray(known)
-        frames += method.follow(replace(task, anchor=anchor), [image], np.random.default_rng([seed, k]))
+        anchor = (
+            place_of(image.silhouettes, scene.cameras, scene.body.stature)
+            if known is None
+            else np.asarray(known)
+        )
+        frames += method.follow(
+            replace(task, anchor=anchor), [image], np.random.default_rng([seed, k])
+        )
     return frames
 
 
 def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
     """Return the poses (T, 66) of a baseline, with the true root and translation, which no method has."""
-    truth, angles = motion.test.poses, motion.angles
+    truth = motion.test.poses
+    angles = motion.angles
     if name == "persistence":
         return np.tile(truth[0], (len(truth), 1))
     if name == "nearest":
-        return np.array([nearest(scene, angles, k, image) for k, image in enumerate(scene.observations)])
-    return np.column_stack([truth[:, :3], np.tile(angles.mean(axis=0), (len(truth), 1))])
+        return np.array(
+            [
+                nearest(scene, angles, k, image)
+                for k, image in enumerate(scene.observations)
+            ]
+        )
+    return np.column_stack(
+        [truth[:, :3], np.tile(angles.mean(axis=0), (len(truth), 1))]
+    )
 
 
-def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run) -> Frame:
+def first_frame(
+    motion: PaperMotion, iterations: int, particles: int, run: Run
+) -> Frame:
     """Return what a method makes of the first frame with a swarm of some size."""
     options = options_of(run.method, motion.training, iterations)
-    options["settings"] = {**options["settings"], f"{run.method.partition('@')[0]}.population_size": particles}
+    options["settings"] = {
+        **options["settings"],
+        f"{run.method.partition('@')[0]}.population_size": particles,
+    }
     options |= {"evaluations": particles * (iterations + 1), "seed": run.seed}
     return track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]

@@ -22,7 +22,13 @@ from posefit_reproduce.sapso.experiment import ITERATIONS, options_of
 from posefit_reproduce.sapso.methods import LABELS as METHODS
 from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
 from posefit_reproduce.sapso.motions import LABELS, PaperMotion, paper_scene
-from posefit_reproduce.sapso.paper import CONVERGED, SHOWN_ITERATIONS, SHOWN_PARTICLES, SMALL_DEGREES, SWARMS
+from posefit_reproduce.sapso.paper import (
+    CONVERGED,
+    SHOWN_ITERATIONS,
+    SHOWN_PARTICLES,
+    SMALL_DEGREES,
+    SWARMS,
+)
 from posefit_reproduce.sapso.tables import Analysis
 from posefit_swarm.sapso import SAPSO
 
@@ -42,7 +48,9 @@ def paper_figures(analysis: Analysis) -> Iterator[tuple[str, Figure]]:
     yield "figure-9-frames.png", frame_figure(analysis)
 
 
-def _in_compact_space(analysis: Analysis, draw: Callable[[Any, PaperMotion, PCA], str]) -> Figure:
+def _in_compact_space(
+    analysis: Analysis, draw: Callable[[Any, PaperMotion, PCA], str]
+) -> Figure:
     """Return the first three latents of two motions, drawn by a function that returns a title."""
     figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     for k, motion in enumerate(MOTIONS):
@@ -50,7 +58,9 @@ def _in_compact_space(analysis: Analysis, draw: Callable[[Any, PaperMotion, PCA]
         axes.set(xlabel="latent 1", ylabel="latent 2", zlabel="latent 3")
         axes.tick_params(labelsize=7)
         axes.set_box_aspect(None, zoom=0.88)  # else the last label is cut
-        title = draw(axes, analysis.motions[motion], PCA().fit(analysis.motions[motion].angles))
+        title = draw(
+            axes, analysis.motions[motion], PCA().fit(analysis.motions[motion].angles)
+        )
         axes.set_title(f"{LABELS[motion]}: {title}", fontsize=9)
     return figure
 
@@ -59,7 +69,14 @@ def _latents(axes: Any, motion: PaperMotion, prior: PCA) -> str:
     """Draw the training poses, a colour a clip."""
     for clip, colour in zip(motion.training, COLOURS, strict=False):
         points = prior.transform(clip.poses[:, 3:])
-        axes.plot(*points[:, :3].T, ".-", color=colour, markersize=3, linewidth=0.4, label=clip.name)
+        axes.plot(
+            *points[:, :3].T,
+            ".-",
+            color=colour,
+            markersize=3,
+            linewidth=0.4,
+            label=clip.name,
+        )
     axes.legend(fontsize=7, frameon=False)
     shares = 100.0 * prior.explained
     return f"{shares[:3].sum():.0f} % of the variance, six keep {shares.sum():.1f} %"
@@ -70,8 +87,12 @@ def _clusters(axes: Any, motion: PaperMotion, prior: PCA) -> str:
     points = prior.transform(motion.angles)
     away = np.abs(points[:, None] - prior.centres).mean(axis=2)
     for k, (centre, colour) in enumerate(zip(prior.centres, COLOURS, strict=False)):
-        axes.plot(*points[away.argmin(axis=1) == k, :3].T, ".", color=colour, markersize=3)
-        axes.plot(*centre[:3, None], "*", color=colour, markersize=13, markeredgecolor="black")
+        axes.plot(
+            *points[away.argmin(axis=1) == k, :3].T, ".", color=colour, markersize=3
+        )
+        axes.plot(
+            *centre[:3, None], "*", color=colour, markersize=13, markeredgecolor="black"
+        )
     within = 100.0 * (away.min(axis=1) < prior.reach).mean()
     return f"K = {len(prior.centres)}, {within:.0f} % of the poses valid"
 
@@ -86,40 +107,80 @@ class WatchedSwarm(NamedTuple):
     history: Array  # (iterations + 1,) lowest cost so far
 
 
-def watched_swarm(motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterations: int = ITERATIONS) -> WatchedSwarm:
+def watched_swarm(
+    motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterations: int = ITERATIONS
+) -> WatchedSwarm:
     """Return the proposals of SAPSO in the first frame."""
     scene = paper_scene(motion, SHOWN_VIEW, (0, 1))
-    options = completed(TrackOptions(**options_of(OURS, motion.training, iterations)), scene.truth)
-    task, observation = task_of(scene, options, motion.training), scene.observations[0]
-    space = Predictor(task, PCA().fit(motion.angles), Prediction(tilt="box")).space(observation)
+    options = completed(
+        TrackOptions(**options_of(OURS, motion.training, iterations)), scene.truth
+    )
+    task = task_of(scene, options, motion.training)
+    observation = scene.observations[0]
+    space = Predictor(task, PCA().fit(motion.angles), Prediction(tilt="box")).space(
+        observation
+    )
     problem = PoseProblem(scene.body, scene.cameras, observation.silhouettes, space)
-    search = SAPSO(space, np.random.default_rng(0), population_size=particles, iterations=iterations)
+    search = SAPSO(
+        space,
+        np.random.default_rng(0),
+        population_size=particles,
+        iterations=iterations,
+    )
     steps = list(populations(search, problem.evaluate, particles * (iterations + 1)))
-    poses, translations = zip(*(problem.decode(proposals) for proposals, _ in steps), strict=True)
+    poses, translations = zip(
+        *(problem.decode(proposals) for proposals, _ in steps), strict=True
+    )
     history = np.minimum.accumulate([costs.min() for _, costs in steps])
-    return WatchedSwarm(scene, [*poses], [*translations], [int(costs.argmin()) for _, costs in steps], history)
+    return WatchedSwarm(
+        scene,
+        [*poses],
+        [*translations],
+        [int(costs.argmin()) for _, costs in steps],
+        history,
+    )
 
 
 def swarm_figure(swarm: WatchedSwarm) -> Figure:
     """Return the silhouette, and on it the bones of all particles after some iterations; the best in colour."""
-    scene, shown = swarm.scene, [k for k in SHOWN_ITERATIONS if k < len(swarm.poses)]
-    camera, mask = scene.cameras[0], scene.observations[0].silhouettes[0].mask
+    scene = swarm.scene
+    shown = [k for k in SHOWN_ITERATIONS if k < len(swarm.poses)]
+    camera = scene.cameras[0]
+    mask = scene.observations[0].silhouettes[0].mask
     figure = Figure(figsize=(12.5, 3.1), layout="constrained")
     panels: Any = figure.subplots(1, 1 + len(shown), squeeze=False)[0]
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows = np.flatnonzero(mask.any(axis=1))
+    columns = np.flatnonzero(mask.any(axis=0))
     side = 0.62 * max(np.ptp(rows), np.ptp(columns))
     extent = 0, mask.shape[1], mask.shape[0], 0
     for axes in panels:
-        axes.imshow(np.where(mask, 0.75, 1.0), cmap="gray", vmin=0.0, vmax=1.0, extent=extent)
-        axes.set(xlim=columns.mean() + np.array([-side, side]), ylim=rows.mean() + np.array([side, -side]))
+        axes.imshow(
+            np.where(mask, 0.75, 1.0), cmap="gray", vmin=0.0, vmax=1.0, extent=extent
+        )
+        axes.set(
+            xlim=columns.mean() + np.array([-side, side]),
+            ylim=rows.mean() + np.array([side, -side]),
+        )
         axes.set(xticks=[], yticks=[])
     panels[0].set_title("silhouette", fontsize=9)
     for axes, k in zip(panels[1:], shown, strict=True):
-        pixels = camera.project(scene.body.skeleton.joints(swarm.poses[k], swarm.translations[k]))[0]
-        bones = np.stack([pixels[:, list(PARENTS[1:])], pixels[:, 1:]], axis=2)  # their ends, (n, 26, 2, 2)
-        axes.add_collection(LineCollection([*bones.reshape(-1, 2, 2)], colors="black", linewidths=0.5, alpha=0.12))
-        axes.add_collection(LineCollection([*bones[swarm.best[k]]], colors=COLOURS[1], linewidths=1.4))
-        axes.set_title(f"iteration {k}, N = {len(bones)}\nlowest cost so far {swarm.history[k]:.1f}", fontsize=9)
+        pixels = camera.project(
+            scene.body.skeleton.joints(swarm.poses[k], swarm.translations[k])
+        )[0]
+        # their ends, (n, 26, 2, 2)
+        bones = np.stack([pixels[:, list(PARENTS[1:])], pixels[:, 1:]], axis=2)
+        axes.add_collection(
+            LineCollection(
+                [*bones.reshape(-1, 2, 2)], colors="black", linewidths=0.5, alpha=0.12
+            )
+        )
+        axes.add_collection(
+            LineCollection([*bones[swarm.best[k]]], colors=COLOURS[1], linewidths=1.4)
+        )
+        axes.set_title(
+            f"iteration {k}, N = {len(bones)}\nlowest cost so far {swarm.history[k]:.1f}",
+            fontsize=9,
+        )
     return figure
 
 
@@ -130,7 +191,8 @@ def lowest_cost_figure(analysis: Analysis) -> Figure:
         for name, style in ((OURS, "-"), (LETTER, ":")):
             histories = analysis.results.of("history", "first", motion, name)
             for k, count in enumerate(SWARMS):
-                middle, label = np.median(histories[:, :, k], axis=(0, 1)), f"N = {count}" + " letter" * (style == ":")
+                middle = np.median(histories[:, :, k], axis=(0, 1))
+                label = f"N = {count}" + " letter" * (style == ":")
                 axes.plot(middle, style, color=COLOURS[k], linewidth=1.3, label=label)
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
         runs = histories.shape[0] * histories.shape[1]
@@ -149,7 +211,13 @@ def dimension_figure(analysis: Analysis) -> Figure:
         for name, kind, style in ((LETTER, "image", "x"), ("mean_pose", "track", "_")):
             away = analysis.away(motion, name, kind).mean(axis=(0, 1, 2))
             label = METHODS[name] + ", true root" * (kind == "track")
-            axes.plot(away, style, color=COLOURS[1 + (kind == "track")], markersize=5, label=label)
+            axes.plot(
+                away,
+                style,
+                color=COLOURS[1 + (kind == "track")],
+                markersize=5,
+                label=label,
+            )
         ours = analysis.away(motion, OURS, "image").mean(axis=(0, 1, 2))
         axes.bar(np.arange(len(ours)), ours, color=COLOURS[0], label=METHODS[OURS])
         axes.axhline(SMALL_DEGREES, color=_DIM, linewidth=0.8, linestyle=":")
@@ -158,7 +226,9 @@ def dimension_figure(analysis: Analysis) -> Figure:
         for k in range(3, len(ours), 3):
             axes.axvline(k - 0.5, color="0.92", linewidth=0.8, zorder=0)
     panels[0].legend(**_LEGEND)
-    panels[-1].set_xticks(3 * np.arange(len(names)) + 1, names, rotation=60, ha="right", fontsize=8)
+    panels[-1].set_xticks(
+        3 * np.arange(len(names)) + 1, names, rotation=60, ha="right", fontsize=8
+    )
     panels[-1].tick_params(axis="x", length=0)
     return figure
 
@@ -167,13 +237,25 @@ def frame_figure(analysis: Analysis) -> Figure:
     """Return the error of each frame of the paper's methods and the letter: medians of all runs, middle halves."""
     figure, panels = _panels((10.0, 6.4), len(MOTIONS))
     for axes, motion in zip(panels, MOTIONS, strict=True):
-        for name, colour in zip((*PAPER, LETTER), (*COLOURS[1::-1], *COLOURS[2:4]), strict=True):
+        for name, colour in zip(
+            (*PAPER, LETTER), (*COLOURS[1::-1], *COLOURS[2:4]), strict=True
+        ):
             errors = analysis.away(motion, name).mean(axis=3)
-            low, middle, high = np.quantile(errors.reshape(-1, errors.shape[2]), [0.25, 0.5, 0.75], axis=0)
+            low, middle, high = np.quantile(
+                errors.reshape(-1, errors.shape[2]), [0.25, 0.5, 0.75], axis=0
+            )
             axes.plot(middle, color=colour, linewidth=1.3, label=METHODS[name])
-            axes.fill_between(np.arange(len(middle)), low, high, color=colour, alpha=0.15, linewidth=0)
+            axes.fill_between(
+                np.arange(len(middle)), low, high, color=colour, alpha=0.15, linewidth=0
+            )
         mean = analysis.away(motion, "mean_pose").mean(axis=3)[0, 0]
-        axes.plot(mean, color=_DIM, linewidth=1.0, linestyle="--", label="mean training pose, true root")
+        axes.plot(
+            mean,
+            color=_DIM,
+            linewidth=1.0,
+            linestyle="--",
+            label="mean training pose, true root",
+        )
         axes.set(ylabel="error, degrees", ylim=(0.0, None), xlim=(0, len(mean) - 1))
         axes.set_title(LABELS[motion], fontsize=9)
     panels[0].legend(ncols=3, **_LEGEND)
@@ -181,7 +263,9 @@ def frame_figure(analysis: Analysis) -> Figure:
     return figure
 
 
-def _panels(size: tuple[float, float], rows: int, columns: int = 1, **shared: Any) -> tuple[Figure, Any]:
+def _panels(
+    size: tuple[float, float], rows: int, columns: int = 1, **shared: Any
+) -> tuple[Figure, Any]:
     """Return a figure of a size in inches and its axes, open at the top and the right."""
     figure = Figure(figsize=size, layout="constrained")
     panels: Any = figure.subplots(rows, columns, **shared)

@@ -40,9 +40,15 @@ class LetterSAPSO(SAPSO):
         stop_temperature: float = 0.0,
         inertia: float = 0.9,
     ) -> None:
-        size, stop = population_size, stop_temperature
+        size = population_size
+        stop = stop_temperature
         super().__init__(
-            space, rng, population_size=size, iterations=iterations, stop_temperature=stop, inertia=inertia
+            space,
+            rng,
+            population_size=size,
+            iterations=iterations,
+            stop_temperature=stop,
+            inertia=inertia,
         )
         self.low, self.high = velocity_limits(space)
         self.v = np.clip(self.v, self.low, self.high)
@@ -58,19 +64,24 @@ class LetterSAPSO(SAPSO):
         if self.c > 0:
             self.T *= self.gamma**count
         self.v, self.moved = redrawn(self.x, self.step, self.allowed, REDRAWS)
-        self.c, self.waiting = self.c + 1, 0
+        self.c = self.c + 1
+        self.waiting = 0
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
         """Return velocities and positions (k, d) of some particles (k,) after a move by (1) and (2)."""
-        x, gbest = self.x[rows], self.pbest[self.pbest_cost.argmin()]
+        x = self.x[rows]
+        gbest = self.pbest[self.pbest_cost.argmin()]
         phi1, phi2 = self.acceleration * self.rng.random((2, len(rows), 1))
-        to_pbest, to_gbest = displacement(self.space, x, self.pbest[rows]), displacement(self.space, x, gbest)
+        to_pbest = displacement(self.space, x, self.pbest[rows])
+        to_gbest = displacement(self.space, x, gbest)
         v = self.inertia() * self.v[rows] + phi1 * to_pbest + phi2 * to_gbest
         return v, wrap(self.space, x + v)
 
     def allowed(self, v: Array, x: Array) -> NDArray[np.bool_]:
         """Return which velocities and positions (k, d) meet constraints 1 and 2 (k,)."""
-        return np.asarray(((self.low <= v) & (v <= self.high)).all(axis=1) & self.space.feasible(x))
+        return np.asarray(
+            ((self.low <= v) & (v <= self.high)).all(axis=1) & self.space.feasible(x)
+        )
 
 
 def velocity_limits(space: Space) -> tuple[Array, Array]:
@@ -80,8 +91,12 @@ def velocity_limits(space: Space) -> tuple[Array, Array]:
     """
     if not isinstance(space, SearchSpace):
         return np.full(space.dimensions, -ALPHA), np.full(space.dimensions, ALPHA)
-    low, high = np.full(space.dimensions, -np.inf), np.full(space.dimensions, np.inf)
+    low = np.full(space.dimensions, -np.inf)
+    high = np.full(space.dimensions, np.inf)
     m = len(space.prior.low)
     half = np.where(space.half[-m:] > 0.0, space.half[-m:], 1.0)
-    low[-m:], high[-m:] = ALPHA * space.prior.low / half, ALPHA * space.prior.high / half
+    low[-m:], high[-m:] = (
+        ALPHA * space.prior.low / half,
+        ALPHA * space.prior.high / half,
+    )
     return low, high

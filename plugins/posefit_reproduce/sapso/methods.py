@@ -11,10 +11,13 @@ from posefit.evaluation.measures import BASELINES
 from posefit_priors.pca import PCA
 from posefit_swarm.sapso import SAPSO, inertia_at
 
-OURS, LETTER = "sapso@pca", "sapso-letter@pca"  # the two forms that are run side by side in every experiment
+# the two forms that are run side by side in every experiment
+OURS = "sapso@pca"
+LETTER = "sapso-letter@pca"
 WIDER = 3.0  # times the range of the training latents, where constraint 1 is left out
 NO_LIMIT = 2.0  # alpha at which a velocity may cross the whole box
-DRIVEN = {"tracker.tilt": "box"}  # Interpretation S16: the paper learns nothing of the root
+# Interpretation S16: the paper learns nothing of the root
+DRIVEN = {"tracker.tilt": "box"}
 
 
 class WidePCA(PCA):
@@ -23,8 +26,10 @@ class WidePCA(PCA):
     def fit(self, angles: Array, skeleton: object = None) -> "WidePCA":
         """Learn the space, and widen its box about its middle."""
         super().fit(angles)
-        middle, half = (self.high + self.low) / 2.0, (self.high - self.low) / 2.0
-        self.low, self.high = middle - WIDER * half, middle + WIDER * half
+        middle = (self.high + self.low) / 2.0
+        half = (self.high - self.low) / 2.0
+        self.low = middle - WIDER * half
+        self.high = middle + WIDER * half
         return self
 
 
@@ -52,13 +57,19 @@ class PaperMethod(NamedTuple):
 
 
 def _search(
-    label: str, method: str | tuple[Any, Any], settings: Mapping[str, Any] = DRIVEN, **more: Any
+    label: str,
+    method: str | tuple[Any, Any],
+    settings: Mapping[str, Any] = DRIVEN,
+    **more: Any,
 ) -> PaperMethod:
     return PaperMethod(label, {"method": method, "settings": settings, **more})
 
 
-_FULL = DRIVEN | {"full.limits": "training"}  # constraint 1 on all angles; the files' joint limits alone are far wider
-_ALWAYS, _NEVER = ({"sapso.temperature": value, "sapso.cooling": 1.0} for value in (1e9, 1e-9))
+# constraint 1 on all angles; the files' joint limits alone are far wider
+_FULL = DRIVEN | {"full.limits": "training"}
+_ALWAYS, _NEVER = (
+    {"sapso.temperature": value, "sapso.cooling": 1.0} for value in (1e9, 1e-9)
+)
 PAPER = {
     "particle@full": _search("PF", "particle@full", _FULL),
     "sapso@full": _search("SAPSO", "sapso@full", _FULL),
@@ -72,23 +83,33 @@ OTHERS = {
 # what PCA + SAPSO is without one of its parts, with as many evaluations
 PARTS = {
     "no-velocity-limits": _search(
-        "no velocity limits (half of constraint 1)", OURS, DRIVEN | {"sapso.alpha": NO_LIMIT}
+        "no velocity limits (half of constraint 1)",
+        OURS,
+        DRIVEN | {"sapso.alpha": NO_LIMIT},
     ),
-    "no-range": _search("no constraint 1", ("sapso", WidePCA), DRIVEN | {"sapso.alpha": NO_LIMIT}),
+    "no-range": _search(
+        "no constraint 1", ("sapso", WidePCA), DRIVEN | {"sapso.alpha": NO_LIMIT}
+    ),
     "no-clusters": _search("no constraint 2", ("sapso", UnclusteredPCA)),
     "every-move": _search("no annealing: every move counts", OURS, DRIVEN | _ALWAYS),
-    "better-moves": _search("no annealing: only better moves count", OURS, DRIVEN | _NEVER),
+    "better-moves": _search(
+        "no annealing: only better moves count", OURS, DRIVEN | _NEVER
+    ),
     "constant-inertia": _search("inertia constant at 0.3", (ConstantInertia, "pca")),
 }
 # what may follow a turn better, with the walk's budget
 TURNING = {
-    "turning-prior": _search("PCA of walks with turns + SAPSO", OURS, train=["16_18", "16_20"]),
+    "turning-prior": _search(
+        "PCA of walks with turns + SAPSO", OURS, train=["16_18", "16_20"]
+    ),
     "wider-yaw": _search(
         "PCA + SAPSO, yaw of 90 degrees to either side",
         OURS,
         DRIVEN | {"tracker.root_range_degrees": (90.0, 15.0, 15.0)},
     ),
-    "exemplars": PaperMethod("exemplars, of other people", {"method": "exemplars", "train": ["library:-16"]}),
+    "exemplars": PaperMethod(
+        "exemplars, of other people", {"method": "exemplars", "train": ["library:-16"]}
+    ),
 }
 METHODS = PAPER | OTHERS | PARTS | TURNING
 LABELS = {name: method.label for name, method in METHODS.items()} | BASELINES

@@ -18,7 +18,9 @@ from posefit.motion.motion import Motion
 from posefit.sweep.cell import digest_of
 
 SIZE = (320, 240)  # pixels
-FPS = 60.0  # not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a run nearly
+# not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a
+# run nearly
+FPS = 60.0
 # the clip, and those that its prior learns from; there is one run of each person, so its prior knows only others
 CLIPS = {
     "walk": ("16/16_15", ("16/16_17",)),
@@ -52,12 +54,16 @@ def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotio
     """
     for clip in ALL_CLIPS:
         if clips is not None and not (Path(clips) / f"{clip}.amc").is_file():
-            raise InputError(f"clips must be a folder of CMU clips such as {clip}.amc, got {clips}, which has none")
+            raise InputError(
+                f"clips must be a folder of CMU clips such as {clip}.amc, got {clips}, which has none"
+            )
     motions = {}
     for name, (test, training) in CLIPS.items():
         first, *others = (_clip(clips, clip) for clip in (test, *training))
         followed = first.frames(FIRST[name], min(FIRST[name] + frames, len(first)))
-        motions[name] = PaperMotion(followed, [motion.frames(1, len(motion)) for motion in others])
+        motions[name] = PaperMotion(
+            followed, [motion.frames(1, len(motion)) for motion in others]
+        )
     return motions
 
 
@@ -66,13 +72,21 @@ def digests(clips: str | Path | None) -> str | list[str]:
     if clips is None:
         return "library"
     paths = [Path(clips) / f"{clip}.amc" for clip in ALL_CLIPS]
-    return [digest_of(file)[:8] for path in paths for file in (path, *sorted(path.parent.glob("*.asf")))]
+    return [
+        digest_of(file)[:8]
+        for path in paths
+        for file in (path, *sorted(path.parent.glob("*.asf")))
+    ]
 
 
 def _clip(folder: str | Path | None, clip: str) -> Motion:
-    return load_motion(clip.partition("/")[2] if folder is None else Path(folder) / f"{clip}.amc", FPS)
+    return load_motion(
+        clip.partition("/")[2] if folder is None else Path(folder) / f"{clip}.amc", FPS
+    )
 
 
-def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None)) -> Scene:
+def paper_scene(
+    motion: PaperMotion, view: float, frames: Range = (None, None)
+) -> Scene:
     """Return a motion as a camera sees it."""
     return synthetic(motion.test, [view], SIZE, [], frames)

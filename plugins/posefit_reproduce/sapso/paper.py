@@ -24,17 +24,57 @@ TABLE_1_JOINTS = ("LFemur", "RFemur", "LKnee", "RKnee")
 TABLE_1: dict[str, tuple[Array, Array]] = {
     "walk": (
         np.array(
-            [[-13.015, 46.717, 10.994], [-0.127, 6.481, 23.928], [-2.302, 57.572, 7.482], [-0.454, 31.281, 4.379]]
+            [
+                [-13.015, 46.717, 10.994],
+                [-0.127, 6.481, 23.928],
+                [-2.302, 57.572, 7.482],
+                [-0.454, 31.281, 4.379],
+            ]
         ),
-        np.array([[-11.397, 48.776, 5.114], [-0.632, 2.766, 24.117], [-3.180, 60.346, 10.051], [0.346, 34.422, 1.443]]),
+        np.array(
+            [
+                [-11.397, 48.776, 5.114],
+                [-0.632, 2.766, 24.117],
+                [-3.180, 60.346, 10.051],
+                [0.346, 34.422, 1.443],
+            ]
+        ),
     ),
     "turn": (
-        np.array([[-12.624, 45.177, 9.155], [-1.243, 2.548, 19.946], [-3.693, 64.398, 8.325], [-0.165, 31.91, 3.480]]),
-        np.array([[-9.331, 43.254, 2.798], [-0.538, -0.045, 23.227], [-2.193, 62.504, 7.542], [0.960, 34.945, -1.518]]),
+        np.array(
+            [
+                [-12.624, 45.177, 9.155],
+                [-1.243, 2.548, 19.946],
+                [-3.693, 64.398, 8.325],
+                [-0.165, 31.91, 3.480],
+            ]
+        ),
+        np.array(
+            [
+                [-9.331, 43.254, 2.798],
+                [-0.538, -0.045, 23.227],
+                [-2.193, 62.504, 7.542],
+                [0.960, 34.945, -1.518],
+            ]
+        ),
     ),
     "run": (
-        np.array([[-12.348, 46.922, 11.044], [0.591, 4.265, 27.956], [-1.221, 48.237, 6.975], [-0.513, 30.113, 5.298]]),
-        np.array([[-11.144, 45.707, 8.435], [1.127, 1.374, 27.919], [-1.458, 46.142, 7.313], [0.254, 32.668, 3.628]]),
+        np.array(
+            [
+                [-12.348, 46.922, 11.044],
+                [0.591, 4.265, 27.956],
+                [-1.221, 48.237, 6.975],
+                [-0.513, 30.113, 5.298],
+            ]
+        ),
+        np.array(
+            [
+                [-11.144, 45.707, 8.435],
+                [1.127, 1.374, 27.919],
+                [-1.458, 46.142, 7.313],
+                [0.254, 32.668, 3.628],
+            ]
+        ),
     ),
 }
 # of each motion the three methods, by the names they have in `methods.METHODS`
@@ -55,6 +95,10 @@ TRAINING_FRAMES = {"walk": 386, "turn": 386, "run": 198}
 CONVERGED = 30  # iterations, section 5.2 and figure 6
 SMALL_DEGREES = 5.0  # most dimensions' errors are below it: section 5.3 and figure 7
 TRACK_DEGREES = 4.0  # about the mean error of its tracks: section 5.4
-ENOUGH_COMPONENTS, EXPLAINED_VARIANCE = 5, 0.95  # so many components explain this share at least: section 2.1
-SHOWN_ITERATIONS, SHOWN_PARTICLES = (0, 10, 40, 60), 100  # figure 5
+# so many components explain this share at least: section 2.1
+ENOUGH_COMPONENTS = 5
+EXPLAINED_VARIANCE = 0.95
+# figure 5
+SHOWN_ITERATIONS = (0, 10, 40, 60)
+SHOWN_PARTICLES = 100
 SWARMS = (20, 40, 60, 100)  # N of figure 6; the paper's own are not in its text

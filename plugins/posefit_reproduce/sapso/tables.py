@@ -11,42 +11,70 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import angles_of
 from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
-from posefit_reproduce.experiment import Claim, Results, Table, bounded, claims_table, interval
+from posefit_reproduce.experiment import (
+    Claim,
+    Results,
+    Table,
+    bounded,
+    claims_table,
+    interval,
+)
 from posefit_reproduce.sapso import paper
 from posefit_reproduce.sapso.experiment import COMPARED
-from posefit_reproduce.sapso.methods import LABELS, LETTER, METHODS, OTHERS, OURS, PAPER, PARTS
+from posefit_reproduce.sapso.methods import (
+    LABELS,
+    LETTER,
+    METHODS,
+    OTHERS,
+    OURS,
+    PAPER,
+    PARTS,
+)
 from posefit_reproduce.sapso.motions import LABELS as MOTIONS
 from posefit_reproduce.sapso.motions import PaperMotion
 
 # LFemur, RFemur, LKnee, RKnee: an Acclaim knee has one angle, the other two are padding that cannot err
 ANGLES = angles_of(("lfemur", "rfemur", "ltibia", "rtibia"))
 # bounds that are ours, where the paper gives none
-HIGH_FRAMES, FEW_JOINTS = 0.9, 3  # the quantile from which a frame's error is high, and how many joints are a few
-SWAPPED = 0.01  # share of frames with left and right exchanged that still counts as none
-SAME_DEGREES = 1.0  # by which views, or a hidden part, may change an error that stays the same
-SAME_COST = 1.0  # by which costs may differ that have converged or are equal; costs go from 0 to 100
-TURNED_ROUND = 90.0  # degrees: a yaw that is more off is a person seen the wrong way round
+# the quantile from which a frame's error is high, and how many joints are a few
+HIGH_FRAMES = 0.9
+FEW_JOINTS = 3
+# share of frames with left and right exchanged that still counts as none
+SWAPPED = 0.01
+# by which views, or a hidden part, may change an error that stays the same
+SAME_DEGREES = 1.0
+# by which costs may differ that have converged or are equal; costs go from 0 to 100
+SAME_COST = 1.0
+# degrees: a yaw that is more off is a person seen the wrong way round
+TURNED_ROUND = 90.0
 
 
 class Analysis:
     """Errors of the runs on the paper's motions."""
 
     def __init__(self, results: Results, motions: Mapping[str, PaperMotion]) -> None:
-        self.results, self.motions = results, motions
+        self.results = results
+        self.motions = motions
 
     def away(self, motion: str, method: str = OURS, kind: str = "track") -> Array:
         """Return the absolute errors of all angles in degrees, (views, seeds, T, 66)."""
         poses = self.results.of("poses", kind, motion, method)
-        return np.asarray(np.degrees(np.abs(wrapped(poses - self.motions[motion].test.poses))))
+        return np.asarray(
+            np.degrees(np.abs(wrapped(poses - self.motions[motion].test.poses)))
+        )
 
     def free(self, motion: str) -> NDArray[np.bool_]:
         """Return which of the 66 angles can err."""
         return self.motions[motion].test.skeleton.free
 
-    def errors(self, motion: str, method: str = OURS, kind: str = "track", free: bool = False) -> Array:
+    def errors(
+        self, motion: str, method: str = OURS, kind: str = "track", free: bool = False
+    ) -> Array:
         """Return the mean errors (8) of runs in degrees, (views, seeds). Interpretation S18."""
         away = self.away(motion, method, kind)
-        return np.asarray((away[..., self.free(motion)] if free else away).mean(axis=(2, 3)))
+        return np.asarray(
+            (away[..., self.free(motion)] if free else away).mean(axis=(2, 3))
+        )
 
     def spread(self, motion: str, method: str) -> Array:
         """Return the deviations (10) of runs in degrees, (views, seeds)."""
@@ -54,9 +82,12 @@ class Analysis:
 
     def swapped(self, motion: str, method: str = OURS, kind: str = "track") -> Array:
         """Return the share of frames (views, seeds) with left and right exchanged."""
-        test, poses = self.motions[motion].test, self.results.of("poses", kind, motion, method)
+        test = self.motions[motion].test
+        poses = self.results.of("poses", kind, motion, method)
         count = poses[..., 0].size // len(test)
-        joints = test.skeleton.joints(poses.reshape(-1, 66), np.tile(test.translations, (count, 1)))
+        joints = test.skeleton.joints(
+            poses.reshape(-1, 66), np.tile(test.translations, (count, 1))
+        )
         flags = nearer_mirrored(np.tile(test.joints, (count, 1, 1)), joints)
         return np.asarray(flags.reshape(poses.shape[:3]).mean(axis=2))
 
@@ -82,7 +113,13 @@ def verdicts_table(analysis: Analysis) -> Table:
     """Return the paper's claims with their verdicts, each on one motion."""
     sections = (track_claims, ("walk", "run")), (image_claims, analysis.motions)
     return claims_table(
-        "claims", [claim for section, on in sections for name in on for claim in section(analysis, name)]
+        "claims",
+        [
+            claim
+            for section, on in sections
+            for name in on
+            for claim in section(analysis, name)
+        ],
     )
 
 
@@ -91,12 +128,35 @@ def motions_table(analysis: Analysis) -> Table:
     rows = []
     for name, motion in analysis.motions.items():
         yaw = np.degrees(np.unwrap(motion.test.poses[:, 0]))
-        learned = ", ".join(clip.name for clip in motion.training), len(motion.angles), paper.TRAINING_FRAMES[name]
+        learned = (
+            ", ".join(clip.name for clip in motion.training),
+            len(motion.angles),
+            paper.TRAINING_FRAMES[name],
+        )
         turned = f"{yaw[-1] - yaw[0]:.0f}"
-        seeds = [analysis.results.of("poses", kind, name, OURS).shape[1] for kind in ("track", "image")]
-        row = [MOTIONS[name], motion.test.name, learned[0], len(motion.test), turned, *learned[1:], *seeds]
+        seeds = [
+            analysis.results.of("poses", kind, name, OURS).shape[1]
+            for kind in ("track", "image")
+        ]
+        row = [
+            MOTIONS[name],
+            motion.test.name,
+            learned[0],
+            len(motion.test),
+            turned,
+            *learned[1:],
+            *seeds,
+        ]
         rows.append([str(cell) for cell in row])
-    heads = ["motion", "followed", "learned from", "frames", "turns by, degrees", "training frames", "the paper's"]
+    heads = [
+        "motion",
+        "followed",
+        "learned from",
+        "frames",
+        "turns by, degrees",
+        "training frames",
+        "the paper's",
+    ]
     return Table("motions", [*heads, "seeds of tracks", "of images"], rows, 3)
 
 
@@ -108,17 +168,35 @@ def table_1(analysis: Analysis) -> Table:
     rows = []
     for motion, pair in paper.TABLE_1.items():
         test = analysis.motions[motion].test.poses
-        frame, images = len(test) // 2, analysis.results.of("poses", "image", motion, OURS)
-        ours = [np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3) for pose in (test[frame], images[1, 0, frame])]
-        mean, letter = (interval(table_1_angles(analysis, motion, name, "image")) for name in (OURS, LETTER))
+        frame = len(test) // 2
+        images = analysis.results.of("poses", "image", motion, OURS)
+        ours = [
+            np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3)
+            for pose in (test[frame], images[1, 0, frame])
+        ]
+        mean, letter = (
+            interval(table_1_angles(analysis, motion, name, "image"))
+            for name in (OURS, LETTER)
+        )
         pose = table_1_angles(analysis, motion, "mean_pose", "track").mean()
-        labels = ["paper, truth", "paper, estimate", f"truth of frame {frame}", "PCA + SAPSO"]
-        errors = ["", f"{np.abs(np.subtract(*pair)).mean():.1f}", f"mean pose {pose:.1f}"]
+        labels = [
+            "paper, truth",
+            "paper, estimate",
+            f"truth of frame {frame}",
+            "PCA + SAPSO",
+        ]
+        errors = [
+            "",
+            f"{np.abs(np.subtract(*pair)).mean():.1f}",
+            f"mean pose {pose:.1f}",
+        ]
         errors.append(f"{bounded(mean, 1)}, the letter {letter.value:.1f}")
         for label, angles, error in zip(labels, (*pair, *ours), errors, strict=True):
             cells = [" ".join(f"{value:.1f}" for value in joint) for joint in angles]
             rows.append([MOTIONS[motion], label, *cells, error])
-    return Table("table-1", ["motion", "", *paper.TABLE_1_JOINTS, "mean error"], rows, 2)
+    return Table(
+        "table-1", ["motion", "", *paper.TABLE_1_JOINTS, "mean error"], rows, 2
+    )
 
 
 def table_2(analysis: Analysis) -> Table:
@@ -128,13 +206,24 @@ def table_2(analysis: Analysis) -> Table:
         cells = [LABELS[name]]
         for motion in paper.TABLE_2:
             cell = paper.TABLE_2[motion].get(name)
-            cells.append("" if cell is None else " / ".join(f"{value:.2f}" for value in cell))
-            figures = [bounded(interval(analysis.errors(motion, name))), f"{analysis.spread(motion, name).mean():.2f}"]
+            cells.append(
+                "" if cell is None else " / ".join(f"{value:.2f}" for value in cell)
+            )
+            figures = [
+                bounded(interval(analysis.errors(motion, name))),
+                f"{analysis.spread(motion, name).mean():.2f}",
+            ]
             if name in METHODS:
-                figures.append(f"{analysis.results.of('cpu_seconds', 'track', motion, name).mean():.4f}")
+                figures.append(
+                    f"{analysis.results.of('cpu_seconds', 'track', motion, name).mean():.4f}"
+                )
             cells.append(" / ".join(figures))
         rows.append(cells)
-    heads = [f"{motion}, {whose}" for motion in paper.TABLE_2 for whose in ("the paper", "here")]
+    heads = [
+        f"{motion}, {whose}"
+        for motion in paper.TABLE_2
+        for whose in ("the paper", "here")
+    ]
     return Table("table-2", ["(9) / (10) / seconds", *heads], rows)
 
 
@@ -145,36 +234,94 @@ def flaws_table(analysis: Analysis) -> Table:
         figures: list[list[str]] = [[], [], []]
         for motion in analysis.motions:
             worse = analysis.errors(motion, name) > analysis.errors(motion, "mean_pose")
-            for cell, share in zip(figures, (analysis.swapped(motion, name), worse), strict=False):
+            for cell, share in zip(
+                figures, (analysis.swapped(motion, name), worse), strict=False
+            ):
                 cell.append(f"{100 * share.mean():.0f}")
             if analysis.results.has("unknown", motion, name):
-                figures[2].append(f"{analysis.errors(motion, name, 'unknown').mean():.2f}")
+                figures[2].append(
+                    f"{analysis.errors(motion, name, 'unknown').mean():.2f}"
+                )
         rows.append([LABELS[name], *(" / ".join(cell) for cell in figures)])
-    heads = ["left for right, % of frames", "worse than the mean pose, % of runs", "(9), first yaw unknown"]
+    heads = [
+        "left for right, % of frames",
+        "worse than the mean pose, % of runs",
+        "(9), first yaw unknown",
+    ]
     return Table("flaws", [" / ".join(analysis.motions), *heads], rows)
 
 
 def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
     """Return the claims of tracks, by (8), of the compact space and of searches of first frames."""
-    results, label = analysis.results, MOTIONS[motion]
-    ours, full, particle = (analysis.errors(motion, name) for name in (OURS, "sapso@full", "particle@full"))
-    seconds = [results.of("cpu_seconds", "track", motion, name) for name in (OURS, "sapso@full")]
+    results = analysis.results
+    label = MOTIONS[motion]
+    ours, full, particle = (
+        analysis.errors(motion, name) for name in (OURS, "sapso@full", "particle@full")
+    )
+    seconds = [
+        results.of("cpu_seconds", "track", motion, name)
+        for name in (OURS, "sapso@full")
+    ]
     # the walk with a turn is followed in the space of the straight walk
     space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
     explained = np.asarray(100.0 * space.explained[: paper.ENOUGH_COMPONENTS].sum())
     wanted = 100.0 * paper.EXPLAINED_VARIANCE
-    few, degrees, milliseconds = 100.0 * few_joints(analysis, motion), "degrees of (8)", "CPU ms a frame"
+    few = 100.0 * few_joints(analysis, motion)
+    degrees = "degrees of (8)"
+    milliseconds = "CPU ms a frame"
     faster = 1e3 * seconds[0] - 1e3 * seconds[1]
     claims = [
-        Claim("SAPSO has a smaller error than PF", "table 2", label, full - particle, degrees),
-        Claim("PCA + SAPSO has a smaller error than SAPSO", "table 2", label, ours - full, degrees),
-        Claim("PCA + SAPSO takes less time than SAPSO", "table 2", label, faster, milliseconds),
-        Claim("a track's error is about 4 degrees at most", "5.4", label, ours, degrees, paper.TRACK_DEGREES),
-        Claim("a few joints make up high errors", "5.4", label, few, "% by 3 of 22", 50.0, above=True),
-        Claim("five components keep 95 % of the variance", "2.1", label, explained, "%", wanted, above=True),
+        Claim(
+            "SAPSO has a smaller error than PF",
+            "table 2",
+            label,
+            full - particle,
+            degrees,
+        ),
+        Claim(
+            "PCA + SAPSO has a smaller error than SAPSO",
+            "table 2",
+            label,
+            ours - full,
+            degrees,
+        ),
+        Claim(
+            "PCA + SAPSO takes less time than SAPSO",
+            "table 2",
+            label,
+            faster,
+            milliseconds,
+        ),
+        Claim(
+            "a track's error is about 4 degrees at most",
+            "5.4",
+            label,
+            ours,
+            degrees,
+            paper.TRACK_DEGREES,
+        ),
+        Claim(
+            "a few joints make up high errors",
+            "5.4",
+            label,
+            few,
+            "% by 3 of 22",
+            50.0,
+            above=True,
+        ),
+        Claim(
+            "five components keep 95 % of the variance",
+            "2.1",
+            label,
+            explained,
+            "%",
+            wanted,
+            above=True,
+        ),
     ]
     for name, form in ((OURS, ""), (LETTER, ", the letter")):
-        history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)
+        # (views, seeds, swarms, populations)
+        history = results.of("history", "first", motion, name)
         usual = history[:, :, paper.SWARMS.index(40)]
         fall = usual[:, :, min(paper.CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
         ends = history[:, :, 0, -1] - history[:, :, -1, -1]
@@ -188,35 +335,81 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
 
 def image_claims(analysis: Analysis, motion: str) -> list[Claim]:
     """Return the claims of single images, by the angles that can err."""
-    label, away = MOTIONS[motion], analysis.away(motion, OURS, "image")
-    small = 100.0 * (away[..., analysis.free(motion)].mean(axis=2) < paper.SMALL_DEGREES).mean(axis=2)
-    chosen, theirs = table_1_angles(analysis, motion, OURS, "image"), np.abs(np.subtract(*paper.TABLE_1[motion])).mean()
-    images, hidden = (analysis.errors(motion, OURS, kind, free=True) for kind in ("image", "hidden"))
-    worse, around = hidden - images[: len(hidden)], np.ptp(images, axis=0)[None]  # the former of the same views
+    label = MOTIONS[motion]
+    away = analysis.away(motion, OURS, "image")
+    small = 100.0 * (
+        away[..., analysis.free(motion)].mean(axis=2) < paper.SMALL_DEGREES
+    ).mean(axis=2)
+    chosen = table_1_angles(analysis, motion, OURS, "image")
+    theirs = np.abs(np.subtract(*paper.TABLE_1[motion])).mean()
+    images, hidden = (
+        analysis.errors(motion, OURS, kind, free=True) for kind in ("image", "hidden")
+    )
+    # the former of the same views
+    worse = hidden - images[: len(hidden)]
+    around = np.ptp(images, axis=0)[None]
     swapped = 100.0 * analysis.swapped(motion, OURS, "image")
     return [
-        Claim("most angles have an error below 5 degrees", "figure 7", label, small, "%", 50.0, above=True),
-        Claim("femora and knees are as near as in table 1", "table 1", label, chosen, bound=float(theirs)),
-        Claim("a hidden part adds less than 1 degree", "figure 8", label, worse, bound=SAME_DEGREES),
-        Claim("eight views differ by less than 1 degree", "5.3", label, around, bound=SAME_DEGREES),
-        Claim("left and right are not exchanged", "5.3", label, swapped, "% of frames", 100.0 * SWAPPED),
+        Claim(
+            "most angles have an error below 5 degrees",
+            "figure 7",
+            label,
+            small,
+            "%",
+            50.0,
+            above=True,
+        ),
+        Claim(
+            "femora and knees are as near as in table 1",
+            "table 1",
+            label,
+            chosen,
+            bound=float(theirs),
+        ),
+        Claim(
+            "a hidden part adds less than 1 degree",
+            "figure 8",
+            label,
+            worse,
+            bound=SAME_DEGREES,
+        ),
+        Claim(
+            "eight views differ by less than 1 degree",
+            "5.3",
+            label,
+            around,
+            bound=SAME_DEGREES,
+        ),
+        Claim(
+            "left and right are not exchanged",
+            "5.3",
+            label,
+            swapped,
+            "% of frames",
+            100.0 * SWAPPED,
+        ),
     ]
 
 
 def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> Array:
     """Return the mean errors (views, seeds) of table 1's angles, of those that can err."""
     chosen = [angle for angle in ANGLES if analysis.free(motion)[angle]]
-    return np.asarray(analysis.away(motion, method, kind)[..., chosen].mean(axis=(2, 3)))
+    return np.asarray(
+        analysis.away(motion, method, kind)[..., chosen].mean(axis=(2, 3))
+    )
 
 
 def few_joints(analysis: Analysis, motion: str) -> Array:
     """Return which share (views, seeds) of the error of a run's worst tenth of frames its three worst joints have."""
     away = analysis.away(motion)
-    joints = away.reshape(*away.shape[:3], 22, 3).sum(axis=4)  # the root and 21 inner joints
+    # the root and 21 inner joints
+    joints = away.reshape(*away.shape[:3], 22, 3).sum(axis=4)
     shares = np.empty(joints.shape[:2])
     for place in np.ndindex(shares.shape):
         frames = joints[place]
-        high = frames[frames.sum(axis=1) >= np.quantile(frames.sum(axis=1), HIGH_FRAMES)].sum(axis=0)
+        high = frames[
+            frames.sum(axis=1) >= np.quantile(frames.sum(axis=1), HIGH_FRAMES)
+        ].sum(axis=0)
         shares[place] = np.sort(high)[-FEW_JOINTS:].sum() / high.sum()
     return shares
 
@@ -229,32 +422,64 @@ def views_table(analysis: Analysis) -> Table:
         yaw = analysis.away(motion, OURS, "image")[..., 0]
         for label, values in (
             ("PCA + SAPSO, degrees", analysis.errors(motion, OURS, "image", free=True)),
-            ("the letter, degrees", analysis.errors(motion, LETTER, "image", free=True)),
+            (
+                "the letter, degrees",
+                analysis.errors(motion, LETTER, "image", free=True),
+            ),
             ("the wrong way round, %", 100.0 * (yaw > TURNED_ROUND).mean(axis=2)),
         ):
             digits = 0 if "%" in label else 1
             cells = [f"{value:.{digits}f}" for value in values.mean(axis=1)]
-            rows.append([MOTIONS[motion], label, *cells, bounded(interval(values), digits)])
-    return Table("views", ["motion", "", *(f"{view:.0f}°" for view in views), "mean"], rows, 2)
+            rows.append(
+                [MOTIONS[motion], label, *cells, bounded(interval(values), digits)]
+            )
+    return Table(
+        "views", ["motion", "", *(f"{view:.0f}°" for view in views), "mean"], rows, 2
+    )
 
 
 def parts_table(analysis: Analysis) -> Table:
     """Return by how much PCA + SAPSO without a part, or another method, is worse than it, paired by view and seed."""
-    labels = {"sapso@full": "no PCA space: all angles"} | {name: LABELS[name] for name in (*PARTS, *OTHERS)}
-    rows = [["PCA + SAPSO itself", *(bounded(interval(analysis.errors(motion))) for motion in analysis.motions)]]
+    labels = {"sapso@full": "no PCA space: all angles"} | {
+        name: LABELS[name] for name in (*PARTS, *OTHERS)
+    }
+    rows = [
+        [
+            "PCA + SAPSO itself",
+            *(
+                bounded(interval(analysis.errors(motion)))
+                for motion in analysis.motions
+            ),
+        ]
+    ]
     for name, label in labels.items():
-        differences = [analysis.errors(motion, name) - analysis.errors(motion) for motion in analysis.motions]
-        rows.append([label, *(bounded(interval(difference)) for difference in differences)])
-    return Table("parts", ["without, or instead", *(MOTIONS[motion] for motion in analysis.motions)], rows)
+        differences = [
+            analysis.errors(motion, name) - analysis.errors(motion)
+            for motion in analysis.motions
+        ]
+        rows.append(
+            [label, *(bounded(interval(difference)) for difference in differences)]
+        )
+    return Table(
+        "parts",
+        ["without, or instead", *(MOTIONS[motion] for motion in analysis.motions)],
+        rows,
+    )
 
 
 def turn_table(analysis: Analysis) -> Table:
     """Return the errors on the walk with a turn, by view."""
     views = sorted({run.view for run in analysis.results.runs if run.kind == "track"})
     rows = []
-    for name in (*(name for name in COMPARED["turn"] if name not in PARTS), "mean_pose"):
-        errors, worst = analysis.errors("turn", name), analysis.away("turn", name)[..., 0].mean(axis=2)
+    for name in (
+        *(name for name in COMPARED["turn"] if name not in PARTS),
+        "mean_pose",
+    ):
+        errors = analysis.errors("turn", name)
+        worst = analysis.away("turn", name)[..., 0].mean(axis=2)
         cells = [f"{value:.2f}" for value in errors.mean(axis=1)]
         yaw = f"{worst.mean():.1f}" if name in METHODS else ""
         rows.append([LABELS[name], *cells, bounded(interval(errors)), yaw])
-    return Table("turn", ["method", *(f"{view:.0f}°" for view in views), "mean", "yaw"], rows)
+    return Table(
+        "turn", ["method", *(f"{view:.0f}°" for view in views), "mean", "yaw"], rows
+    )

@@ -48,7 +48,10 @@ ACTIVITIES = (
     Activity("squat", "squat-b", 60, frozenset({"squat"})),
 )
 # What a prior may learn from: no motion of the sequence.
-TRAINING = tuple(f"{kind}-a" for kind in ("walk", "step", "arms-out", "wave", "jacks", "squat", "jump", "march"))
+TRAINING = tuple(
+    f"{kind}-a"
+    for kind in ("walk", "step", "arms-out", "wave", "jacks", "squat", "jump", "march")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,11 @@ class Film:
     @property
     def switches(self) -> list[int]:
         """The frames in which another activity begins."""
-        return [k for k in range(1, len(self.labels)) if self.labels[k] != self.labels[k - 1]]
+        return [
+            k
+            for k in range(1, len(self.labels))
+            if self.labels[k] != self.labels[k - 1]
+        ]
 
 
 @lru_cache(maxsize=1)  # all methods follow the film of one seed before that of the next
@@ -81,21 +88,31 @@ def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
     rng = np.random.default_rng(seed)
     parts = [
         built_in.motion(
-            activity.motion, frames=activity.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random()
+            activity.motion,
+            frames=activity.frames,
+            fps=FPS,
+            speed=rng.uniform(*SPEEDS),
+            phase=rng.random(),
         )
         for activity in activities
     ]
     poses = np.concatenate([part.poses for part in parts])
-    places = np.concatenate([part.translations * [1.0, 1.0, 0.0] for part in parts])  # striding, but on the spot
+    # striding, but on the spot
+    places = np.concatenate([part.translations * [1.0, 1.0, 0.0] for part in parts])
     labels = np.repeat(np.arange(len(parts)), [len(part) for part in parts]).tolist()
     for first in np.cumsum([len(part) for part in parts])[:-1]:
-        away, moved = wrapped(poses[first : first + BLEND] - poses[first - 1]), places[first : first + BLEND]
+        away = wrapped(poses[first : first + BLEND] - poses[first - 1])
+        moved = places[first : first + BLEND]
         share = (np.arange(1, BLEND + 1) / (BLEND + 1))[:, None]
         poses[first : first + BLEND] = poses[first - 1] + share * away
-        places[first : first + BLEND] = places[first - 1] + share * (moved - places[first - 1])
+        places[first : first + BLEND] = places[first - 1] + share * (
+            moved - places[first - 1]
+        )
     truth = Motion("patent", built_in.average_skeleton(), poses, places, FPS)
     body = Body.of(truth.skeleton)
-    camera = Camera.around(np.array([0.0, 1.05, 0.0]), rng.uniform(-SIDEWAYS, SIDEWAYS), DISTANCE, SIZE)
+    camera = Camera.around(
+        np.array([0.0, 1.05, 0.0]), rng.uniform(-SIDEWAYS, SIDEWAYS), DISTANCE, SIZE
+    )
     return Film(truth, body, camera, labels, rng)
 
 
@@ -103,9 +120,19 @@ def _images(
     truth: Motion, body: Body, camera: Camera, rng: np.random.Generator
 ) -> tuple[Iterator[Image], Iterator[Image]]:
     """Return the frames of the empty scene, and of the person before it; a wall, and clothes of another colour."""
-    width, height = camera.width, camera.height
-    across, down = np.meshgrid(np.linspace(0.0, 1.0, width), np.linspace(0.0, 1.0, height))
-    wall = np.stack([150.0 + 40.0 * across, 160.0 - 30.0 * down, 140.0 + 20.0 * np.sin(9.0 * across)], axis=-1)
+    width = camera.width
+    height = camera.height
+    across, down = np.meshgrid(
+        np.linspace(0.0, 1.0, width), np.linspace(0.0, 1.0, height)
+    )
+    wall = np.stack(
+        [
+            150.0 + 40.0 * across,
+            160.0 - 30.0 * down,
+            140.0 + 20.0 * np.sin(9.0 * across),
+        ],
+        axis=-1,
+    )
     clothes = np.where(down[..., None] < 0.55, [60.0, 50.0, 170.0], [130.0, 60.0, 40.0])
 
     def noisy(image: Array) -> Image:

@@ -22,18 +22,25 @@ from posefit_vsmm.motion import library
 
 TUNED = 5  # films on which defaults were chosen
 WARM_UP = 3  # frames that are tracked beforehand, so that no time includes compilation
-LABELS = ("walk", "arms-out", "jacks", "squat", "jump")  # of the film's activities; a jump is none of them
-DETAILS = ("lost", "joints", "confidence", "filter_seconds", "detection_seconds")  # of frames that are stored
+# of the film's activities; a jump is none of them
+LABELS = ("walk", "arms-out", "jacks", "squat", "jump")
+# of frames that are stored
+DETAILS = ("lost", "joints", "confidence", "filter_seconds", "detection_seconds")
 MODELS = library().models.names
 GROUPS = tuple(TOPOLOGY.groups.items())
 METHODS: dict[str, TrackOptions] = {
     "default": TrackOptions(method="vsmm"),
     "patent": TrackOptions(method="vsmm:patent"),
     "all six models": TrackOptions(method="vsmm", settings={"vsmm.structure": "all"}),
-    "patent, all six": TrackOptions(method="vsmm:patent", settings={"vsmm.structure": "all"}),
+    "patent, all six": TrackOptions(
+        method="vsmm:patent", settings={"vsmm.structure": "all"}
+    ),
 }
-UNRECOVERED = "no recovery"  # Interpretation V14, on the films that defaults are chosen on
-ALL = METHODS | {UNRECOVERED: TrackOptions(method="vsmm", settings={"vsmm.recovery": False})}
+# Interpretation V14, on the films that defaults are chosen on
+UNRECOVERED = "no recovery"
+ALL = METHODS | {
+    UNRECOVERED: TrackOptions(method="vsmm", settings={"vsmm.recovery": False})
+}
 
 
 @dataclass(frozen=True)
@@ -48,25 +55,45 @@ class Scale:
         if self.films < 1:
             raise InputError(f"films must be at least 1, got {self.films}")
         for seed in range(TUNED, TUNED + self.films):
-            yield from (Run("reported", "film", method, seed=seed) for method in METHODS)
+            yield from (
+                Run("reported", "film", method, seed=seed) for method in METHODS
+            )
         for seed in range(TUNED):
-            yield from (Run("tuned", "film", method, seed=seed) for method in ("default", UNRECOVERED))
+            yield from (
+                Run("tuned", "film", method, seed=seed)
+                for method in ("default", UNRECOVERED)
+            )
 
 
 def film_task(film: Film, evaluations: int) -> Task:
     """Return what is known before a film; its first pose is not."""
-    yaw, place = float(film.truth.poses[0, 0]), film.truth.translations[0]
+    yaw = float(film.truth.poses[0, 0])
+    place = film.truth.translations[0]
     motions = [built_in.motion(motion) for motion in TRAINING]
-    return Task(film.body, [film.camera], evaluations, yaw, place, "aligned", film.truth.fps, motions)
+    return Task(
+        film.body,
+        [film.camera],
+        evaluations,
+        yaw,
+        place,
+        "aligned",
+        film.truth.fps,
+        motions,
+    )
 
 
 def perform(run: Run) -> Arrays:
     """Follow the film of a seed with a method; the first pose is not known."""
-    film, options = film_of(run.seed), ALL[run.method]
+    film = film_of(run.seed)
+    options = ALL[run.method]
     task = film_task(film, options.evaluations or EVALUATIONS)
     with threadpool_limits(1):
         for observations in (film.observations[:WARM_UP], film.observations):
-            frames = list(prepare(options, task).follow(task, observations, np.random.default_rng(run.seed)))
+            frames = list(
+                prepare(options, task).follow(
+                    task, observations, np.random.default_rng(run.seed)
+                )
+            )
     return arrays_of(frames)
 
 
@@ -74,7 +101,9 @@ def arrays_of(frames: list[Frame]) -> Arrays:
     """Return the arrays of a track, a row a frame; -1 stands for no group, no candidate and no label."""
     probabilities = np.zeros((len(frames), len(MODELS)))
     for row, frame in zip(probabilities, frames, strict=True):
-        row[[MODELS.index(name) for name in frame.details["models"]]] = frame.details.get("probabilities", 0.0)
+        row[[MODELS.index(name) for name in frame.details["models"]]] = (
+            frame.details.get("probabilities", 0.0)
+        )
     groups = [None, *(name for name, _ in GROUPS)]
     series: dict[str, list[Any]] = {
         "poses": [frame.pose for frame in frames],
@@ -82,7 +111,13 @@ def arrays_of(frames: list[Frame]) -> Arrays:
         "areas": [frame.areas[0] for frame in frames],
         "cpu_seconds": [frame.cpu_seconds for frame in frames],
         "label": [[None, *LABELS].index(frame.activity) - 1 for frame in frames],
-        **{name: [groups.index(frame.details[name]) - 1 for frame in frames] for name in ("group", "candidate_group")},
+        **{
+            name: [groups.index(frame.details[name]) - 1 for frame in frames]
+            for name in ("group", "candidate_group")
+        },
         **{name: [frame.details[name] for frame in frames] for name in DETAILS},
     }
-    return {"probabilities": probabilities, **{name: np.array(values) for name, values in series.items()}}
+    return {
+        "probabilities": probabilities,
+        **{name: np.array(values) for name, values in series.items()},
+    }

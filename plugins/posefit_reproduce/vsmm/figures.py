@@ -16,16 +16,24 @@ from posefit_reproduce.vsmm.tables import PATENT_CM, joint_errors
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
 LARGER = 2  # pixels a pixel, in the stills
-_JOINT, _HIDDEN = (60, 220, 255), (120, 120, 120)
+_JOINT = (60, 220, 255)
+_HIDDEN = (120, 120, 120)
 
 
 def patent_figures(results: Results) -> Iterator[tuple[str, Any]]:
     """Yield the figures of the first film that is reported, by default and by the letter, with the names of files."""
     film = film_of(TUNED)
     for run, arrays in results.runs.items():
-        if run.kind == "reported" and run.seed == TUNED and run.method in ("default", "patent"):
+        if (
+            run.kind == "reported"
+            and run.seed == TUNED
+            and run.method in ("default", "patent")
+        ):
             yield f"figure-9-joints-{run.method}.jpg", film_stills(film, arrays)
-            yield f"figure-10-probabilities-{run.method}.png", probability_figure(film, arrays)
+            yield (
+                f"figure-10-probabilities-{run.method}.png",
+                probability_figure(film, arrays),
+            )
             yield f"figure-11-errors-{run.method}.png", error_figure(film, arrays)
 
 
@@ -38,12 +46,28 @@ def probability_figure(film: Film, arrays: Arrays) -> Figure:
         upper.plot(seconds, series, linewidth=1.2, label=name)
     upper.set(ylabel="probability", ylim=(0.0, 1.14))
     place = {"loc": "upper center", "bbox_to_anchor": (0.5, 1.18)}
-    upper.legend(fontsize=8.5, frameon=False, ncols=len(MODELS), columnspacing=1.2, handlelength=1.4, **place)
+    upper.legend(
+        fontsize=8.5,
+        frameon=False,
+        ncols=len(MODELS),
+        columnspacing=1.2,
+        handlelength=1.4,
+        **place,
+    )
     for row in range(len(GROUPS)):
-        force = (arrays["group"] == row) | (arrays["candidate_group"] == row) | (arrays["group"] < 0)
+        force = (
+            (arrays["group"] == row)
+            | (arrays["candidate_group"] == row)
+            | (arrays["group"] < 0)
+        )
         lower.scatter(seconds[force], np.full(force.sum(), row), s=4, marker="s")
     names = [name for name, _ in GROUPS]
-    lower.set(yticks=range(len(names)), yticklabels=names, ylim=(-0.6, len(names) - 0.4), xlabel="seconds")
+    lower.set(
+        yticks=range(len(names)),
+        yticklabels=names,
+        ylim=(-0.6, len(names) - 0.4),
+        xlabel="seconds",
+    )
     lower.set_ylabel("in force")
     for axes in (upper, lower):
         _activities(axes, film, label=axes is upper)
@@ -52,12 +76,26 @@ def probability_figure(film: Film, arrays: Arrays) -> Figure:
 
 def error_figure(film: Film, arrays: Arrays) -> Figure:
     """Return the errors of right elbow and hand over time, against the detected joints and against the truth."""
-    labels = {"_detected": "to the detected, cm", "": "to the truth, cm", "_space": "in space, cm"}
-    errors, figure = joint_errors(film, arrays), Figure(figsize=(7.0, 6.0), layout="constrained")
+    labels = {
+        "_detected": "to the detected, cm",
+        "": "to the truth, cm",
+        "_space": "in space, cm",
+    }
+    errors = joint_errors(film, arrays)
+    figure = Figure(figsize=(7.0, 6.0), layout="constrained")
     seconds = np.arange(len(film.labels)) / FPS
-    for axes, (name, label) in zip(figure.subplots(3, 1, sharex=True), labels.items(), strict=True):
-        for joint, series in zip(("right elbow", "right hand"), errors[name].T, strict=True):
-            axes.plot(seconds, series, linewidth=1.0, label=f"{joint}, mean {series.mean():.1f}")
+    for axes, (name, label) in zip(
+        figure.subplots(3, 1, sharex=True), labels.items(), strict=True
+    ):
+        for joint, series in zip(
+            ("right elbow", "right hand"), errors[name].T, strict=True
+        ):
+            axes.plot(
+                seconds,
+                series,
+                linewidth=1.0,
+                label=f"{joint}, mean {series.mean():.1f}",
+            )
         axes.set(ylabel=label, ylim=(0.0, None))
         axes.legend(fontsize=8.5, frameon=False)
         _activities(axes, film, label=False)
@@ -77,21 +115,57 @@ def _activities(axes: Any, film: Film, label: bool) -> None:
 
 def film_stills(film: Film, arrays: Arrays) -> Image:
     """Return stills: detected joints on the mask, filled unless hidden; the body on it; the body from its side."""
-    stills = [_still(film, {name: value[k] for name, value in arrays.items() if value.ndim}, k) for k in STILLS]
+    stills = [
+        _still(
+            film, {name: value[k] for name, value in arrays.items() if value.ndim}, k
+        )
+        for k in STILLS
+    ]
     rows = [np.hstack(stills[k : k + len(stills) // 2]) for k in (0, len(stills) // 2)]
-    return np.asarray(cv2.resize(np.vstack(rows), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
+    return np.asarray(
+        cv2.resize(np.vstack(rows), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    )
 
 
 def _still(film: Film, frame: Arrays, k: int) -> Image:
     mask = film.observations[k].silhouettes[0].mask
-    grey: Image = np.repeat(np.where(mask, 150, 28).astype(np.uint8)[..., None], 3, axis=2)
+    grey: Image = np.repeat(
+        np.where(mask, 150, 28).astype(np.uint8)[..., None], 3, axis=2
+    )
     drawn = grey.copy()
     draw_body(drawn, film.body, film.camera, frame["poses"], frame["translations"])
-    marked, drawn = (np.asarray(cv2.resize(i, None, fx=LARGER, fy=LARGER), dtype=np.uint8) for i in (grey, drawn))
-    for point, confidence in zip(LARGER * frame["joints"][0], frame["confidence"][0], strict=True):
+    marked, drawn = (
+        np.asarray(cv2.resize(i, None, fx=LARGER, fy=LARGER), dtype=np.uint8)
+        for i in (grey, drawn)
+    )
+    for point, confidence in zip(
+        LARGER * frame["joints"][0], frame["confidence"][0], strict=True
+    ):
         colour, thickness = (_JOINT, -1) if confidence > 0.0 else (_HIDDEN, 1)
-        cv2.circle(marked, tuple(np.rint(point).astype(int).tolist()), 4, colour, thickness, cv2.LINE_AA)
+        cv2.circle(
+            marked,
+            tuple(np.rint(point).astype(int).tolist()),
+            4,
+            colour,
+            thickness,
+            cv2.LINE_AA,
+        )
     middle = slice(drawn.shape[1] // 5, drawn.shape[1] - drawn.shape[1] // 5)
-    cv2.putText(marked, f"{k}", (middle.start + 8, 44), cv2.FONT_HERSHEY_SIMPLEX, 1.3, (240, 240, 240), 2, cv2.LINE_AA)
-    side = side_view(film.body, film.camera, frame["poses"], frame["translations"], middle.stop - middle.start)
+    cv2.putText(
+        marked,
+        f"{k}",
+        (middle.start + 8, 44),
+        cv2.FONT_HERSHEY_SIMPLEX,
+        1.3,
+        (240, 240, 240),
+        2,
+        cv2.LINE_AA,
+    )
+    side = side_view(
+        film.body,
+        film.camera,
+        frame["poses"],
+        frame["translations"],
+        middle.stop - middle.start,
+    )
     return np.vstack([marked[:, middle], drawn[:, middle], side])

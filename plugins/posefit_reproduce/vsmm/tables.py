@@ -10,16 +10,36 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.geometry.skeleton import JOINTS
-from posefit_reproduce.experiment import Arrays, Claim, Results, Table, bounded, claims_table, interval
+from posefit_reproduce.experiment import (
+    Arrays,
+    Claim,
+    Results,
+    Table,
+    bounded,
+    claims_table,
+    interval,
+)
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film, film_of
-from posefit_reproduce.vsmm.experiment import GROUPS, LABELS, METHODS, MODELS, TUNED, UNRECOVERED
+from posefit_reproduce.vsmm.experiment import (
+    GROUPS,
+    LABELS,
+    METHODS,
+    MODELS,
+    TUNED,
+    UNRECOVERED,
+)
 from posefit_vsmm.state import AT
 
-ELBOW, HAND = JOINTS.index("rhumerus"), JOINTS.index("rwrist")  # the joints that end in elbow and hand
+# the joints that end in elbow and hand
+ELBOW = JOINTS.index("rhumerus")
+HAND = JOINTS.index("rwrist")
 POINTS = [AT["right elbow"], AT["right hand"]]
 TRUE_MM = 50.0  # ours: a mean distance of joints in space that still counts as none
 PATENT_CM = (2.7, 5.2)  # between these lie the patent's own mean errors of figure 11
-RIGHT = [[MODELS.index(model) for model in sorted(activity.models)] for activity in ACTIVITIES]
+RIGHT = [
+    [MODELS.index(model) for model in sorted(activity.models)]
+    for activity in ACTIVITIES
+]
 FIGURES: dict[str, tuple[str, int]] = {
     "elbow_detected": ("elbow to the detected, cm", 1),
     "hand_detected": ("hand to the detected, cm", 1),
@@ -43,9 +63,24 @@ FIGURES: dict[str, tuple[str, int]] = {
 BOTH = ("default", "patent")
 Films = Mapping[str, Array]  # by the names of `FIGURES`, those of all films (1, n)
 # what is shown film by film
-CHIEF = ("elbow_detected", "hand_detected", "mpjpe", "model", "group", "delay", "delay_change")
+CHIEF = (
+    "elbow_detected",
+    "hand_detected",
+    "mpjpe",
+    "model",
+    "group",
+    "delay",
+    "delay_change",
+)
 # figures that a filter over all models does not have
-SWITCHING = {"group", "delay", "delay_change", "activations", "wrong_activations", "wrong_terminations"}
+SWITCHING = {
+    "group",
+    "delay",
+    "delay_change",
+    "activations",
+    "wrong_activations",
+    "wrong_terminations",
+}
 
 
 def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
@@ -53,13 +88,19 @@ def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
 
     As in figure 11 no frame is left out: a joint that is hidden is where it is predicted. Interpretation V18.
     """
-    skeleton, chosen = film.body.skeleton, [ELBOW, HAND]
+    skeleton = film.body.skeleton
+    chosen = [ELBOW, HAND]
     truth = skeleton.joints(film.truth.poses, film.truth.translations)[:, chosen]
     estimate = skeleton.joints(arrays["poses"], arrays["translations"])[:, chosen]
-    (true_pixels, true_depths), (pixels, depths) = film.camera.project(truth), film.camera.project(estimate)
+    (true_pixels, true_depths), (pixels, depths) = (
+        film.camera.project(truth),
+        film.camera.project(estimate),
+    )
 
     def in_cm(off_pixels: Array, depths: Array) -> Array:
-        return np.asarray(100.0 * np.linalg.norm(off_pixels / film.camera.focal, axis=-1) * depths)
+        return np.asarray(
+            100.0 * np.linalg.norm(off_pixels / film.camera.focal, axis=-1) * depths
+        )
 
     return {
         "": in_cm(true_pixels - pixels, true_depths),
@@ -70,12 +111,16 @@ def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
 
 def film_figures(seed: int, arrays: Arrays) -> dict[str, float]:
     """Return the figures of a track of a film, by the names of `FIGURES`."""
-    film, figures = film_of(seed), dict[str, Any]()
-    skeleton, poses = film.body.skeleton, arrays["poses"]
+    film = film_of(seed)
+    figures = dict[str, Any]()
+    skeleton = film.body.skeleton
+    poses = arrays["poses"]
     for name, values in joint_errors(film, arrays).items():
         figures[f"elbow{name}"], figures[f"hand{name}"] = values.mean(axis=0)
     truth = skeleton.joints(film.truth.poses, film.truth.translations)
-    figures["mpjpe"] = metrics.mpjpe_mm(truth, skeleton.joints(poses, arrays["translations"])).mean()
+    figures["mpjpe"] = metrics.mpjpe_mm(
+        truth, skeleton.joints(poses, arrays["translations"])
+    ).mean()
     figures["degrees"] = metrics.pose_error_degrees(film.truth.poses, poses).mean()
     figures["frame"] = 1e3 * np.median(arrays["cpu_seconds"])
     figures |= switching_figures(film.labels, arrays)
@@ -84,15 +129,22 @@ def film_figures(seed: int, arrays: Arrays) -> dict[str, float]:
 
 def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     """Return how often models and groups in force are right; frames that try all models have no group."""
-    probabilities, candidates = arrays["probabilities"], arrays["candidate_group"]
+    probabilities = arrays["probabilities"]
+    candidates = arrays["candidate_group"]
     likeliest = probabilities.argmax(axis=1)
-    models_of = [set(), *({MODELS.index(name) for name in names} for _, names in GROUPS)]  # of a group's number + 1
+    # of a group's number + 1
+    models_of = [
+        set(),
+        *({MODELS.index(name) for name in names} for _, names in GROUPS),
+    ]
     in_force = [
         models_of[group + 1] | models_of[candidate + 1]
         for group, candidate in zip(arrays["group"], candidates, strict=True)
     ]
     right = [set(RIGHT[label]) for label in labels]
-    right_group = np.array([bool(models & wanted) for models, wanted in zip(in_force, right, strict=True)])
+    right_group = np.array(
+        [bool(models & wanted) for models, wanted in zip(in_force, right, strict=True)]
+    )
     delays = _delays(labels, right_group)
     activated = [
         models_of[now + 1] & wanted
@@ -105,7 +157,10 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     ]
     return {
         "dominant": 100.0 * np.mean(probabilities.max(axis=1) > 0.5),
-        "model": 100.0 * np.mean([model in models for model, models in zip(likeliest, right, strict=True)]),
+        "model": 100.0
+        * np.mean(
+            [model in models for model, models in zip(likeliest, right, strict=True)]
+        ),
         "group": 100.0 * right_group.mean(),
         "label": 100.0 * np.mean(arrays["label"] == np.array(labels)),
         "delay": max(delays),
@@ -132,9 +187,12 @@ def patent_tables(results: Results) -> Iterator[Table]:
     """Yield all tables: claims, methods, film by film, labels, recovery."""
     rows: dict[str, list[dict[str, float]]] = {}
     for run in sorted(results.runs, key=lambda run: run.seed):
-        rows.setdefault(f"{run.kind} {run.method}", []).append(film_figures(run.seed, results.runs[run]))
+        rows.setdefault(f"{run.kind} {run.method}", []).append(
+            film_figures(run.seed, results.runs[run])
+        )
     films: dict[str, Films] = {
-        name: {figure: np.array([[row[figure] for row in each]]) for figure in each[0]} for name, each in rows.items()
+        name: {figure: np.array([[row[figure] for row in each]]) for figure in each[0]}
+        for name, each in rows.items()
     }
     methods = {name: films[f"reported {name}"] for name in METHODS}
     yield claims_table("claims", list(claims(methods)))
@@ -151,7 +209,9 @@ def means_table(name: str, methods: Mapping[str, Films]) -> Table:
         [
             label,
             *(
-                "" if "six" in method and figure in SWITCHING else bounded(interval(films[figure]), digits)
+                ""
+                if "six" in method and figure in SWITCHING
+                else bounded(interval(films[figure]), digits)
                 for method, films in methods.items()
             ),
         ]
@@ -178,17 +238,83 @@ def claims(methods: Mapping[str, Films]) -> Iterator[Claim]:
     """Yield what the patent says of its experiment, of our default and of its letter."""
     for name, other in (("default", "all six models"), ("patent", "patent, all six")):
         figures = methods[name]
-        less = {figure: figures[figure] - methods[other][figure] for figure in ("frame", "mpjpe")}
+        less = {
+            figure: figures[figure] - methods[other][figure]
+            for figure in ("frame", "mpjpe")
+        }
         for text, source, values, unit, bound, above in (
-            ("the elbow is near the detected one", "figure 11", figures["elbow_detected"], "cm", PATENT_CM[1], False),
-            ("the hand is near the detected one", "figure 11", figures["hand_detected"], "cm", PATENT_CM[1], False),
-            ("the body in space is the true one", "figure 9c", figures["mpjpe"], "mm MPJPE", TRUE_MM, False),
-            ("one model dominates at each time", "figure 10", figures["dominant"], "% of frames", 95.0, True),
-            ("it is the right one", "figure 10", figures["model"], "% of frames", 95.0, True),
-            ("a right group comes after a change", "figure 10", figures["delay_change"], "frames", 10.0, False),
-            ("a group takes less time than six models", "effect 2", less["frame"], "CPU ms", 0.0, False),
-            ("a group is more accurate than six models", "effect 2", less["mpjpe"], "mm MPJPE", 0.0, False),
-            ("ten frames a second are tracked", "effect 3", figures["filter"], "ms", 100.0, False),
+            (
+                "the elbow is near the detected one",
+                "figure 11",
+                figures["elbow_detected"],
+                "cm",
+                PATENT_CM[1],
+                False,
+            ),
+            (
+                "the hand is near the detected one",
+                "figure 11",
+                figures["hand_detected"],
+                "cm",
+                PATENT_CM[1],
+                False,
+            ),
+            (
+                "the body in space is the true one",
+                "figure 9c",
+                figures["mpjpe"],
+                "mm MPJPE",
+                TRUE_MM,
+                False,
+            ),
+            (
+                "one model dominates at each time",
+                "figure 10",
+                figures["dominant"],
+                "% of frames",
+                95.0,
+                True,
+            ),
+            (
+                "it is the right one",
+                "figure 10",
+                figures["model"],
+                "% of frames",
+                95.0,
+                True,
+            ),
+            (
+                "a right group comes after a change",
+                "figure 10",
+                figures["delay_change"],
+                "frames",
+                10.0,
+                False,
+            ),
+            (
+                "a group takes less time than six models",
+                "effect 2",
+                less["frame"],
+                "CPU ms",
+                0.0,
+                False,
+            ),
+            (
+                "a group is more accurate than six models",
+                "effect 2",
+                less["mpjpe"],
+                "mm MPJPE",
+                0.0,
+                False,
+            ),
+            (
+                "ten frames a second are tracked",
+                "effect 3",
+                figures["filter"],
+                "ms",
+                100.0,
+                False,
+            ),
         ):
             yield Claim(text, source, name, values, unit, bound, above)
 
@@ -201,7 +327,8 @@ def labels_table(name: str, results: Results, method: str) -> Table:
             np.add.at(counts, (np.array(film_of(run.seed).labels), arrays["label"]), 1)
     shares = 100.0 * counts / counts.sum(axis=1, keepdims=True)
     rows = [
-        [activity.label, *(f"{share:.0f}" for share in row)] for activity, row in zip(ACTIVITIES, shares, strict=True)
+        [activity.label, *(f"{share:.0f}" for share in row)]
+        for activity, row in zip(ACTIVITIES, shares, strict=True)
     ]
     chance = 100.0 * counts.sum(axis=1).max() / counts.sum()
     return Table(name, [f"% (by chance {chance:.0f})", *LABELS, "none"], rows)
@@ -209,8 +336,18 @@ def labels_table(name: str, results: Results, method: str) -> Table:
 
 def recovery_table(films: Mapping[str, Films]) -> Table:
     """Return by how many mm of MPJPE the tracker is worse without recovery, on the films that it was chosen on."""
-    with_it, without = films["tuned default"], films[f"tuned {UNRECOVERED}"]
+    with_it = films["tuned default"]
+    without = films[f"tuned {UNRECOVERED}"]
     worse = without["mpjpe"] - with_it["mpjpe"]
     hands = [f"{each['hand'].mean():.1f}" for each in (with_it, without)]
-    row = [UNRECOVERED, bounded(interval(worse), 1), f"{(worse > 0).sum()} of {worse.size}", *hands]
-    return Table("recovery", ["V14", "worse by mm", "on films", "hand, cm: by default", "without"], [row])
+    row = [
+        UNRECOVERED,
+        bounded(interval(worse), 1),
+        f"{(worse > 0).sum()} of {worse.size}",
+        *hands,
+    ]
+    return Table(
+        "recovery",
+        ["V14", "worse by mm", "on films", "hand, cm: by default", "without"],
+        [row],
+    )

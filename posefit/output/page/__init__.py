@@ -17,7 +17,16 @@ The constant `D` is the data that content.py returns; `posefit.page` has what al
 
 from typing import Any
 
-from posefit.output.drawing import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
+from posefit.output.drawing import (
+    BOTH,
+    LEFT,
+    MIDDLE,
+    MISSED,
+    OTHER,
+    RIGHT,
+    SPILLED,
+    hexadecimal,
+)
 from posefit.page.document import assembled, colour_style, one_script, part
 
 LIGHT = {
@@ -52,4 +61,10 @@ _MARK = "<!doctype html>\n<!-- a track of posefit -->\n"
 def track_document(data: dict[str, Any]) -> str:
     """Return the page that shows the data of a track."""
     style = colour_style(LIGHT, DARK) + part(__package__, "track.css")
-    return assembled(_MARK, part(__package__, "track.html"), style, data, one_script(__package__, SCRIPTS))
+    return assembled(
+        _MARK,
+        part(__package__, "track.html"),
+        style,
+        data,
+        one_script(__package__, SCRIPTS),
+    )

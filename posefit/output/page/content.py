@@ -30,7 +30,16 @@ TENTH = 0.1  # degrees: the unit of angles in a page
 UNIT = np.radians(TENTH)
 MAX_16_BITS = 32_767
 COLUMN = ("label", "unit", "digits", "factor")  # of a figure, as the page has it
-CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "wall_seconds")
+CURVES = (
+    "mpjpe_mm",
+    "error_degrees",
+    "iou",
+    "cost",
+    "pa_mpjpe_mm",
+    "geodesic_degrees",
+    "evaluations",
+    "wall_seconds",
+)
 MARKS: dict[str, Callable[[Table], NDArray[np.bool_]]] = {
     "held": lambda table: table["usable"] == 0.0,
     "lost": lambda table: table["lost"] >= LOST,
@@ -38,7 +47,11 @@ MARKS: dict[str, Callable[[Table], NDArray[np.bool_]]] = {
 }
 ANGLE_NAMES = (
     *("root yaw", "root pitch", "root roll"),
-    *(f"{JOINTS[k]} {axis} (bone to the {PLACES[k].replace('_', ' ')})" for k in INNER for axis in "xyz"),
+    *(
+        f"{JOINTS[k]} {axis} (bone to the {PLACES[k].replace('_', ' ')})"
+        for k in INNER
+        for axis in "xyz"
+    ),
 )
 
 
@@ -48,11 +61,17 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
     Joints are millimetres from the first position of the root and angles tenths of a degree, in 16 bits each. A long
     track has every `step`-th frame; a frame is marked if one of those that it stands for is.
     """
-    scene, frames, table, setup = content.scene, content.frames, content.table, content.setup
-    step, estimate, intervals = stills.step, content.motion, content.intervals
+    scene = content.scene
+    frames = content.frames
+    table = content.table
+    setup = content.setup
+    step = stills.step
+    estimate = content.motion
+    intervals = content.intervals
     joints = estimate.joints[::step]
     origin = np.round(joints[0, 0], 3)
-    truth, free = scene.truth, estimate.skeleton.free
+    truth = scene.truth
+    free = estimate.skeleton.free
     true = None if truth is None else truth.joints[::step]
     angles = unwrapped(estimate.poses)[::step]
     worth = "" if truth is None else f": {brief(content)[0]}"
@@ -78,21 +97,32 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         "estimate": in_16_bits(joints - origin),
         "truth": None if true is None else in_16_bits(true - origin),
         "others": _others(scene, frames[::step], origin),
-        "columns": {name: {key: getattr(FRAME[name], key) for key in COLUMN} for name in curves},
+        "columns": {
+            name: {key: getattr(FRAME[name], key) for key in COLUMN} for name in curves
+        },
         "gait": _gait(content) if len(frames) > 1 else None,
         "rows": {name: table[name][::step].tolist() for name in curves},
-        "marks": {name: np.unique(np.flatnonzero(marked(table)) // step).tolist() for name, marked in MARKS.items()},
+        "marks": {
+            name: np.unique(np.flatnonzero(marked(table)) // step).tolist()
+            for name, marked in MARKS.items()
+        },
         "angles": {
-            "names": [name for name, is_free in zip(ANGLE_NAMES, free, strict=True) if is_free],
+            "names": [
+                name for name, is_free in zip(ANGLE_NAMES, free, strict=True) if is_free
+            ],
             "values": in_16_bits(angles[:, free], UNIT),
             "truth": None
             if truth is None
-            else in_16_bits((angles - wrapped(angles - truth.poses[::step]))[:, free], UNIT),
+            else in_16_bits(
+                (angles - wrapped(angles - truth.poses[::step]))[:, free], UNIT
+            ),
         },
         "clinical": {
             "names": [name.replace("_", " ") for name in COLUMNS],
             "values": in_16_bits(_clinical(estimate, step), TENTH),
-            "truth": None if truth is None else in_16_bits(_clinical(truth, step), TENTH),
+            "truth": None
+            if truth is None
+            else in_16_bits(_clinical(truth, step), TENTH),
         },
         "intervals": {
             "levels": [round(100 * level) for level in intervals["levels"].tolist()],
@@ -113,16 +143,23 @@ def _verdict(content: Content) -> str:
         (content.log.unknown_sides, "which side is left"),
         (content.log.lost_frames, "which frames are lost"),
     )
-    unreported = " or ".join(words for reported, words in certainties if reported is None)
+    unreported = " or ".join(
+        words for reported, words in certainties if reported is None
+    )
     if unreported:
         return f"{trust}The method does not report {unreported}: frames without a mark may be wrong too."
     return f"{trust}The method reports no frame as lost, and left and right as known in every frame."
 
 
 def _facts(content: Content) -> list[list[str]]:
-    setup, measures = content.setup, content.measures
+    setup = content.setup
+    measures = content.measures
     return [
-        *([] if measures.mpjpe_mm is None else [["MPJPE", f"{measures.mpjpe_mm:.0f} mm"]]),
+        *(
+            []
+            if measures.mpjpe_mm is None
+            else [["MPJPE", f"{measures.mpjpe_mm:.0f} mm"]]
+        ),
         ["method", setup.method],
         ["seed", str(setup.seed)],
         ["cameras", f"{setup.views}, {setup.camera}"],
@@ -135,9 +172,15 @@ def _facts(content: Content) -> list[list[str]]:
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
     """Return the other likely poses of frames: their numbers among those shown, weights and joints."""
     skeleton = scene.body.skeleton
-    modes = [other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT) for frame in frames]
+    modes = [
+        other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
+        for frame in frames
+    ]
     likely = {k: mode for k, mode in enumerate(modes) if mode is not None}
-    joints = [skeleton.joints(mode.pose, mode.translation) - origin for mode in likely.values()]
+    joints = [
+        skeleton.joints(mode.pose, mode.translation) - origin
+        for mode in likely.values()
+    ]
     return {
         "at": list(likely),
         "weights": [mode.weight for mode in likely.values()],
@@ -147,12 +190,21 @@ def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, A
 
 def _gait(content: Content) -> dict[str, Any]:
     """Return the gait in words and by side, and how the knees bend over a stride, the mean and a standard deviation."""
-    gait, knees = content.gait.as_dict(), {}
+    gait = content.gait.as_dict()
+    knees = {}
     if gait["walk"]:
-        for side, curves in stride_curves(content.motion, content.gait, "knee_flexion").items():
-            mean, spread = (curves.mean(axis=0), curves.std(axis=0)) if len(curves) else (np.empty(0), 0.0)
+        for side, curves in stride_curves(
+            content.motion, content.gait, "knee_flexion"
+        ).items():
+            mean, spread = (
+                (curves.mean(axis=0), curves.std(axis=0))
+                if len(curves)
+                else (np.empty(0), 0.0)
+            )
             lines = {"mean": mean, "low": mean - spread, "high": mean + spread}
-            knees[side] = {name: np.round(line, 1).tolist() for name, line in lines.items()} | {"strides": len(curves)}
+            knees[side] = {
+                name: np.round(line, 1).tolist() for name, line in lines.items()
+            } | {"strides": len(curves)}
     rows = gait_rows(gait) if gait["walk"] else []
     return {"text": gait_line(gait, by_side=False), "rows": rows, "knees": knees}
 
@@ -168,7 +220,9 @@ def in_16_bits(values: Array, unit: float = 1e-3) -> str:
 
     Larger values are clipped to 32,767 units; NaN is -32,768.
     """
-    units = np.clip(np.round(np.asarray(values, dtype=np.float64) / unit), -MAX_16_BITS, MAX_16_BITS)
+    units = np.clip(
+        np.round(np.asarray(values, dtype=np.float64) / unit), -MAX_16_BITS, MAX_16_BITS
+    )
     whole = np.where(np.isnan(units), -MAX_16_BITS - 1, units).astype("<i2")
     return base64.b64encode(whole.tobytes()).decode()
 
@@ -180,5 +234,7 @@ def camera_from_origin(camera: Camera, origin: Array) -> dict[str, Any]:
         "focal": np.round(camera.focal, 3).tolist(),
         "centre": np.round(camera.centre, 3).tolist(),
         "rotation": np.round(camera.rotation, 6).tolist(),
-        "translation": np.round(camera.translation + camera.rotation @ origin, 6).tolist(),
+        "translation": np.round(
+            camera.translation + camera.rotation @ origin, 6
+        ).tolist(),
     }

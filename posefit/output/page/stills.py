@@ -19,11 +19,18 @@ from posefit.silhouette.mask import Mask
 from posefit.silhouette.rasteriser import NEAR
 
 MAX_FRAMES = 1_200  # of a track; longer ones show every second, fourth, ... frame
-MAX_FILM, MAX_MASKS = 4_500_000, 1_200_000  # characters of all frames of footage, and of all cameras' masks together
+# characters of all frames of footage, and of all cameras' masks together
+MAX_FILM = 4_500_000
+MAX_MASKS = 1_200_000
 SPARE = 0.2  # of the room for footage, as later frames may need more than the first
 MAX_HEIGHT = 360  # pixels of a picture
 # pixels of height and quality of JPEG, 0 to 100, of the part around the person and of the whole frame, finest first
-FINENESS = ((MAX_HEIGHT, 75), (200, 50)), ((MAX_HEIGHT, 50), (200, 50)), ((288, 40), (180, 35)), ((216, 35), (120, 30))
+FINENESS = (
+    ((MAX_HEIGHT, 75), (200, 50)),
+    ((MAX_HEIGHT, 50), (200, 50)),
+    ((288, 40), (180, 35)),
+    ((216, 35), (120, 30)),
+)
 MARGIN = 0.25  # of the larger side of a person's box, to each side
 
 Fineness = tuple[tuple[int, int], tuple[int, int]]
@@ -36,13 +43,18 @@ class Strip:
     def __init__(self, room: int, every: int) -> None:
         self.pictures: list[tuple[Any, ...]] = []  # a box, and the pictures
         self.every = every
-        self._room, self._count = room, 0
+        self._room = room
+        self._count = 0
 
     def add(self, box: Box, pictures: Callable[[], list[str]]) -> None:
         """Take the next frame, whose `pictures` are made if they are needed; the first is of the box."""
         if self._count % self.every == 0:
             self.pictures.append((box, *pictures()))
-            while len(self.pictures) > 1 and sum(len(text) for _, *each in self.pictures for text in each) > self._room:
+            while (
+                len(self.pictures) > 1
+                and sum(len(text) for _, *each in self.pictures for text in each)
+                > self._room
+            ):
                 self.pictures = self.pictures[::2]
                 self.every *= 2
         self._count += 1
@@ -62,20 +74,30 @@ class Stills:
         self.step = 1
         while scene.count > MAX_FRAMES * self.step:
             self.step *= 2
-        self._body, self._cameras = scene.body, scene.cameras
+        self._body = scene.body
+        self._cameras = scene.cameras
         self._wanted = -(-scene.count // self.step)
         self._fineness: Fineness | None = None  # unknown before the first frame
         self._film = Strip(MAX_FILM, self.step) if scene.pictures is not None else None
-        self._masks = [Strip(MAX_MASKS // len(scene.cameras), self.step) for _ in scene.cameras]
+        self._masks = [
+            Strip(MAX_MASKS // len(scene.cameras), self.step) for _ in scene.cameras
+        ]
 
     def add(self, frame: Frame, observation: Observation, filmed: Image | None) -> None:
         """Take the next frame."""
         masks = [silhouette.mask for silhouette in observation.silhouettes]
-        boxes = [_box(mask, self._body, camera, frame) for mask, camera in zip(masks, self._cameras, strict=True)]
+        boxes = [
+            _box(mask, self._body, camera, frame)
+            for mask, camera in zip(masks, self._cameras, strict=True)
+        ]
         if self._film is not None and filmed is not None:
             if self._fineness is None:
                 each = int((1.0 - SPARE) * MAX_FILM / self._wanted)
-                small = (step for step in FINENESS if sum(map(len, _photographs(filmed, boxes[0], step))) <= each)
+                small = (
+                    step
+                    for step in FINENESS
+                    if sum(map(len, _photographs(filmed, boxes[0], step))) <= each
+                )
                 self._fineness = next(small, FINENESS[-1])
             fineness = self._fineness
             self._film.add(boxes[0], lambda: _photographs(filmed, boxes[0], fineness))
@@ -101,7 +123,8 @@ def _box(mask: Mask, body: Body, camera: Camera, frame: Frame) -> Box:
     inside = np.clip(np.concatenate(points), 0, size)
     if not len(inside):
         return (0, 0, camera.width, camera.height)
-    low, high = inside.min(axis=0), inside.max(axis=0)
+    low = inside.min(axis=0)
+    high = inside.max(axis=0)
     space = MARGIN * (high - low).max() + 1.0
     left, top = np.floor(np.clip(low - space, 0, size - 1)).astype(int).tolist()
     right, bottom = np.ceil(np.clip(high + space, 1, size)).astype(int).tolist()
@@ -116,7 +139,9 @@ def _cut(image: Image, box: Box) -> Image:
 def _photographs(image: Image, box: Box, fineness: Fineness) -> list[str]:
     return [
         _encoded(".jpg", _small(picture, height), [cv2.IMWRITE_JPEG_QUALITY, quality])
-        for picture, (height, quality) in zip((_cut(image, box), image), fineness, strict=True)
+        for picture, (height, quality) in zip(
+            (_cut(image, box), image), fineness, strict=True
+        )
     ]
 
 

@@ -33,4 +33,10 @@ DARK = {f"c{k}": colour for k, colour in enumerate(_DARK)}
 def document(data: dict[str, Any]) -> str:
     """Return the page that shows the data of a report."""
     style = colour_style(LIGHT, DARK) + part(__package__, "report.css")
-    return assembled(MARK, part(__package__, "report.html"), style, data, one_script(__package__, SCRIPTS))
+    return assembled(
+        MARK,
+        part(__package__, "report.html"),
+        style,
+        data,
+        one_script(__package__, SCRIPTS),
+    )

@@ -13,9 +13,13 @@ DEVICES = ("cpu", "cuda")
 def check_device(device: str) -> None:
     """Raise InputError for an unknown device, and for one that is not available."""
     if device not in DEVICES:
-        raise InputError(f"device must be one of {', '.join(DEVICES)}, got {quoted(device)}")
+        raise InputError(
+            f"device must be one of {', '.join(DEVICES)}, got {quoted(device)}"
+        )
     if device == "cuda" and (missing := _missing()):
-        raise InputError(f"device cuda needs an NVIDIA GPU and posefit[gpu], got {missing}")
+        raise InputError(
+            f"device cuda needs an NVIDIA GPU and posefit[gpu], got {missing}"
+        )
 
 
 def _missing() -> str | None:
@@ -39,6 +43,7 @@ def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
     check_device(device)
     if device == silhouette.device:
         return silhouette
-    moved = copy(silhouette)  # its borders, too, which a smaller picture has from a larger one
+    # its borders, too, which a smaller picture has from a larger one
+    moved = copy(silhouette)
     object.__setattr__(moved, "device", device)
     return moved

@@ -20,10 +20,14 @@ from posefit.silhouette.spans import STRIP_PIXELS as STRIP
 
 THREADS = 64  # of a block
 WORDS = 4  # of a row that a thread fills at a time
-_ANGLES, _BONES, _JOINTS = ANGLES, len(BONES), len(JOINTS)
+_ANGLES = ANGLES
+_BONES = len(BONES)
+_JOINTS = len(JOINTS)
 U, V, METRE = range(3)  # rows of `ends`, a column a joint
-X0, Y0, S0, X1, Y1, S1, XP, MP, PA, PB, XQ, MQ, QA, QB, LINES = range(15)  # rows of `lines`, a column a bone
-ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)  # rows of `bounds`: those drawn, strips, and the cone's own first row
+# rows of `lines`, a column a bone
+X0, Y0, S0, X1, Y1, S1, XP, MP, PA, PB, XQ, MQ, QA, QB, LINES = range(15)
+# rows of `bounds`: those drawn, strips, and the cone's own first row
+ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)
 
 
 def on_device(function):
@@ -31,7 +35,8 @@ def on_device(function):
     return cuda.jit(device=True)(getattr(function, "py_func", function))
 
 
-sine_cosine_near_zero, rotated = on_device(kernels.sine_cosine_near_zero), on_device(kernels.rotated)
+sine_cosine_near_zero = on_device(kernels.sine_cosine_near_zero)
+rotated = on_device(kernels.rotated)
 
 
 def fused(factor, by, addend):
@@ -63,8 +68,13 @@ def spanned(first, stop):
 @overload(spanned)
 def _spanned_compiled(first, stop):  # noqa: ARG001
     def compiled(first, stop):
-        a, b = np.uint64(min(max(first, 0), 32)), np.uint64(min(max(stop, 0), 32))
-        return np.uint32((np.uint64(1) << b) - (np.uint64(1) << a)) if b > a else np.uint32(0)
+        a = np.uint64(min(max(first, 0), 32))
+        b = np.uint64(min(max(stop, 0), 32))
+        return (
+            np.uint32((np.uint64(1) << b) - (np.uint64(1) << a))
+            if b > a
+            else np.uint32(0)
+        )
 
     return compiled
 
@@ -101,8 +111,12 @@ def write_sine(i, angle, sines, cosines):
 @cuda.jit(device=True)
 def place_root(i, place, sines, cosines, frames):
     """Write world coordinate i of the root's three axes and of its place."""
-    sy, sp, sr = sines[0], sines[1], sines[2]
-    cy, cp, cr = cosines[0], cosines[1], cosines[2]
+    sy = sines[0]
+    sp = sines[1]
+    sr = sines[2]
+    cy = cosines[0]
+    cp = cosines[1]
+    cr = cosines[2]
     if i == 0:
         frames[0, 0, i] = cy * cr + sy * sp * sr
         frames[0, 1, i] = sy * sp * cr - cy * sr
@@ -123,8 +137,11 @@ def place_bones(i, chain, sines, cosines, frames):
     """Write world coordinate i of all frames (27, 4, 3) beyond the root's: no axis asks for another one."""
     starts, angles, turns, offsets = chain
     for b in range(starts.size):
-        p, a = starts[b], angles[b]
-        x, y, z = frames[p, 0, i], frames[p, 1, i], frames[p, 2, i]
+        p = starts[b]
+        a = angles[b]
+        x = frames[p, 0, i]
+        y = frames[p, 1, i]
+        z = frames[p, 2, i]
         u = x * turns[b, 0, 0] + y * turns[b, 1, 0] + z * turns[b, 2, 0]
         v = x * turns[b, 0, 1] + y * turns[b, 1, 1] + z * turns[b, 2, 1]
         w = x * turns[b, 0, 2] + y * turns[b, 1, 2] + z * turns[b, 2, 2]
@@ -133,13 +150,17 @@ def place_bones(i, chain, sines, cosines, frames):
             w, u = rotated(w, u, sines[a + 1], cosines[a + 1])
             v, w = rotated(v, w, sines[a], cosines[a])
         frames[b + 1, 0, i], frames[b + 1, 1, i], frames[b + 1, 2, i] = u, v, w
-        frames[b + 1, 3, i] = frames[p, 3, i] + u * offsets[b, 0] + v * offsets[b, 1] + w * offsets[b, 2]
+        frames[b + 1, 3, i] = (
+            frames[p, 3, i] + u * offsets[b, 0] + v * offsets[b, 1] + w * offsets[b, 2]
+        )
 
 
 @cuda.jit(device=True)
 def project_joint(j, frames, view, ends):
     """Write the projection of joint j, in pixels, and the pixels of a metre there: 0 where it is not to be drawn."""
-    a, b, c = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
+    a = frames[j, 3, 0]
+    b = frames[j, 3, 1]
+    c = frames[j, 3, 2]
     x = view[0] * a + view[1] * b + view[2] * c + view[9]
     y = view[3] * a + view[4] * b + view[5] * c + view[10]
     z = view[6] * a + view[7] * b + view[8] * c + view[11]
@@ -173,13 +194,21 @@ def write_cone(k, start, radii, ends, size, lines, bounds):
     """Write the bounds of cone k, and the discs and tangent segments that border it; no rows where it is invisible."""
     strips, width, height = size
     bounds[ROW, k] = bounds[STOP, k] = 0
-    u0, v0, r0 = ends[U, start], ends[V, start], ends[METRE, start] * radii[k, 0]
-    u1, v1, r1 = ends[U, k + 1], ends[V, k + 1], ends[METRE, k + 1] * radii[k, 1]
+    u0 = ends[U, start]
+    v0 = ends[V, start]
+    r0 = ends[METRE, start] * radii[k, 0]
+    u1 = ends[U, k + 1]
+    v1 = ends[V, k + 1]
+    r1 = ends[METRE, k + 1] * radii[k, 1]
     top = min(max(ceiled(min(v0 - r0, v1 - r1)), 0.0), float(height))
     bottom = max(min(floored(max(v0 + r0, v1 + r1)) + 1.0, float(height)), 0.0)
     left = min(max(ceiled(min(u0 - r0, u1 - r1)), 0.0), float(width))
     right = max(min(floored(max(u0 + r0, u1 + r1)) + 1.0, float(width)), 0.0)
-    if not (top < bottom and left < right and min(ends[METRE, start], ends[METRE, k + 1]) > 0.0):
+    if not (
+        top < bottom
+        and left < right
+        and min(ends[METRE, start], ends[METRE, k + 1]) > 0.0
+    ):
         return
     bounds[ROW, k] = int(top) // BLOCK * BLOCK
     bounds[STOP, k] = min((int(bottom) + BLOCK - 1) // BLOCK * BLOCK, height)
@@ -212,23 +241,27 @@ def crossing(k, y, lines):
 
     All are float32, as on a CPU.
     """
-    low, high = HUGE, -HUGE
+    low = HUGE
+    high = -HUGE
     if lines[PA, k] <= y <= lines[PB, k]:
         x = fused(lines[MP, k], y, lines[XP, k])
         low = high = x
     if lines[QA, k] <= y <= lines[QB, k]:
         x = fused(lines[MQ, k], y, lines[XQ, k])
-        low, high = min(low, x), max(high, x)
+        low = min(low, x)
+        high = max(high, x)
     away = y - lines[Y0, k]
     square = fused(-away, away, lines[S0, k])
     if square >= ZERO:
         half = single_root(square)
-        low, high = min(low, lines[X0, k] - half), max(high, lines[X0, k] + half)
+        low = min(low, lines[X0, k] - half)
+        high = max(high, lines[X0, k] + half)
     away = y - lines[Y1, k]
     square = fused(-away, away, lines[S1, k])
     if square >= ZERO:
         half = single_root(square)
-        low, high = min(low, lines[X1, k] - half), max(high, lines[X1, k] + half)
+        low = min(low, lines[X1, k] - half)
+        high = max(high, lines[X1, k] + half)
     return low, high
 
 
@@ -255,14 +288,24 @@ def fill(row, strip, strips, lines, bounds, words):
     for k in range(WORDS):
         words[k] = np.uint32(0)
     for b in range(_BONES):
-        first, last = bounds[FIRST, b], bounds[LAST, b]
-        if bounds[ROW, b] <= row < bounds[STOP, b] and first < strip + WORDS and strip <= last:
+        first = bounds[FIRST, b]
+        last = bounds[LAST, b]
+        if (
+            bounds[ROW, b] <= row < bounds[STOP, b]
+            and first < strip + WORDS
+            and strip <= last
+        ):
             low, high = crossing(b, np.float32(row - bounds[TOP, b]), lines)
             for k in range(WORDS):
                 start = first + ((strip + k - first) & ~1)
-                words[k] |= word_of(low, high, strip + k, first, last, min(start, strips - 2))
-                if start == strips - 3 and last == strips - 1:  # the last window of two overlaps the one before it
-                    words[k] |= word_of(low, high, strip + k, max(first, strips - 2), last, strips - 2)
+                words[k] |= word_of(
+                    low, high, strip + k, first, last, min(start, strips - 2)
+                )
+                # the last window of two overlaps the one before it
+                if start == strips - 3 and last == strips - 1:
+                    words[k] |= word_of(
+                        low, high, strip + k, max(first, strips - 2), last, strips - 2
+                    )
 
 
 @cuda.jit(device=True)
@@ -278,11 +321,14 @@ def bound(b, bounds, box):
 @cuda.jit(device=True)
 def add_counts(row, strip, strips, words, observed, valid, counts):
     """Add how many pixels of some words of a row are known, and how many are the person's."""
-    body, overlap = np.int32(0), np.int32(0)
+    body = np.int32(0)
+    overlap = np.int32(0)
     for k in range(WORDS):
         if words[k] != np.uint32(0) and strip + k < strips:
             body += np.int32(cuda.popc(np.uint32(words[k] & valid[strip + k, row])))
-            overlap += np.int32(cuda.popc(np.uint32(words[k] & observed[strip + k, row])))
+            overlap += np.int32(
+                cuda.popc(np.uint32(words[k] & observed[strip + k, row]))
+            )
     if body > 0:
         cuda.atomic.add(counts, 0, body)
         cuda.atomic.add(counts, 1, overlap)
@@ -306,7 +352,9 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
     box = cuda.shared.array(4, int32)
     counts = cuda.shared.array(2, int32)
     words = cuda.local.array(WORDS, uint32)
-    i, thread, threads = cuda.blockIdx.x, cuda.threadIdx.x, cuda.blockDim.x
+    i = cuda.blockIdx.x
+    thread = cuda.threadIdx.x
+    threads = cuda.blockDim.x
     strips = person.shape[0]
 
     for a in range(thread, _ANGLES, threads):
@@ -326,14 +374,17 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
         write_cone(b, starts[b], radii, ends, (strips, width, height), lines, bounds)
         bound(b, bounds, box)
     cuda.syncthreads()
-    rows, across = max(box[1] - box[0], 0), (box[3] - box[2]) // WORDS + 1
+    rows = max(box[1] - box[0], 0)
+    across = (box[3] - box[2]) // WORDS + 1
     for item in range(thread, rows * across, threads):
-        row, strip = box[0] + item % rows, box[2] + item // rows * WORDS
+        row = box[0] + item % rows
+        strip = box[2] + item // rows * WORDS
         fill(row, strip, strips, lines, bounds, words)
         add_counts(row, strip, strips, words, person, valid, counts)
     cuda.syncthreads()
     if thread == 0:
-        body, overlap = counts[0], counts[1]
+        body = counts[0]
+        overlap = counts[1]
         areas[i, 0] = pixels[0] - overlap
         areas[i, 1] = body - overlap
         areas[i, 2] = overlap

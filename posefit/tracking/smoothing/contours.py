@@ -13,8 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.contours import MAX_ANGLE_STEP, ROBUST_SCALES, MaskContours, contour_squares
-from posefit.fitting.shape import MODEL_SPREAD, NAMES, PRECISION, REACH, SPREAD, Shape, shaped
+from posefit.fitting.contours import (
+    MAX_ANGLE_STEP,
+    ROBUST_SCALES,
+    MaskContours,
+    contour_squares,
+)
+from posefit.fitting.shape import (
+    MODEL_SPREAD,
+    NAMES,
+    PRECISION,
+    REACH,
+    SPREAD,
+    Shape,
+    shaped,
+)
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
@@ -23,25 +36,47 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import BONES
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
-from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
+from posefit.tracking.smoothing.path import (
+    Squares,
+    Visibility,
+    add_root,
+    add_standing,
+    standing_feet,
+    windows_over,
+)
 
 FACTOR_DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
-ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
+# that an angle may be off the estimate: standard deviation, as all that follow
+ANGLE_DEVIATION = np.radians(8.0)
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
-CONTOUR_ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
+# metres that the root may be off the estimate, across the line of sight
+CONTOUR_ROOT_DEVIATION = 0.03
 MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor, or of a camera's turn
-CAMERA_DEVIATION = np.radians(0.03)  # that a calibrated camera may be turned: standard deviation about each axis; ours
-BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
-CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
+# that a calibrated camera may be turned: standard deviation about each axis; ours
+CAMERA_DEVIATION = np.radians(0.03)
+# that weigh as much as what is known of people: errors of successive contours are
+# correlated
+BUILD_FRAMES = 2.0
+# frames that are solved for at once, and those that two windows share
+CONTOUR_WINDOW = 300
+CONTOUR_OVERLAP = 30
 
 
 def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Array]:
     """Return how joints (T, 17, 27, 3) and radii (17, 26, 2), metres, change with the logarithms of factors."""
-    bodies = [shaped(body, np.exp(FACTOR_DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
+    bodies = [
+        shaped(body, np.exp(FACTOR_DIFFERENCE * row), height)
+        for row in np.eye(len(NAMES))
+    ]
     here = motion.joints
-    joints = [grown.skeleton.joints(motion.poses, motion.translations) - here for grown in bodies]
+    joints = [
+        grown.skeleton.joints(motion.poses, motion.translations) - here
+        for grown in bodies
+    ]
     radii = [grown.radii - body.radii for grown in bodies]
-    return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(radii) / FACTOR_DIFFERENCE
+    return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(
+        radii
+    ) / FACTOR_DIFFERENCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +84,24 @@ class _Part:
     estimate: Motion  # before it is fitted
     fitted: Motion
     body: Body
-    factors: Array  # (17,) logarithms of what the body was fitted by before; (0,) where the build is known
+    # (17,) logarithms of what the body was fitted by before; (0,) where the build is
+    # known
+    factors: Array
     height: float | None
     visibility: Visibility
     spread: Array  # (17,) standard deviations of these logarithms
     cameras: Sequence[Camera]
-    turns: Array  # (V, 3) radians that each camera's world was turned by; (0, 3) where calibrations are held
+    # (V, 3) radians that each camera's world was turned by; (0, 3) where calibrations
+    # are held
+    turns: Array
 
 
 def fit_contours(
-    scene: Scene, motion: Motion, visibility: Visibility, shape: Shape | None, beta: float = BETA
+    scene: Scene,
+    motion: Motion,
+    visibility: Visibility,
+    shape: Shape | None,
+    beta: float = BETA,
 ) -> tuple[Scene, Motion, Shape | None]:
     """Return a steady motion fitted to the borders of a scene's masks, with the scene's cameras and the build.
 
@@ -72,16 +115,29 @@ def fit_contours(
     fitted: dict[int, _Part] = {}
     if shape is not None or scene.cameras_turn:
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
-        part = fitted[best] = _fitted(scene, motion, visibility, parts[best][0], shape, beta, turned=True)
-        if shape is not None and part.body is not scene.body:  # else no build fits better, and only poses are fitted
+        part = fitted[best] = _fitted(
+            scene, motion, visibility, parts[best][0], shape, beta, turned=True
+        )
+        # else no build fits better, and only poses are fitted
+        if shape is not None and part.body is not scene.body:
             spread = np.minimum(np.hypot(part.spread, MODEL_SPREAD), SPREAD)
-            shape = replace(shape, body=part.body, factors=np.exp(part.factors), spread=spread)
+            shape = replace(
+                shape, body=part.body, factors=np.exp(part.factors), spread=spread
+            )
         scene = replace(scene, body=part.body, cameras=part.cameras)
-    poses, places = motion.poses.copy(), motion.translations.copy()
+    poses = motion.poses.copy()
+    places = motion.translations.copy()
     for k, (rows, inner) in enumerate(parts):
         part = fitted.get(k) or _fitted(scene, motion, visibility, rows, None, beta)
-        poses[rows[inner]], places[rows[inner]] = part.fitted.poses[inner], part.fitted.translations[inner]
-    return scene, replace(motion, skeleton=scene.body.skeleton, poses=poses, translations=places), shape
+        poses[rows[inner]], places[rows[inner]] = (
+            part.fitted.poses[inner],
+            part.fitted.translations[inner],
+        )
+    return (
+        scene,
+        replace(motion, skeleton=scene.body.skeleton, poses=poses, translations=places),
+        shape,
+    )
 
 
 def _fitted(
@@ -94,20 +150,43 @@ def _fitted(
     turned: bool = False,
 ) -> _Part:
     """Return some frames of a motion as the best step fits them, with the build where there is a shape to fit."""
-    body, cameras = scene.body, scene.cameras
-    estimate = replace(motion, skeleton=body.skeleton, poses=motion.poses[rows], translations=motion.translations[rows])
+    body = scene.body
+    cameras = scene.cameras
+    estimate = replace(
+        motion,
+        skeleton=body.skeleton,
+        poses=motion.poses[rows],
+        translations=motion.translations[rows],
+    )
     observations = [scene.observations[k] for k in rows.tolist()]
     places = estimate.translations
-    borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(cameras)]
-    factors, height = (np.empty(0), None) if shape is None else (np.log(shape.factors), shape.height)
+    borders = [
+        MaskContours.of(camera, view, observations, places)
+        for view, camera in enumerate(cameras)
+    ]
+    factors, height = (
+        (np.empty(0), None) if shape is None else (np.log(shape.factors), shape.height)
+    )
     turns = np.zeros((len(cameras) if turned and scene.cameras_turn else 0, 3))
     spread = np.zeros(len(factors))
-    part = _Part(estimate, estimate, body, factors, height, visibility.at(rows), spread, cameras, turns)
-    best, least = part, _mean_cost(part, observations, beta)
+    part = _Part(
+        estimate,
+        estimate,
+        body,
+        factors,
+        height,
+        visibility.at(rows),
+        spread,
+        cameras,
+        turns,
+    )
+    best = part
+    least = _mean_cost(part, observations, beta)
     for scale in ROBUST_SCALES:
         part = _stepped(part, borders, scale)
         if (cost := _mean_cost(part, observations, beta)) < least:
-            best, least = part, cost
+            best = part
+            least = cost
     return best
 
 
@@ -115,40 +194,66 @@ def _mean_cost(part: _Part, observations: Sequence[Observation], beta: float) ->
     """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
     costs = []
     for k in np.flatnonzero(part.visibility.usable).tolist():
-        pose, place = part.fitted.poses[k : k + 1], part.fitted.translations[k : k + 1]
-        costs.append(pose_costs(part.body, part.cameras, observations[k].silhouettes, pose, place, beta)[0][0])
+        pose = part.fitted.poses[k : k + 1]
+        place = part.fitted.translations[k : k + 1]
+        costs.append(
+            pose_costs(
+                part.body, part.cameras, observations[k].silhouettes, pose, place, beta
+            )[0][0]
+        )
     return float(np.mean(costs)) if costs else np.inf
 
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
     """Return a window after a Gauss-Newton step to the borders of all views."""
-    fitted, count = part.fitted, len(part.factors)
+    fitted = part.fitted
+    count = len(part.factors)
     angles = np.flatnonzero(fitted.skeleton.free).tolist()
-    poses, places = fitted.poses.copy(), fitted.translations
-    turned = [border.seen_by(camera) for border, camera in zip(borders, part.cameras, strict=True)]
+    poses = fitted.poses.copy()
+    places = fitted.translations
+    turned = [
+        border.seen_by(camera)
+        for border, camera in zip(borders, part.cameras, strict=True)
+    ]
     hessians, gradients, mixed, hessian, gradient = contour_squares(
         part.body, turned, poses, places, scale, _changes(part)
     )
     squares = _frame_squares(part, hessians, gradients, angles)
-    solved = squares.steps_for(np.concatenate([squares.gradients[..., None], mixed], axis=2))
-    steps, by_factor = solved[..., 0], solved[..., 1:]
+    solved = squares.steps_for(
+        np.concatenate([squares.gradients[..., None], mixed], axis=2)
+    )
+    steps = solved[..., 0]
+    by_factor = solved[..., 1:]
     held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
-    values, known = np.append(part.factors, part.turns), np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
+    values = np.append(part.factors, part.turns)
+    known = np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
     known[:count, :count] = PRECISION[:count, :count]
     hessian = hessian + held * known - np.einsum("tni,tnj->ij", mixed, by_factor)
     gradient = gradient + held * known @ values - np.einsum("tni,tn->i", mixed, steps)
-    changes = np.clip(np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
+    changes = np.clip(
+        np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP
+    )
     reach = REACH * SPREAD[:count]
-    changes[:count] = part.factors - np.clip(part.factors - changes[:count], -reach, reach)
+    changes[:count] = part.factors - np.clip(
+        part.factors - changes[:count], -reach, reach
+    )
     steps = steps - by_factor @ changes
     poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    body = shaped(part.body, np.exp(-changes[:count]), part.height) if count else part.body
-    turns, cameras = changes[count:].reshape(-1, 3), part.cameras
+    body = (
+        shaped(part.body, np.exp(-changes[:count]), part.height) if count else part.body
+    )
+    turns = changes[count:].reshape(-1, 3)
+    cameras = part.cameras
     if len(turns):
         cameras = [turned_camera(*each) for each in zip(cameras, -turns, strict=True)]
     return replace(
         part,
-        fitted=replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3]),
+        fitted=replace(
+            fitted,
+            skeleton=body.skeleton,
+            poses=poses,
+            translations=places - steps[:, :3],
+        ),
         body=body,
         factors=part.factors - changes[:count],
         spread=np.sqrt(held * np.diag(np.linalg.inv(hessian)))[:count],
@@ -157,26 +262,47 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     )
 
 
-def _frame_squares(part: _Part, hessians: Array, gradients: Array, angles: Sequence[int]) -> Squares:
+def _frame_squares(
+    part: _Part, hessians: Array, gradients: Array, angles: Sequence[int]
+) -> Squares:
     """Return those of the borders, and of what is known of each frame's root, of its angles and of standing feet."""
-    fitted, estimate, visibility = part.fitted, part.estimate, part.visibility
-    squares, of_angles = Squares(len(fitted), 3 + len(angles)), slice(3, 3 + len(angles))
+    fitted = part.fitted
+    estimate = part.estimate
+    visibility = part.visibility
+    squares = Squares(len(fitted), 3 + len(angles))
+    of_angles = slice(3, 3 + len(angles))
     squares.add(slice(None), hessians, gradients)
-    add_root(squares, estimate, visibility, CONTOUR_ROOT_DEVIATION, fitted.translations - estimate.translations)
+    add_root(
+        squares,
+        estimate,
+        visibility,
+        CONTOUR_ROOT_DEVIATION,
+        fitted.translations - estimate.translations,
+    )
     change = wrapped(fitted.poses - estimate.poses)[:, angles]
-    squares.add(of_angles, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
+    squares.add(
+        of_angles, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2
+    )
     squares.add_bends(of_angles, change, fitted.fps**2 / ANGLE_ACCELERATION)
-    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, visibility.viewpoints), angles)
+    add_standing(
+        squares,
+        fitted,
+        standing_feet(fitted.joints, fitted.fps, visibility.viewpoints),
+        angles,
+    )
     return squares
 
 
 def _changes(part: _Part) -> list[tuple[Array, Array]]:
     """Return how joints and radii change in each view with the factors of the build and the turns of the cameras."""
-    joints, turns = part.fitted.joints, part.turns.size
-    wider, larger = np.empty((len(joints), 0, *joints.shape[1:])), np.empty((0, len(BONES), 2))
+    joints = part.fitted.joints
+    turns = part.turns.size
+    wider = np.empty((len(joints), 0, *joints.shape[1:]))
+    larger = np.empty((0, len(BONES), 2))
     if len(part.factors):
         wider, larger = growth(part.body, part.height, part.fitted)
-    larger, changes = np.concatenate([larger, np.zeros((turns, len(BONES), 2))]), []
+    larger = np.concatenate([larger, np.zeros((turns, len(BONES), 2))])
+    changes = []
     for view, camera in enumerate(part.cameras):
         turned = np.zeros((len(joints), turns, *joints.shape[1:]))
         if turns:  # in this view the world turns about its optical centre

@@ -26,83 +26,140 @@ from posefit.uncertainty.calibration import SECOND_SIDE
 
 ROUNDS = 3  # at most: what is exchanged in one shows the next what else is doubtful
 TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
-PASSING = 0.16  # metres, rms: exchanged legs that are so near to those of the frame before may be theirs
-JUMPING, HIGH_COST = 0.33, 1.3  # the same, where a smoothed frame costs so many times the median, the most around
+# metres, rms: exchanged legs that are so near to those of the frame before may be
+# theirs
+PASSING = 0.16
+# the same, where a smoothed frame costs so many times the median, the most around
+JUMPING = 0.33
+HIGH_COST = 1.3
 AROUND_SECONDS = 0.08  # in which one frame stands for all
-ODDS_COST = 0.5  # of landmarks: of the logarithm of the odds that legs are as they are, as errors last for frames
-LEG_JOINTS = [JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]]
+# of landmarks: of the logarithm of the odds that legs are as they are, as errors last
+# for frames
+ODDS_COST = 0.5
+LEG_JOINTS = [
+    JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]
+]
 
 
-def with_cheapest_legs(tracked: Sequence[Frame], smoothed: Smoothed, beta: float) -> tuple[Smoothed, NDArray[np.bool_]]:
+def with_cheapest_legs(
+    tracked: Sequence[Frame], smoothed: Smoothed, beta: float
+) -> tuple[Smoothed, NDArray[np.bool_]]:
     """Return tracked frames smoothed with their legs exchanged where that is cheaper, and in which (T,) they are.
 
     Where a fifth are, it stays open which of two sequences is right, this one or that with left and right exchanged:
     posteriors have both.
     """
-    scene, shape = smoothed.scene, smoothed.shape
+    scene = smoothed.scene
+    shape = smoothed.shape
     usable = np.array([observation.usable for observation in scene.observations])
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
         exchanged = legs_exchanged(smoothed.scene, tracked, usable, beta)
         pairs = zip(tracked, exchanged, strict=True)
-        frames = [_exchanged(smoothed.scene, frame) if other else frame for frame, other in pairs]
+        frames = [
+            _exchanged(smoothed.scene, frame) if other else frame
+            for frame, other in pairs
+        ]
         again = smooth(scene, frames, shape, beta) if exchanged.any() else smoothed
         if mean_cost(again.frames, usable) >= mean_cost(smoothed.frames, usable):
             break
-        tracked, smoothed, changed = frames, again, changed ^ exchanged
+        tracked = frames
+        smoothed = again
+        changed = changed ^ exchanged
     share = min(float(changed.mean()), 0.5)
-    return smoothed._replace(frames=[_with_both(scene, frame, share) for frame in smoothed.frames]), changed
+    return smoothed._replace(
+        frames=[_with_both(scene, frame, share) for frame in smoothed.frames]
+    ), changed
 
 
-def legs_exchanged(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float) -> NDArray[np.bool_]:
+def legs_exchanged(
+    scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float
+) -> NDArray[np.bool_]:
     """Return in which frames (T,) legs should be exchanged, as that is cheaper. `usable` frames (T,) show enough."""
     pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
     here, there = (scene.motion(each) for each in pairs)
     costs = _smoothed_costs(scene, here, beta)
     added = _smoothed_costs(scene, there, beta) - costs
     edges = doubtful(here, there, costs, usable)
-    exchanged, reach, switches = np.zeros(len(frames), dtype=np.int64), max(round(TRIAL_SECONDS * scene.fps), 2), []
+    exchanged = np.zeros(len(frames), dtype=np.int64)
+    reach = max(round(TRIAL_SECONDS * scene.fps), 2)
+    switches = []
     for edge in edges:  # in the order of time: two that are near each other may be one
-        rows, later = range(max(edge - reach, 0), min(edge + reach, len(frames))), np.arange(len(frames)) >= edge
+        rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
+        later = np.arange(len(frames)) >= edge
         window = replace(scene, observations=[scene.observations[k] for k in rows])
-        trials = [[pairs[which[k]][k] for k in rows] for which in (exchanged, exchanged ^ later)]
-        same, other = (_smoothed_costs(window, window.motion(trial), beta).sum() for trial in trials)
-        switch = other - same - np.where(exchanged, -added, added)[edge : rows.stop].sum()
+        trials = [
+            [pairs[which[k]][k] for k in rows]
+            for which in (exchanged, exchanged ^ later)
+        ]
+        same, other = (
+            _smoothed_costs(window, window.motion(trial), beta).sum()
+            for trial in trials
+        )
+        switch = (
+            other - same - np.where(exchanged, -added, added)[edge : rows.stop].sum()
+        )
         switches.append(abs(switch))
         exchanged ^= later & (switch < 0.0)
-    starts, stops = [0, *edges], [*edges, len(frames)]
-    stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + _odds(scene, here)), starts)
+    starts = [0, *edges]
+    stops = [*edges, len(frames)]
+    stretches = np.add.reduceat(
+        np.where(exchanged, -1.0, 1.0) * (added + _odds(scene, here)), starts
+    )
     steps = np.reshape(switches, (-1, 1, 1)) * (1.0 - np.eye(2))
-    others = cheapest_sequence(np.column_stack([np.zeros(len(starts)), stretches]), steps)
+    others = cheapest_sequence(
+        np.column_stack([np.zeros(len(starts)), stretches]), steps
+    )
     others = np.repeat(others, np.subtract(stops, starts))
     return np.asarray(exchanged != others)
 
 
-def doubtful(here: Motion, there: Motion, costs: Array, usable: NDArray[np.bool_]) -> list[int]:
+def doubtful(
+    here: Motion, there: Motion, costs: Array, usable: NDArray[np.bool_]
+) -> list[int]:
     """Return the frames from which legs may have to be exchanged: those of `there` are near to those of the one before.
 
     They need not be as near where the smoothed frame costs more than others. Frames that are not `usable` are left out.
     """
-    legs, exchanged = (root_centred(motion.skeleton.joints(motion.poses))[:, LEG_JOINTS] for motion in (here, there))
-    off = np.append(np.inf, np.sqrt(((exchanged[1:] - legs[:-1]) ** 2).sum(axis=2).mean(axis=1)))
+    legs, exchanged = (
+        root_centred(motion.skeleton.joints(motion.poses))[:, LEG_JOINTS]
+        for motion in (here, there)
+    )
+    off = np.append(
+        np.inf, np.sqrt(((exchanged[1:] - legs[:-1]) ** 2).sum(axis=2).mean(axis=1))
+    )
     around = max(round(AROUND_SECONDS * here.fps), 1)
 
     def least(values: Array) -> NDArray[np.bool_]:
         """Return where values (T,) are the least around."""
         padded = np.pad(values, around, constant_values=np.inf)
-        return np.asarray(values <= np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1).min(axis=1))
+        return np.asarray(
+            values
+            <= np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1).min(
+                axis=1
+            )
+        )
 
     passing = (off < PASSING) & least(off)
-    jumping = (off < JUMPING) & least(-costs) & (costs > HIGH_COST * np.median(costs[usable]))
+    jumping = (
+        (off < JUMPING) & least(-costs) & (costs > HIGH_COST * np.median(costs[usable]))
+    )
     return [int(frame) for frame in np.flatnonzero((passing | jumping) & usable)]
 
 
 def _exchanged(scene: Scene, frame: Frame) -> Frame:
     """Return a frame with exchanged legs; so are those of its posterior."""
-    skeleton, posterior = scene.body.skeleton, frame.posterior
+    skeleton = scene.body.skeleton
+    posterior = frame.posterior
     if posterior is not None:
-        posterior = replace(posterior, poses=exchanged_limbs(skeleton, posterior.poses, "legs"))
-    return replace(frame, pose=exchanged_limbs(skeleton, frame.pose[None], "legs")[0], posterior=posterior)
+        posterior = replace(
+            posterior, poses=exchanged_limbs(skeleton, posterior.poses, "legs")
+        )
+    return replace(
+        frame,
+        pose=exchanged_limbs(skeleton, frame.pose[None], "legs")[0],
+        posterior=posterior,
+    )
 
 
 def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
@@ -110,11 +167,23 @@ def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
     posterior = frame.posterior
     if posterior is None or share < SECOND_SIDE:
         return frame
-    poses = np.concatenate([posterior.poses, mirrored_poses(scene.body.skeleton, posterior.poses)])
-    weights = np.concatenate([(1.0 - share) * posterior.weights, share * posterior.weights])
+    poses = np.concatenate(
+        [posterior.poses, mirrored_poses(scene.body.skeleton, posterior.poses)]
+    )
+    weights = np.concatenate(
+        [(1.0 - share) * posterior.weights, share * posterior.weights]
+    )
     places = np.tile(posterior.translations, (2, 1))
-    model = posterior.recalibration and replace(posterior.recalibration, second_side=0.0)
-    both = replace(posterior, poses=poses, translations=places, weights=weights, recalibration=model)
+    model = posterior.recalibration and replace(
+        posterior.recalibration, second_side=0.0
+    )
+    both = replace(
+        posterior,
+        poses=poses,
+        translations=places,
+        weights=weights,
+        recalibration=model,
+    )
     return replace(frame, posterior=both)
 
 
@@ -122,14 +191,30 @@ def _smoothed_costs(scene: Scene, motion: Motion, beta: float) -> Array:
     """Return the costs (T,) of a motion's frames once it is smoothed; 0 for those that show too little."""
     scene, motion, _ = smoothed_motion(scene, motion, None, beta)
     return np.array(
-        [_cost(scene, *each, beta) for each in zip(scene.observations, motion.poses, motion.translations, strict=True)]
+        [
+            _cost(scene, *each, beta)
+            for each in zip(
+                scene.observations, motion.poses, motion.translations, strict=True
+            )
+        ]
     )
 
 
-def _cost(scene: Scene, observation: Observation, pose: Array, place: Array, beta: float) -> float:
+def _cost(
+    scene: Scene, observation: Observation, pose: Array, place: Array, beta: float
+) -> float:
     if not observation.usable:
         return 0.0
-    return float(pose_costs(scene.body, scene.cameras, observation.silhouettes, pose[None], place[None], beta)[0][0])
+    return float(
+        pose_costs(
+            scene.body,
+            scene.cameras,
+            observation.silhouettes,
+            pose[None],
+            place[None],
+            beta,
+        )[0][0]
+    )
 
 
 def _odds(scene: Scene, motion: Motion) -> Array:
@@ -138,6 +223,8 @@ def _odds(scene: Scene, motion: Motion) -> Array:
     for k, observation in enumerate(scene.observations):
         if observation.landmarks is not None:
             marks = motion.skeleton, scene.cameras, observation.landmarks
-            likelihoods = landmark_likelihoods(*marks, motion.poses[k : k + 1], motion.translations[k : k + 1])
+            likelihoods = landmark_likelihoods(
+                *marks, motion.poses[k : k + 1], motion.translations[k : k + 1]
+            )
             costs[k] = ODDS_COST * side_odds(likelihoods[0])[LEGS]
     return costs

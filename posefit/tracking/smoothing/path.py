@@ -38,25 +38,37 @@ class Squares:
     def add_bends(self, which: slice, series: Array, weight: float) -> None:
         """Add the squares of `weight` times the second differences of some numbers, which are now `series` (T, m)."""
         bends = weight**2 * np.diff(series, 2, axis=0)
-        count, diagonal = len(series), np.arange(which.start, which.stop)
+        count = len(series)
+        diagonal = np.arange(which.start, which.stop)
         for first in range(3):
             frames = slice(first, count - 2 + first)
             self.gradients[frames, which] += SECOND_DIFFERENCE[first] * bends
             for second in range(first, 3):
-                square = weight**2 * SECOND_DIFFERENCE[first] * SECOND_DIFFERENCE[second]
+                square = (
+                    weight**2 * SECOND_DIFFERENCE[first] * SECOND_DIFFERENCE[second]
+                )
                 self.hessians[second - first, frames, diagonal, diagonal] += square
 
-    def add_steps(self, frames: NDArray[np.int64], series: Array, derivatives: Array, weight: float) -> None:
+    def add_steps(
+        self,
+        frames: NDArray[np.int64],
+        series: Array,
+        derivatives: Array,
+        weight: float,
+    ) -> None:
         """Add the squares of `weight` times the changes of `series` (T, m) from some frames to the next ones.
 
         `derivatives` (T, m, n) are those of the series by the numbers of the same frame.
         """
         steps = weight**2 * (series[frames + 1] - series[frames])
-        here, there = derivatives[frames], derivatives[frames + 1]
+        here = derivatives[frames]
+        there = derivatives[frames + 1]
         self.gradients[frames] -= np.einsum("kmn,km->kn", here, steps)
         self.gradients[frames + 1] += np.einsum("kmn,km->kn", there, steps)
         self.hessians[0, frames] += weight**2 * np.einsum("kmi,kmj->kij", here, here)
-        self.hessians[0, frames + 1] += weight**2 * np.einsum("kmi,kmj->kij", there, there)
+        self.hessians[0, frames + 1] += weight**2 * np.einsum(
+            "kmi,kmj->kij", there, there
+        )
         self.hessians[1, frames] -= weight**2 * np.einsum("kmi,kmj->kij", here, there)
 
     def least(self) -> Array:
@@ -69,20 +81,26 @@ class Squares:
 
         _, count, numbers, _ = self.hessians.shape
         band = (BAND_REACH + 1) * numbers
-        lines = np.zeros((band, count * numbers))  # scipy's upper form: lines[band - 1 + row - column, column]
+        # scipy's upper form: lines[band - 1 + row - column, column]
+        lines = np.zeros((band, count * numbers))
         for apart in range(BAND_REACH + 1):
             for row in range(numbers):
                 for column in range(numbers):
                     off = apart * numbers + column - row
                     if off >= 0:
                         values = self.hessians[apart, : count - apart, row, column]
-                        lines[band - 1 - off, apart * numbers + column :: numbers] = values
-        steps = solveh_banded(lines, gradients.reshape(count * numbers, -1), check_finite=False)
+                        lines[band - 1 - off, apart * numbers + column :: numbers] = (
+                            values
+                        )
+        steps = solveh_banded(
+            lines, gradients.reshape(count * numbers, -1), check_finite=False
+        )
         return np.asarray(steps).reshape(gradients.shape)
 
 
 STANDING_SPEED = 0.25  # metres a second that a standing foot may seem to move
-STANDING_SPEED_SHARE = 0.45  # of the root's speed, which it may seem to move where that is more
+# of the root's speed, which it may seem to move where that is more
+STANDING_SPEED_SHARE = 0.45
 STANDING_HEIGHT = 0.07  # metres above the lowest place of either foot within a stride
 STRIDE_SECONDS = 1.2
 MIN_STANCE_SECONDS = 0.12
@@ -95,7 +113,8 @@ def standing_feet(joints: Array, fps: float, viewpoints: Array) -> NDArray[np.bo
     A foot that stands is low, and slow compared with the root, which a walk moves on. y is up. A single camera, at
     `viewpoints` (T, 3), shows how slow it is only across the line of sight; these are NaN where several show it.
     """
-    feet, sights = joints[:, BALLS], (joints[:, 0] - viewpoints)[:, [0, 2]]
+    feet = joints[:, BALLS]
+    sights = (joints[:, 0] - viewpoints)[:, [0, 2]]
     speed, root = (_speeds(places, sights, fps) for places in (feet, joints[:, :1]))
     slow = speed < np.maximum(STANDING_SPEED, STANDING_SPEED_SHARE * root)
     stands = slow & low(feet, fps, STRIDE_SECONDS, STANDING_HEIGHT)
@@ -111,8 +130,13 @@ def _speeds(places: Array, sights: Array, fps: float) -> Array:
     A line of NaN excludes nothing.
     """
     velocities = np.gradient(places[..., [0, 2]], 1.0 / fps, axis=0)
-    sights = np.nan_to_num(sights / np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), 1e-9))
-    velocities = velocities - np.einsum("tni,ti->tn", velocities, sights)[..., None] * sights[:, None]
+    sights = np.nan_to_num(
+        sights / np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), 1e-9)
+    )
+    velocities = (
+        velocities
+        - np.einsum("tni,ti->tn", velocities, sights)[..., None] * sights[:, None]
+    )
     return np.asarray(np.linalg.norm(velocities, axis=2))
 
 
@@ -125,20 +149,30 @@ def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     return longer
 
 
-PATH_ROOT_DEVIATION = 0.006  # metres that a root may be off from its estimate: standard deviation, as all that follow
+# metres that a root may be off from its estimate: standard deviation, as all that
+# follow
+PATH_ROOT_DEVIATION = 0.006
 DEPTH_DEVIATION = 0.004  # of the distance, towards or away from a single camera
 UNUSABLE_DEVIATION = 1.0  # metres, in frames that show too little
 ROOT_ACCELERATION = 3.0  # metres a second squared, of the root on each axis
 LEG_DEVIATION = np.radians(3.0)  # that an angle of a leg may be off the estimate
 LEG_ACCELERATION = np.radians(400.0)  # a second squared, of that difference
-STANDING_SLIDE = 0.004  # metres that a foot which stands may move in a thirtieth of a second
-OUTLIER_DEVIATIONS = 4.0  # standard deviations from the estimate beyond which a place is weighted down
+# metres that a foot which stands may move in a thirtieth of a second
+STANDING_SLIDE = 0.004
+# standard deviations from the estimate beyond which a place is weighted down
+OUTLIER_DEVIATIONS = 4.0
 GAUSS_NEWTON_STEPS = 4
 ANGLE_DIFFERENCE = 1e-4  # radians: of a difference quotient
-PATH_WINDOW, PATH_OVERLAP = 900, 60  # frames that are solved for at once, and those that two windows share
+# frames that are solved for at once, and those that two windows share
+PATH_WINDOW = 900
+PATH_OVERLAP = 60
 
 # places in a pose of the angles of both legs
-LEGS = tuple(angles_of([side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]).tolist())
+LEGS = tuple(
+    angles_of(
+        [side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]
+    ).tolist()
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +180,14 @@ class Visibility:
     """Which frames of a motion are usable, and by which camera."""
 
     usable: NDArray[np.bool_]  # (T,)
-    viewpoints: Array = field(repr=False)  # (T, 3) metres: of the only camera that shows it; NaN where several do
+    # (T, 3) metres: of the only camera that shows it; NaN where several do
+    viewpoints: Array = field(repr=False)
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
         """Return the visibility of the frames of a scene."""
-        usable, viewpoints = [], []
+        usable = []
+        viewpoints = []
         for observation in scene.observations:
             only = only_camera(scene.cameras, observation.silhouettes)
             usable.append(observation.usable)
@@ -170,21 +206,36 @@ def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
     """
     if len(motion) < 3:
         return motion
-    frames, known = np.arange(len(motion)), np.flatnonzero(visibility.usable)
+    frames = np.arange(len(motion))
+    known = np.flatnonzero(visibility.usable)
     if len(known):  # the root moves straight on where frames show too little
-        lines = [np.interp(frames, known, line) for line in motion.translations[known].T]
+        lines = [
+            np.interp(frames, known, line) for line in motion.translations[known].T
+        ]
         motion = replace(motion, translations=np.column_stack(lines))
-    poses, places = motion.poses.copy(), motion.translations.copy()
+    poses = motion.poses.copy()
+    places = motion.translations.copy()
     for rows, inner in windows_over(len(motion), PATH_WINDOW, PATH_OVERLAP):
-        part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
-        stands, visible = np.zeros((len(part), 2), dtype=bool), visibility.at(rows)
-        smooth = _solved(part, visible, stands)  # of the root alone, which shows which foot stands
-        smooth = _solved(part, visible, standing_feet(smooth.joints, smooth.fps, visible.viewpoints))
-        poses[rows[inner]], places[rows[inner]] = smooth.poses[inner], smooth.translations[inner]
+        part = replace(
+            motion, poses=motion.poses[rows], translations=motion.translations[rows]
+        )
+        stands = np.zeros((len(part), 2), dtype=bool)
+        visible = visibility.at(rows)
+        # of the root alone, which shows which foot stands
+        smooth = _solved(part, visible, stands)
+        smooth = _solved(
+            part, visible, standing_feet(smooth.joints, smooth.fps, visible.viewpoints)
+        )
+        poses[rows[inner]], places[rows[inner]] = (
+            smooth.poses[inner],
+            smooth.translations[inner],
+        )
     return replace(motion, poses=poses, translations=places)
 
 
-def windows_over(count: int, size: int, overlap: int) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
+def windows_over(
+    count: int, size: int, overlap: int
+) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
     """Return the frames (n,) of windows over `count` frames, and which of them (n,) are no neighbour's.
 
     Each has `size` such frames, the last one the rest, and up to `overlap` of its neighbours' before and after them.
@@ -196,45 +247,70 @@ def windows_over(count: int, size: int, overlap: int) -> list[tuple[NDArray[np.i
     return parts
 
 
-def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -> Motion:
+def _solved(
+    motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]
+) -> Motion:
     """Return the motion of the least sum of squares, given which feet stand."""
     angles = [angle for angle in LEGS if motion.skeleton.free[angle]]
-    root, legs = slice(0, 3), slice(3, 3 + len(angles))
+    root = slice(0, 3)
+    legs = slice(3, 3 + len(angles))
     change = np.zeros((len(motion), 3 + len(angles)))  # of the root, and of the angles
-    poses, places = motion.poses.copy(), motion.translations.copy()
+    poses = motion.poses.copy()
+    places = motion.translations.copy()
     for _ in range(GAUSS_NEWTON_STEPS):
         squares = Squares(*change.shape)
         add_root(squares, motion, visibility, PATH_ROOT_DEVIATION, change[:, root])
-        squares.add(legs, np.eye(len(angles)) / LEG_DEVIATION**2, change[:, legs] / LEG_DEVIATION**2)
+        squares.add(
+            legs,
+            np.eye(len(angles)) / LEG_DEVIATION**2,
+            change[:, legs] / LEG_DEVIATION**2,
+        )
         squares.add_bends(legs, change[:, legs], motion.fps**2 / LEG_ACCELERATION)
-        add_standing(squares, replace(motion, poses=poses, translations=places), stands, angles)
+        add_standing(
+            squares, replace(motion, poses=poses, translations=places), stands, angles
+        )
         change = change - squares.least()
         poses[:, angles] = motion.poses[:, angles] + change[:, 3:]
         places = motion.translations + change[:, root]
     return replace(motion, poses=poses, translations=places)
 
 
-def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation: float, moved: Array) -> None:
+def add_root(
+    squares: Squares,
+    motion: Motion,
+    visibility: Visibility,
+    deviation: float,
+    moved: Array,
+) -> None:
     """Add the squares of a root `moved` (T, 3) from its places in a motion, and of its accelerations.
 
     `deviation` is how many metres it may be off across the line of sight, and in depth where there are several cameras.
     The root's place is the first three numbers of each frame.
     """
-    root, across = slice(0, 3), np.where(visibility.usable, deviation, UNUSABLE_DEVIATION)
-    precision = np.eye(3) / across[:, None, None] ** 2  # (T, 3, 3) the inverse of the covariance
+    root = slice(0, 3)
+    across = np.where(visibility.usable, deviation, UNUSABLE_DEVIATION)
+    # (T, 3, 3) the inverse of the covariance
+    precision = np.eye(3) / across[:, None, None] ** 2
     alone = np.isfinite(visibility.viewpoints).all(axis=1)
     sights = motion.translations[alone] - visibility.viewpoints[alone]
     far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
     sights = sights / far[:, None]
-    less = 1.0 / np.maximum(DEPTH_DEVIATION * far, across[alone]) ** 2 - 1.0 / across[alone] ** 2
+    less = (
+        1.0 / np.maximum(DEPTH_DEVIATION * far, across[alone]) ** 2
+        - 1.0 / across[alone] ** 2
+    )
     precision[alone] += less[:, None, None] * sights[:, :, None] * sights[:, None, :]
     off = np.einsum("ti,tij,tj->t", moved, precision, moved)
     precision /= (1.0 + off / OUTLIER_DEVIATIONS**2)[:, None, None]
     squares.add(root, precision, np.einsum("tij,tj->ti", precision, moved))
-    squares.add_bends(root, motion.translations + moved, motion.fps**2 / ROOT_ACCELERATION)
+    squares.add_bends(
+        root, motion.translations + moved, motion.fps**2 / ROOT_ACCELERATION
+    )
 
 
-def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], angles: Sequence[int]) -> None:
+def add_standing(
+    squares: Squares, motion: Motion, stands: NDArray[np.bool_], angles: Sequence[int]
+) -> None:
     """Add the squares of the steps of feet that stand (T, 2) in a motion.
 
     The numbers of each frame are the root's place and some `angles`.
@@ -244,12 +320,16 @@ def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], an
     turned = np.repeat(motion.poses[None], len(legs), axis=0)
     for row, angle in enumerate(legs):
         turned[row, :, angle] += ANGLE_DIFFERENCE
-    there = motion.skeleton.joints(turned, np.repeat(motion.translations[None], len(legs), axis=0))
+    there = motion.skeleton.joints(
+        turned, np.repeat(motion.translations[None], len(legs), axis=0)
+    )
     joints = motion.joints
     for side, ball in enumerate(BALLS):
         feet = joints[:, ball]
         derivatives = np.zeros((*feet.shape, 3 + len(angles)))
         derivatives[..., :3] = np.eye(3)
-        derivatives[..., columns] = np.moveaxis((there[:, :, ball] - feet) / ANGLE_DIFFERENCE, 0, 2)
+        derivatives[..., columns] = np.moveaxis(
+            (there[:, :, ball] - feet) / ANGLE_DIFFERENCE, 0, 2
+        )
         both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
         squares.add_steps(both, feet, derivatives, motion.fps / (30.0 * STANDING_SLIDE))

@@ -16,7 +16,8 @@ from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import mean_cost
 
-STEADY_SECONDS = 1.0 / 30.0  # standard deviation of the filter of angles that a single camera sees
+# standard deviation of the filter of angles that a single camera sees
+STEADY_SECONDS = 1.0 / 30.0
 
 
 class Smoothed(NamedTuple):
@@ -27,7 +28,9 @@ class Smoothed(NamedTuple):
     shape: Shape | None
 
 
-def smooth(scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float) -> Smoothed:
+def smooth(
+    scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float
+) -> Smoothed:
     """Return the frames of a scene, smoothed.
 
     Costs and areas are those of the smoothed frames, and their posteriors move as far as the pose and the root did.
@@ -46,7 +49,13 @@ def smoothed_motion(
 ) -> tuple[Scene, Motion, Shape | None]:
     """Return a scene's motion, smoothed and fitted to the contours, with the scene and the build that it fits."""
     visibility = Visibility.of(scene)
-    return fit_contours(scene, smooth_path(steadied(motion, visibility), visibility), visibility, shape, beta)
+    return fit_contours(
+        scene,
+        smooth_path(steadied(motion, visibility), visibility),
+        visibility,
+        shape,
+        beta,
+    )
 
 
 def steadied(motion: Motion, visibility: Visibility) -> Motion:
@@ -56,17 +65,36 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
     """
     from scipy.ndimage import gaussian_filter1d
 
-    angles = gaussian_filter1d(np.unwrap(motion.poses, axis=0), STEADY_SECONDS * motion.fps, axis=0, mode="nearest")
-    return replace(motion, poses=np.where(np.isfinite(visibility.viewpoints[:, :1]), angles, motion.poses))
+    angles = gaussian_filter1d(
+        np.unwrap(motion.poses, axis=0),
+        STEADY_SECONDS * motion.fps,
+        axis=0,
+        mode="nearest",
+    )
+    return replace(
+        motion,
+        poses=np.where(np.isfinite(visibility.viewpoints[:, :1]), angles, motion.poses),
+    )
 
 
 def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
     """Return a frame at the pose that a motion has in frame k."""
-    pose, place, silhouettes = motion.poses[k], motion.translations[k], scene.observations[k].silhouettes
-    costs, counts = pose_costs(scene.body, scene.cameras, silhouettes, pose[None], place[None], beta)
+    pose = motion.poses[k]
+    place = motion.translations[k]
+    silhouettes = scene.observations[k].silhouettes
+    costs, counts = pose_costs(
+        scene.body, scene.cameras, silhouettes, pose[None], place[None], beta
+    )
     posterior = frame.posterior
     if posterior is not None:
         poses = posterior.poses + wrapped(pose - frame.pose)
         places = posterior.translations + (place - frame.translation)
         posterior = replace(posterior, poses=poses, translations=places)
-    return replace(frame, pose=pose, translation=place, cost=float(costs[0]), areas=counts[:, 0], posterior=posterior)
+    return replace(
+        frame,
+        pose=pose,
+        translation=place,
+        cost=float(costs[0]),
+        areas=counts[:, 0],
+        posterior=posterior,
+    )
