@@ -373,7 +373,7 @@ class SynthesisTracker:
             problem = self.problem(space, observation)
             minimise(problem, optimiser, budget_known=True)
             predictor.commit(problem.best)
-            latest = _frame(problem)
+            latest = _frame(problem, space)
             yield latest
 
     def _held(
@@ -406,7 +406,7 @@ class SynthesisTracker:
         return Problem(cost, space, task.evaluations, id="a frame")
 
 
-def _frame(problem: Problem) -> Frame:
+def _frame(problem: Problem, space: SearchSpace) -> Frame:
     best = problem.best
     poses, translations = problem.decode(best[None])
     with uncounted():  # its result drawn again is no evaluation
@@ -418,5 +418,5 @@ def _frame(problem: Problem) -> Frame:
         areas,
         problem.evaluations,
         np.column_stack(problem.trace),
-        details={COORDINATES: problem.space.coordinates(best)},
+        details={COORDINATES: space.coordinates(best)},
     )

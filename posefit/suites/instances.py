@@ -1,7 +1,7 @@
-"""Numbered instances: a person of the library, a pose, cameras, and their silhouettes.
+"""The instances of a suite's functions: a person of the library, a pose, cameras, and their silhouettes.
 
-A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose.
-Instances below 10,000 are of seven people, the others of three who are in no training data.
+A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose; see
+`posefit.motion.instances`. Training instances are of seven people, the others of three who are in no training data.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,6 +19,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
+from posefit.motion.instances import TRAINING, generator
 from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import mean_over_views, project
 from posefit.silhouette.mask import Silhouette
@@ -34,9 +35,7 @@ from posefit.suites.boxes import (
     is_upright,
     learned_without,
 )
-from posefit.suites.functions import TRAINING
 
-RNG_STREAM = 2026  # part of the seed of every instance
 SIZE = (120, 160)  # pixels
 PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and cameras aim
 # metres to a camera; radians it sees across the larger side
@@ -52,7 +51,7 @@ DAMAGES = ("blobs", "holes")
 STRENGTH = 0.6
 POOL = 32  # how many of these an instance has
 # they come in, again and again; a prime
-ORDER = np.random.default_rng(RNG_STREAM).integers(POOL, size=10_007)
+ORDER = generator("suite").integers(POOL, size=10_007)
 ANCHOR_OFF = 0.3  # metres along each axis that the anchor of an alignment is off
 DIGITS = 4  # of a truth in the box, so that every machine has the same one
 
@@ -108,7 +107,7 @@ class SuiteInstance:
 @lru_cache(maxsize=256)
 def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     """Return an instance; the same for the same numbers everywhere, which `checked_address` has checked."""
-    rng = np.random.default_rng([RNG_STREAM, function, number])
+    rng = generator("suite", function, number)
     people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
     subject = people[int(rng.integers(len(people)))]
     # the root has three
@@ -119,9 +118,7 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
         box = SequenceBox(learned, count)
     elif function in (7, 9):
         rotated = (
-            np.random.default_rng([RNG_STREAM, function, number, dimension])
-            if function == 9
-            else None
+            generator("suite", function, number, dimension) if function == 9 else None
         )
         box = AngleBox(learned, count, rotated)
     else:

@@ -17,12 +17,12 @@ from posefit.errors import InputError
 from posefit.fitting.check import one_of
 from posefit.fitting.problem import Problem
 from posefit.geometry.camera import Camera
+from posefit.motion.instances import HELD_OUT
 from posefit.reading import quoted
 from posefit.silhouette.mask import Mask
 from posefit.suites.functions import (
     DIMENSIONS,
     FUNCTIONS,
-    HELD_OUT,
     SUITE,
     SUITES,
     SuiteFunction,

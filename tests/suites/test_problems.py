@@ -13,8 +13,9 @@ from scipy.optimize import differential_evolution
 import posefit
 from posefit.fitting.box import draw_population
 from posefit.fitting.problem import BudgetSpentError, Problem
+from posefit.motion.instances import HELD_OUT, TRAINING
 from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, learned_without
-from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
+from posefit.suites.functions import FUNCTIONS, SUITE
 from posefit.suites.instances import suite_instance
 from posefit.suites.running import run_on
 from posefit_bridges.problems import ioh_problem
@@ -293,7 +294,7 @@ def test_a_copy_of_a_problem_counts_for_itself(
             lambda: problem(np.array([1, 2])),
             r"function must be a whole number of at least 1, got array\(\[1, 2\]\)",
         ),  # type: ignore[arg-type]
-        (lambda: problem(1, 20_000), "instance must be at most 19999, got 20000"),
+        (lambda: problem(1, 20_000), "instance must lie in 0 to 19999, got 20000"),
         (
             lambda: problem(7, 0, 9),
             "dimension of function 7 must be one of 20, 24, 40, 66, got 9",
