@@ -198,12 +198,19 @@ class Stage:
         poses, translations = self.decode(proposals[:, None], rows)
         pictures = self._backdrops.copy()
         costs, areas = self._drawn(poses, translations, rows, pictures)
-        self._poses[rows] = poses[rows, 0]
-        self._translations[rows] = translations[rows, 0]
+        drawn_poses = poses[:, 0]
+        drawn_translations = translations[:, 0]
+        # most steps draw in every row, and nothing is copied
+        if len(rows) == len(self.all_rows):
+            self._poses = drawn_poses
+            self._translations = drawn_translations
+        else:
+            self._poses[rows] = drawn_poses[rows]
+            self._translations[rows] = drawn_translations[rows]
         self._has_body[rows] = True
         return Drawn(
-            poses[:, 0],
-            translations[:, 0],
+            drawn_poses,
+            drawn_translations,
             costs[:, 0],
             np.ascontiguousarray(areas[:, :, 0].swapaxes(0, 1)),
             pictures.view(np.uint8),

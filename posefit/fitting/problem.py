@@ -344,9 +344,9 @@ class Problems:
     def count(self, rows: NDArray[np.int64], proposals: Array, costs: Array) -> None:
         """Count the proposals (m, k, d) of some rows (m,), which cost (m, k), and remember the best of each."""
         self.evaluations[rows] += costs.shape[1]
-        each = np.arange(len(rows))
-        lowest = costs.argmin(axis=1)
-        least = costs[each, lowest]
+        least = costs.min(axis=1)
         better = np.flatnonzero(least < self.best_costs[rows])
-        self.best_costs[rows[better]] = least[better]
-        self.best[rows[better]] = proposals[better, lowest[better]]
+        if better.size:
+            lowest = costs[better].argmin(axis=1)
+            self.best_costs[rows[better]] = least[better]
+            self.best[rows[better]] = proposals[better, lowest]
