@@ -80,8 +80,8 @@ class Table(NamedTuple):
             )
         pixels = np.concatenate(small)
         mean = pixels.mean(axis=0)
-        _, axes = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
-        axes = axes[:, : -DIMENSIONS - 1 : -1].astype(np.float32)
+        _, directions = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
+        axes = directions[:, : -DIMENSIONS - 1 : -1].astype(np.float32)
         codes = (pixels - mean) @ axes
         return cls(states, mean, axes, codes, (codes**2).sum(axis=1))
 
