@@ -27,10 +27,12 @@ from numpy.typing import NDArray
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import (
+    FLAT,
     FORMATS,
     IMAGES,
     PIXELS,
     Marks,
+    flat_share,
     page_count,
     read_marks,
 )
@@ -511,7 +513,7 @@ def _decided(
     counts = ValueCounts()
     size = (0, 0)
     for marks in frames:
-        counts.add(marks.values, marks.soft)
+        counts.add(marks)
         size = marks.values.shape[1], marks.values.shape[0]
     return size, *counts.classifier(label, name)
 
@@ -532,6 +534,10 @@ class ValueCounts:
 
     # whether a value is a degree: in lossy images, in fractions, in an alpha channel
     soft: bool = False
+    alpha: bool = False  # whether all are of alpha channels
+    # masks with several values, and those of them whose areas are flat, as of labels
+    several: int = 0
+    flat: int = 0
     fractions: bool = False
     lowest: float = np.inf
     highest: float = 0.0
@@ -540,18 +546,19 @@ class ValueCounts:
     # masks in which a value is more than an edge between others
     solid: Counter[int | float] = field(default_factory=Counter)
 
-    def add(self, values: Values, soft: bool) -> None:
+    def add(self, marks: Marks) -> None:
         """Count the next mask."""
+        values = marks.values
         low = values.min()
         high = values.max()
-        self.lowest, self.highest = (
-            min(self.lowest, float(low)),
-            max(self.highest, float(high)),
-        )
+        first = self.lowest == np.inf
+        self.alpha = marks.alpha and (self.alpha or first)
+        self.lowest = min(self.lowest, float(low))
+        self.highest = max(self.highest, float(high))
         self.fractions |= values.dtype.kind == "f" and bool(
             (values != np.floor(values)).any()
         )
-        self.soft |= soft
+        self.soft |= marks.soft
         if self.soft:
             return
         top = int(np.count_nonzero(values == high))
@@ -566,6 +573,8 @@ class ValueCounts:
         self.soft = len(self.pixels) > (2 if self.fractions else COUNTED_VALUES)
         if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
+            self.several += len(unique) > 2
+            self.flat += len(unique) > 2 and flat_share(values) >= FLAT
 
     def classifier(
         self, label: int | None, name: object
@@ -587,10 +596,14 @@ class ValueCounts:
                 )
             return lambda values: np.asarray(values == label), []
         values = sorted(self.pixels)
-        if self.highest > SCALES[-1] and (self.soft or len(values) > FEW_VALUES):
+        many = len(values) > FEW_VALUES
+        if many and not self.soft and 2 * self.flat > self.several:
+            most = [value for value, _ in self.pixels.most_common() if value]
+            raise self._several(name, most)
+        if self.highest > SCALES[-1] and (self.soft or many):
             raise _many_colours(name)
         ends = f"{name}: masks of values from {self.lowest:.4g} to {self.highest:.4g}"
-        if self.soft or len(values) > FEW_VALUES:
+        if self.soft or many:
             half, kind = self._half
             return _above(half), [f"{ends} are {kind}: the person is above {half:g}"]
         if len(values) <= 2:  # whichever two they are
@@ -607,22 +620,38 @@ class ValueCounts:
             ]
         labels = [value for value, _ in self.solid.most_common() if value]
         if len(labels) > 1:
-            raise InputError(
-                f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
-            )
+            raise self._several(name, labels)
         threshold = float(labels[0] // 2) if labels else self._half[0]
+        # what is far above the only label is no edge of it, as the 255 around the objects of PASCAL VOC
+        most = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
+        if self.highest > most:
+            return _between(threshold, most), [
+                f"{ends}: the person is above {threshold:g}, and what is above {most:g} is not"
+            ]
         return _above(threshold), [
             f"{ends}: the person is above {threshold:g}, what is between is an edge"
         ]
+
+    def _several(self, name: object, labels: Sequence[float]) -> InputError:
+        """Return the error of masks with several labels, none of which is known to be the person's."""
+        return InputError(
+            f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
+        )
 
     @property
     def _half(self) -> tuple[float, str]:
         """The value half way to a whole person, 127 of 255, as whole numbers have no middle; and what the values are.
 
-        Signed ones are a network's logits, of which 0 is the middle.
+        Signed ones are a network's logits, of which 0 is the middle. Degrees that were resampled go a little below 0,
+        and reach about a whole person. An alpha channel that is nowhere half opaque is a translucent colour.
         """
-        if self.lowest < -SIGNED * self.highest:
+        usual = any(
+            0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
+        )
+        if self.lowest < -SIGNED * self.highest or (self.lowest < 0.0 and not usual):
             return 0.0, "logits"
+        if self.alpha and self.highest <= SCALES[1] // 2:
+            return float(self.highest // 2), "translucent"
         # of no usual scale
         if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:
             return self.highest / 2.0, "degrees"
@@ -644,6 +673,10 @@ class ValueCounts:
 
 def _above(threshold: float) -> Classifier:
     return lambda values: np.asarray(values > threshold)
+
+
+def _between(threshold: float, most: float) -> Classifier:
+    return lambda values: np.asarray((values > threshold) & (values <= most))
 
 
 def _many_colours(name: object) -> InputError:

@@ -180,15 +180,21 @@ def scene_of(
             raise InputError(
                 f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}"
             )
-        known = calibrated(camera, [video.size for video in videos])
+        known = calibrated(
+            camera,
+            [video.size for video in videos],
+            [str(video.path) for video in videos],
+        )
         how = replace(extraction or Extraction(), person=person)
         result = _filmed(videos, known, how, frames, progress, scene)
     else:
-        known = calibrated(camera, [None] * len(sources))
         places = [
             source if isinstance(source, np.ndarray | tuple) else Path(str(source))
             for source in sources
         ]
+        known = calibrated(
+            camera, [None] * len(places), [name_of(place) for place in places]
+        )
         views = list[CameraView]()
         read = read_views(places, frames, label)
         for place, masks in zip(places, read, strict=True):
