@@ -228,7 +228,7 @@ def measured(
     rng = np.random.default_rng([instance, number])
     points = draw_population(problem.space, rng, POINTS)
     truth = np.array(problem.made.truth)
-    row, basins = features(problem.evaluate, problem.noise_free, truth, points, rng)
+    row, basins = features(problem, problem.noise_free, truth, points, rng)
     reached: Shares = {name: [] for name in METHODS}
     for method, costs in reached.items():
         problem.reset()

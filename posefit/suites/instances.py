@@ -12,7 +12,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Start
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -65,13 +65,13 @@ class SuiteInstance:
     number: int
     subject: str
     # one, or those of a sequence: they have a box in common
-    frames: Sequence[PoseProblem] = field(repr=False)
+    frames: Sequence[SilhouetteCost] = field(repr=False)
     box: SuiteBox = field(repr=False)
     # (d,) the proposal of the true pose, for tests: a search that reads it cheats
     truth: Array = field(repr=False)
     truth_cost: float  # of that proposal; 0 where the function is exact
     # of function 4: each with a damaged silhouette
-    noisy: Sequence[PoseProblem] = field(default=(), repr=False)
+    noisy: Sequence[SilhouetteCost] = field(default=(), repr=False)
 
     @property
     def space(self) -> SearchSpace:
@@ -80,14 +80,14 @@ class SuiteInstance:
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) without noise: the means over the frames."""
-        return mean_over_views([frame.evaluate(proposals) for frame in self.frames])
+        return mean_over_views([frame(proposals) for frame in self.frames])
 
     def evaluate_noisy(self, proposals: Array, first: int) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) with noise: the evaluations from number `first` on."""
         costs = np.empty(len(proposals))
         drawn = ORDER[(first + np.arange(len(proposals))) % len(ORDER)]
         for k in np.unique(drawn):
-            costs[drawn == k] = self.noisy[k].evaluate(proposals[drawn == k])
+            costs[drawn == k] = self.noisy[k](proposals[drawn == k])
         return costs
 
     def repaired(self, proposals: Array) -> Array:
@@ -185,7 +185,7 @@ class _Draft:
     def silhouette(self, camera: Camera, pose: Array) -> Silhouette:
         return Silhouette.of(project(self.body, camera, pose, PLACE))
 
-    def made(self, truth: Array, *frames: PoseProblem) -> SuiteInstance:
+    def made(self, truth: Array, *frames: SilhouetteCost) -> SuiteInstance:
         truth = truth.copy()
         truth.setflags(write=False)
         made = SuiteInstance(
@@ -210,7 +210,7 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
     cameras = [draft.camera(azimuth + 0.5 * np.pi * k) for k in range(views)]
     pose = space.decode(truth[None])[0][0]
     silhouettes = [draft.silhouette(camera, pose) for camera in cameras]
-    return draft.made(truth, PoseProblem(draft.body, cameras, silhouettes, space))
+    return draft.made(truth, SilhouetteCost(draft.body, cameras, silhouettes, space))
 
 
 def _still(draft: _Draft, pose: Array) -> Array:
@@ -237,7 +237,7 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
     space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
     return draft.made(
         truth,
-        PoseProblem(draft.body, [camera], [draft.silhouette(camera, pose)], space),
+        SilhouetteCost(draft.body, [camera], [draft.silhouette(camera, pose)], space),
     )
 
 
@@ -270,11 +270,11 @@ def _sequence(draft: _Draft) -> SuiteInstance:
     silhouettes = [
         draft.silhouette(camera, frame.decode(truth)[0][0]) for frame in spaces
     ]
-    problems = [
-        PoseProblem(draft.body, [camera], [silhouette], frame)
+    costs = [
+        SilhouetteCost(draft.body, [camera], [silhouette], frame)
         for silhouette, frame in zip(silhouettes, spaces, strict=True)
     ]
-    return draft.made(truth[0], *problems)
+    return draft.made(truth[0], *costs)
 
 
 def _aligned(draft: _Draft) -> SuiteInstance:
