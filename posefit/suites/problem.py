@@ -219,11 +219,14 @@ class Problem:
             [cost for _, cost in steps]
         )
 
-    def __deepcopy__(self, memo: object) -> "Problem":
+    def __copy__(self) -> "Problem":
         """Return a problem with the same count, best and trace, which are its own from now on."""
         copy: Problem = object.__new__(Problem)
         copy.__dict__.update(self.__dict__, _steps=self._steps.copy())
         return copy
+
+    def __deepcopy__(self, memo: object) -> "Problem":
+        return self.__copy__()
 
     def __getstate__(self) -> Any:
         raise PicklingError(
@@ -374,6 +377,11 @@ class Suite:
         return len(self._addresses)
 
     def __getitem__(self, index: int) -> Problem:
+        if isinstance(index, slice):
+            raise InputError(
+                f"index must be the number of one problem, got {quoted(index)}: "
+                "problems are made in their turn, as itertools.islice takes them"
+            )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)
         return problem
