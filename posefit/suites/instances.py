@@ -21,7 +21,7 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
 from posefit.motion.instances import TRAINING, generator
 from posefit.silhouette.corruption import corrupted
-from posefit.silhouette.cost import mean_over_views, project
+from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.suites.boxes import (
     CONSTANT,
@@ -79,7 +79,8 @@ class SuiteInstance:
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) without noise: the means over the frames."""
-        return mean_over_views([frame(proposals) for frame in self.frames])
+        costs = [frame(proposals) for frame in self.frames]
+        return np.asarray(np.mean(costs, axis=0))
 
     def evaluate_noisy(self, proposals: Array, first: int) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) with noise: the evaluations from number `first` on."""

@@ -227,6 +227,11 @@ class Suite:
         return len(self._addresses)
 
     def __getitem__(self, index: int) -> Problem:
+        if isinstance(index, slice):
+            raise InputError(
+                f"index must be the number of one problem, got {quoted(index)}: "
+                "problems are made in their turn, as itertools.islice takes them"
+            )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)
         return problem

@@ -277,14 +277,15 @@ def run_cell(cell: Cell) -> CellResult:
 def other_version(origin: str) -> str | None:
     """Return what is installed instead of one origin of a version; None where it is this one, or is unknown here."""
     name = origin.partition(" ")[0]
-    installed = _installed()
-    if origin in installed:
+    origins = installed()
+    if origin in origins:
         return None
-    return next((other for other in installed if other.partition(" ")[0] == name), None)
+    return next((other for other in origins if other.partition(" ")[0] == name), None)
 
 
 @lru_cache(maxsize=1)
-def _installed() -> frozenset[str]:
+def installed() -> frozenset[str]:
+    """Return the origins of everything that is installed: see `posefit.registry.Offer.origin`."""
     from posefit.registry import registry
 
     offers = (offer for named in registry().offers.values() for offer in named.values())

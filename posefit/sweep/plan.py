@@ -24,6 +24,7 @@ from posefit.sweep.check import (
     cell_of,
     families,
     flattened,
+    forget,
     search_method,
     search_of,
 )
@@ -59,6 +60,7 @@ class Plan:
 
     def __init__(self, cells: Callable[[], Iterator[Cell]]) -> None:
         self._cells = cells
+        forget()
         keys: set[bytes] = set()
         for cell in cells():
             if (key := bytes.fromhex(cell.key)) in keys:

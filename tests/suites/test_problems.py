@@ -350,7 +350,7 @@ def swarm(space: posefit.Space) -> posefit.Optimiser:
 
 
 def test_iohexperimenter_has_the_trace_of_a_plain_loop_in_each_run() -> None:
-    pytest.importorskip("ioh", reason="it has no wheels for every Python")
+    pytest.importorskip("ioh", reason="it is in the extra test")
     for address in ADDRESSES:
         plain, posed = (posefit.suite(SUITE, *address) for _ in range(2))
         plain.budget = BUDGET
@@ -391,7 +391,7 @@ def test_iohexperimenter_has_the_trace_of_a_plain_loop_in_each_run() -> None:
 
 
 def test_iohexperimenter_finds_the_optimum_and_keeps_a_budget() -> None:
-    pytest.importorskip("ioh", reason="it has no wheels for every Python")
+    pytest.importorskip("ioh", reason="it is in the extra test")
     wrapped = ioh_problem(problem(budget=1))
     wrapped(wrapped.optimum.x)
     assert wrapped.state.final_target_found
