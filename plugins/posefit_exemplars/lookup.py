@@ -82,8 +82,9 @@ class Table(NamedTuple):
         mean = pixels.mean(axis=0)
         _, directions = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
         axes = directions[:, : -DIMENSIONS - 1 : -1].astype(np.float32)
-        codes = (pixels - mean) @ axes
-        return cls(states, mean, axes, codes, (codes**2).sum(axis=1))
+        codes = np.asarray((pixels - mean) @ axes, dtype=np.float32)
+        squares = np.square(codes).sum(axis=1)
+        return cls(states, mean, axes, codes, squares)
 
     def distances(self, picture: Mask) -> Codes:
         """Return the squared distances (n, YAWS) of all silhouettes from that of a picture (height, width)."""
