@@ -18,9 +18,10 @@ from posefit import (
     Camera,
     Motion,
     Observation,
-    PoseProblem,
+    Problem,
     SearchSpace,
     Silhouette,
+    SilhouetteCost,
     Task,
 )
 from posefit.arrays import Array
@@ -304,13 +305,10 @@ class Instance:
     def episode(self, frame: int, space: SearchSpace) -> "Episode":
         """Return the search for the pose of a frame in a space."""
         silhouettes = self.observations[frame].silhouettes
-        return Episode(
-            self,
-            frame,
-            PoseProblem(
-                self.task.body, self.task.cameras, silhouettes, space, blank=True
-            ),
+        cost = SilhouetteCost(
+            self.task.body, self.task.cameras, silhouettes, space, blank=True
         )
+        return Episode(self, frame, Problem(cost, space))
 
     @cached_property
     def joints(self) -> Array:
@@ -324,7 +322,7 @@ class Episode:
 
     instance: Instance
     frame: int
-    problem: PoseProblem
+    problem: Problem
 
     @property
     def truth(self) -> Array:
