@@ -31,7 +31,7 @@ from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.geometry.body import varied
 from posefit.motion import built_in
 from posefit.motion.clips import load_motion
-from posefit.motion.instance import motion_of_instance, variation
+from posefit.motion.instances import motion_of_instance, variation
 from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
