@@ -1,5 +1,6 @@
 """What `posefit report` writes and prints, and one line for every mistake."""
 
+import csv
 import json
 import re
 import sys
@@ -36,6 +37,16 @@ def results(tmp_path: Path) -> Path:
         for (method, i, s), error in full({"random@pca": 2.0, "sapso@pca": 1.0}).items()
     ]
     return ledger(tmp_path / "results", made, LOST)
+
+
+@pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t", "\r"])
+def test_no_name_is_a_formula_of_a_spreadsheet(sign: str, tmp_path: Path) -> None:
+    write_csv(
+        [{"name": f"{sign}1+1", "value": -1.5, "kind": "a=b"}], tmp_path / "rows.csv"
+    )
+    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert row == {"name": f"'{sign}1+1", "value": "-1.5", "kind": "a=b"}
 
 
 def test_the_report_is_one_file_that_links_to_nothing_but_itself(
