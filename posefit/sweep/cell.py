@@ -85,7 +85,7 @@ class TrackCell(Cell):
     """A motion that is tracked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
-    numbers what the cameras see of the motion, see `posefit.motion.instance`. `corruption` gives kinds of
+    numbers what the cameras see of the motion, see `posefit.motion.instances`. `corruption` gives kinds of
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames without masks; the damage
     follows from the instance, so that it is the same for every method and seed. `hypotheses` is how many times the
     motion is tracked, see `posefit.tracking.restarts`. `files` holds the SHA-256 of every capture file that is read.
@@ -295,7 +295,7 @@ def installed() -> frozenset[str]:
 def cell_scene(cell: TrackCell) -> "Scene":
     """Return the observations of a cell; the same for all methods and seeds."""
     from posefit.footage.scene import synthetic, with_corruption
-    from posefit.motion.instance import motion_of_instance, variation
+    from posefit.motion.instances import motion_of_instance, variation
 
     motion = motion_of_instance(
         cell.motion, cell.instance, frames=cell.frames, fps=cell.fps

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from posefit.errors import InputError
+from posefit.motion.instances import HELD_OUT
 from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text, suggestion
-from posefit.suites.functions import FUNCTIONS, HELD_OUT
+from posefit.suites.functions import FUNCTIONS
 from posefit.suites.problem import EVALUATIONS
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import (
