@@ -13,6 +13,7 @@ import pytest
 
 from posefit.page.document import embedded, plain
 from posefit.report.content import data_of
+from posefit.report.kind import Contest
 from posefit.report.page import MARK
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
@@ -64,11 +65,12 @@ def test_fewer_resamples_than_usual_are_said(
     def said() -> list[str]:
         return [note for note in header_of(results)["notes"] if "resamples" in note]
 
-    # of 8 runs: as many numbers as the usual 2,000 resamples need, and half as many
-    monkeypatch.setattr("posefit.report.kind.WORK", 8 * 2000)
-    assert said() == []
-    monkeypatch.setattr("posefit.report.kind.WORK", 8 * 1000)
-    assert said() == ["So many runs have 1000 bootstrap resamples instead of 2,000."]
+    for count, notes in (
+        (2000, []),
+        (1999, ["So many runs have 1999 bootstrap resamples instead of 2,000."]),
+    ):
+        monkeypatch.setattr(Contest, "resamples", lambda *_, count=count: count)
+        assert said() == notes
 
 
 @pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t", "\r"])
