@@ -45,6 +45,7 @@ def stored(kind: str, key: bytes, make: Callable[[], Arrays]) -> Arrays:
 
     Returns:
         The arrays by their names.
+
     """
     name = hashlib.sha256(key).hexdigest()[:32]
     try:

@@ -10,7 +10,9 @@ import signal
 import sys
 import threading
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
@@ -28,7 +30,7 @@ class _Process(SpawnProcess):
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802
         main = sys.modules["__main__"]
-        with _starting:
+        with _starting, _interrupts_blocked():
             before = {
                 name: getattr(main, name, None) for name in ("__file__", "__spec__")
             }
@@ -37,6 +39,24 @@ class _Process(SpawnProcess):
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
             finally:
                 vars(main).update(before)
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Start processes with Ctrl-C blocked, which they are deaf to only once they have imported what ignores it.
+
+    A terminal sends it to all processes: in between it would end a worker with a traceback. For this process it waits.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # which would end with the interrupt unblocked, were it started with the first process
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class Context(SpawnContext):
@@ -48,6 +68,9 @@ class Context(SpawnContext):
 def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
     """Make this process a worker: one thread, deaf to Ctrl-C, which is the driver's, and ended with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # what a cell starts is not to inherit that it is blocked
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     # so that a kill from outside looks like one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     # a group of its own: what a terminal or a script sends to the driver is not for it

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import signal
 import socket
 import subprocess
@@ -23,6 +24,7 @@ from posefit.sweep.engine import Engine, Limits, Outcome
 from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
+from posefit.sweep.worker import Context, become_worker
 from tests.sweep import fake
 from tests.sweep.fake import behave, cells, quarantined_in, rows_in, swept
 
@@ -200,6 +202,30 @@ assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
 assert compiled() == 1
 """
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def interrupts() -> list[Any]:
+    """Return whether Ctrl-C is blocked in this process, and what it does."""
+    return [
+        signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []),
+        signal.getsignal(signal.SIGINT),
+    ]
+
+
+def starts_deaf(path: list[str]) -> None:
+    """End with status 0 where this process was deaf to Ctrl-C before it became a worker, and is afterwards."""
+    before = interrupts()
+    become_worker(os.getppid(), path, pickle.dumps(None))
+    deaf = before[0] and interrupts() == [False, signal.SIG_IGN]
+    sys.exit(not deaf)
+
+
+def test_a_worker_is_deaf_to_ctrl_c_from_its_first_moment() -> None:
+    process = Context().Process(target=starts_deaf, args=(sys.path,))
+    process.start()
+    process.join(60.0)
+    assert process.exitcode == 0
+    assert not interrupts()[0]
 
 
 def test_a_script_may_compare_without_a_guard(tmp_path: Path) -> None:
