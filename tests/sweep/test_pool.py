@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
@@ -202,6 +203,35 @@ assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
 assert compiled() == 1
 """
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted = tmp_path / "left"
+    monkeypatch.setenv(fake.LEFT, str(noted))
+    tally = swept(tmp_path / "r", cells(3, fake.LEAVE_BEHIND), Pool(1, LIMITS, behave))
+    assert tally.done == 3
+    found = [json.loads(line) for line in noted.read_text().splitlines()]
+    assert [states[1:-1] for states in found] == [[os.getcwd(), None, False, True]] * 3
+    # the random numbers go on as if no cell had set their seed: none takes any itself
+    assert len({states[-1] for states in found}) == 1
+    wait_until(lambda: not any(is_running(states[0]) for states in found))
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    """Wait until something is true; the limit of a test ends it otherwise."""
+    while not true():
+        time.sleep(0.02)
+
+
+def is_running(process: int) -> bool:
+    """Return whether there is a process that has not ended; who has ended may wait to be noticed."""
+    state = Path(f"/proc/{process}/stat")
+    try:
+        return state.read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def interrupts() -> list[Any]:
