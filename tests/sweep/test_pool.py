@@ -13,6 +13,7 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -26,6 +27,8 @@ from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
 from posefit.sweep.worker import Context, become_worker
+from posefit.version import posefit_build
+from tests.cases import each
 from tests.sweep import fake
 from tests.sweep.fake import behave, cells, quarantined_in, rows_in, swept
 
@@ -361,6 +364,33 @@ def test_a_scheduler_that_is_not_there_is_named() -> None:
         match=f"scheduler must be one with workers that answers, got {address}",
     ):
         cluster(address, LIMITS, patience=1.0)
+
+
+@each(
+    ("worker", "scheduler", "message"),
+    [
+        (ModuleNotFoundError("No module named 'posefit'"), None, "the worker tcp://b must have posefit .*, got none .*No module"),
+        ("posefit 0.0.9 a1", None, "the worker tcp://b must have posefit .*, got posefit 0.0.9 a1"),
+        (posefit_build(), ModuleNotFoundError("No module named 'posefit'"), "the scheduler tcp://s must have posefit, got none"),
+        (posefit_build(), None, None),
+    ],
+)  # fmt: skip
+def test_dask_workers_without_this_posefit_are_refused_before_a_cell_is_lost(
+    worker: Any, scheduler: Exception | None, message: str | None
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    client = Mock(status="running")
+    client.run.return_value = {"tcp://a": posefit_build(), "tcp://b": worker}
+    client.run_on_scheduler.side_effect = scheduler
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(distributed, "Client", lambda *_, **__: client)
+        if message is None:
+            cluster("tcp://s", LIMITS)
+            return
+        with pytest.raises(InputError, match=message):
+            cluster("tcp://s", LIMITS)
+    client.submit.assert_not_called()
+    client.close.assert_called_once()
 
 
 @pytest.mark.slow
