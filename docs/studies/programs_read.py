@@ -223,7 +223,7 @@ def pymotion_joints(expected: Expected) -> None:
     kinematics = importlib.import_module("pymotion.ops.skeleton")
     turns, places, parents, offsets, _, _ = reader.get_data()
     joints, _ = kinematics.fk(turns, places[:, 0], offsets, parents)
-    names = reader.data["names"]
+    names = list(reader.data["names"])
     knees = joints[:, names.index("LeftLeg")]
     same("knees", knees, expected.joints[:, knee(expected)], BONE_METRES)
     same("rate", 1.0 / reader.data["frame_time"], expected.fps, 1e-6 * expected.fps)
