@@ -332,7 +332,8 @@ def _rate(times: Array, off: float, stated: float) -> float:
     intervals = len(times) - 1
     lasted = float(times[-1] - times[0])
     rate = intervals / lasted
-    slack = max(STAMP + off, SAME_RATE * lasted)
+    # the first and the last may be off by as much
+    slack = max(STAMP + 2.0 * off, SAME_RATE * lasted)
     for likely in (stated, float(round(rate)), round(rate * 1.001) / 1.001):
         if likely > 0.0 and abs(intervals / likely - lasted) <= slack:
             return likely
