@@ -24,9 +24,10 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.contours import (
     STEP_EVALUATIONS,
-    MaskContours,
+    contour_race,
     fitted,
     precisions,
+    race_count,
 )
 from posefit.fitting.landmarks import (
     exchanged_given,
@@ -51,17 +52,6 @@ FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
 # two of them are of places to start at
 CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 MIN_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS  # of a frame
-# of the first frame, whose hypotheses race: the reaches of each round's steps, and the
-# share of all hypotheses that take part in it, the cheapest ones
-ROUNDS = (
-    ((0.09, 0.065), 1.0),
-    ((0.065, 0.045, 0.045), 0.33),
-    ((0.033,) * 8, 0.1),
-)
-# of each hypothesis: its steps, its cost before each round, and at the end once more
-FIRST_EVALUATIONS = 1.0 + sum(
-    share * len(reaches) * STEP_EVALUATIONS + 1.0 for reaches, share in ROUNDS
-)
 FRESH_SHARE = 0.45  # of the evaluations
 REFLECTED_SHARE = 0.25  # of the fresh hypotheses: reflections of the others
 FIRST_REFLECTED_SHARE = 0.5  # of those of the first frame
@@ -236,7 +226,7 @@ class HypothesisFilter:
         """
         evaluations = max(self._evaluations / camera_count, MIN_EVALUATIONS)
         if first:
-            fresh = int(evaluations / FIRST_EVALUATIONS)
+            fresh = race_count(evaluations)
             return Counts(fresh, fresh - 1 - int(FIRST_REFLECTED_SHARE * fresh), 0)
         fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
         continued = int(
@@ -311,8 +301,16 @@ class HypothesisFilter:
                 ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT,
             )
             if not len(latest.poses):
-                *fresh, used = self._raced(estimate, contours, fresh, weights, noise)
-                evaluations += used
+                *fresh, used = contour_race(
+                    self._task.body,
+                    contours,
+                    fresh,
+                    weights,
+                    lambda poses, places: self._pose_costs(
+                        frame_costs, poses, places, noise, FIRST_LIBRARY_COST
+                    ),
+                )
+                evaluations += used + len(fresh[0])
             else:
                 fresh = fitted(
                     self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES
@@ -342,38 +340,6 @@ class HypothesisFilter:
             noise,
             evaluations,
         )
-
-    def _raced(
-        self,
-        estimate: Estimate,
-        contours: Sequence[MaskContours],
-        fresh: tuple[Array, Array],
-        weights: Array,
-        noise: float,
-    ) -> tuple[Array, Array, float]:
-        """Return the hypotheses of a first frame, fitted in rounds, the cheapest of them longest; and the evaluations.
-
-        The right one is seldom the cheapest before it is fitted, and a wrong one seldom gets as cheap as the right one.
-        """
-        frame_costs = estimate.frame_costs
-        poses, places = (array.copy() for array in fresh)
-        count = len(poses)
-        evaluations = float(count)  # their costs at the end
-        for reaches, share in ROUNDS:
-            rows = np.arange(count)
-            remaining = max(int(share * count), 1)
-            if remaining < count:
-                costs = self._pose_costs(
-                    frame_costs, poses, places, noise, FIRST_LIBRARY_COST
-                )
-                evaluations += count
-                rows = np.argsort(costs, kind="stable")[:remaining]
-            start = poses[rows], places[rows]
-            poses[rows], places[rows] = fitted(
-                self._task.body, contours, start, start[0], weights, reaches
-            )
-            evaluations += remaining * len(reaches) * STEP_EVALUATIONS
-        return poses, places, evaluations
 
     def _pose_costs(
         self,

@@ -62,7 +62,8 @@ def stored(kind: str, key: bytes, make: Callable[[], Arrays]) -> Arrays:
 
 def _read(path: Path) -> Arrays:
     """Return the arrays of a file. An archive has a checksum of each array, which is compared as it is read."""
-    with np.load(path, allow_pickle=False) as file:
+    # NumPy leaves a damaged archive open that it has opened itself
+    with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}
     if not arrays:
         raise ValueError(f"{path} is empty")

@@ -15,8 +15,8 @@ from posefit.fitting.problem import Problem
 # ours, as all that follow: of the weight of the likeliest start; less likely ones are
 # not searched
 MIN_WEIGHT = 0.05
-SHORT_SHARE = 0.4  # of the budget: for a short search from each start
-MIN_SHORT = 80  # evaluations of a short search
+SHORT_SHARE = 0.5  # of the budget: for a short search from each start
+MIN_SHORT = 40  # evaluations of a short search
 FINALISTS = 2  # that are searched longer
 # of the spread of a start: what a finalist starts with, around its best proposal
 FINAL_SPREAD = 0.5

@@ -8,29 +8,35 @@ from dataclasses import replace
 
 import numpy as np
 
-from posefit.fitting.contours import ROBUST_SCALES, STEP_EVALUATIONS, contour_fit
+from posefit.arrays import Array
+from posefit.fitting.contours import (
+    POINT_SPACING,
+    MaskContours,
+    contour_race,
+    precisions,
+    race_count,
+)
 from posefit.fitting.start import posterior_of
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.silhouette.cost import pose_costs
+from posefit.geometry.symmetry import exchanged_limbs, facing, reflected_poses
+from posefit.silhouette.cost import known_views, pose_costs
 
-SHARE = 0.4  # of a frame's evaluations: those of polishing, at most
-MAX_POSES = 3
+SHARE = 0.5  # of a frame's evaluations: those of polishing
 # standard deviations that a searched pose is off: radians, and metres
 TURN = np.radians(8.0)
 SHIFT = 0.05
 
 
 def polish_evaluations(evaluations: int) -> int:
-    """Return how many of a frame's evaluations are for polishing: for whole steps, if there are any."""
-    most = MAX_POSES * (len(ROBUST_SCALES) * STEP_EVALUATIONS + 1.0)
-    share = min(SHARE * evaluations, most)
-    return int(share) if share > STEP_EVALUATIONS else 0
+    """Return how many of a frame's evaluations are for polishing; none where they do not suffice for one pose."""
+    share = int(SHARE * evaluations)
+    return share if race_count(share) else 0
 
 
 def polished(
     task: Task, frame: Frame, observation: Observation, evaluations: int, beta: float
 ) -> Frame:
-    """Return a frame whose likeliest poses are fitted to the contours, the cheapest of them being its pose.
+    """Return a frame whose poses, and their reflections, are fitted to the contours; the cheapest is its pose.
 
     Args:
         task: what the search of the frame knew.
@@ -40,39 +46,69 @@ def polished(
         beta: that of the cost.
 
     Returns:
-        The frame with the evaluations of both.
+        The frame, with the evaluations of both.
 
     """
-    poses = frame.pose[None]
-    places = frame.translation[None]
-    if frame.posterior is not None:
-        poses = frame.posterior.poses.copy()
-        places = frame.posterior.translations.copy()
     scene = task.body, task.cameras, observation.silhouettes
-    full = len(ROBUST_SCALES) * STEP_EVALUATIONS + 1.0
-    count = min(max(int(evaluations / full), 1), len(poses))
-    share = int(min(evaluations / count, full)) - 1
-    costs = np.empty(len(poses))
-    # the search gives its poses by their costs, the cheapest first
-    used = 0
-    for k in range(count):
-        poses[k], places[k], steps = contour_fit(
-            task, observation, (poses[k], places[k]), (TURN, SHIFT), share
+
+    def cost(poses: Array, places: Array) -> Array:
+        return pose_costs(*scene, poses, places, beta)[0]
+
+    poses, places = _open_poses(task, frame, observation)
+    poses = poses[: race_count(evaluations)]
+    places = places[: len(poses)]
+    views = [
+        MaskContours.of(
+            camera, view, [observation], frame.translation[None], POINT_SPACING
         )
-        used += steps
+        for view, camera in enumerate(task.cameras)
+    ]
+    start = poses, places
+    poses, places, used = contour_race(
+        task.body, views, start, precisions(TURN, SHIFT), cost
+    )
     costs, areas = pose_costs(*scene, poses, places, beta)
-    used += len(poses)
     best = int(costs.argmin())
-    posterior = frame.posterior and posterior_of(poses, places, costs)
-    total = frame.evaluations + used
-    cost = float(costs[best])
+    least = float(costs[best])
+    total = frame.evaluations + used + len(poses)
     return replace(
         frame,
         pose=poses[best],
         translation=places[best],
-        cost=cost,
+        cost=least,
         areas=areas[:, best],
         evaluations=total,
-        trace=np.vstack([frame.trace, [total, cost]]),
-        posterior=posterior,
+        trace=np.vstack([frame.trace, [total, least]]),
+        posterior=posterior_of(poses, places, costs) if len(poses) > 1 else None,
     )
+
+
+def _open_poses(
+    task: Task, frame: Frame, observation: Observation
+) -> tuple[Array, Array]:
+    """Return the poses (n, 66) and places (n, 3) that a search left open, and others with about such a silhouette.
+
+    One camera hardly shows whether a person leans towards it or away, and which leg is in front. Each pose is followed
+    by its reflections; poses whose legs or arms are exchanged come after all of these.
+    """
+    skeleton = task.body.skeleton
+    poses = frame.pose[None]
+    places = frame.translation[None]
+    if frame.posterior is not None:
+        poses = frame.posterior.poses
+        places = frame.posterior.translations
+    reflected = [
+        reflected_poses(skeleton, poses, facing(camera, frame.translation))
+        for camera in known_views(task.cameras, observation.silhouettes)
+    ]
+    exchanged = [
+        exchanged_limbs(skeleton, poses, "legs"),
+        exchanged_limbs(skeleton, poses, "arms"),
+    ]
+    groups = [
+        np.stack([poses, *reflected], axis=1),  # (modes, 1 + views, 66)
+        np.stack(exchanged, axis=1),
+    ]
+    every = [group.reshape(-1, group.shape[2]) for group in groups]
+    repeated = [np.repeat(places, group.shape[1], axis=0) for group in groups]
+    return np.concatenate(every), np.concatenate(repeated)
