@@ -19,7 +19,7 @@ import sqlite3
 import stat
 import zipfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -136,6 +136,10 @@ class Ledger:
     def __contains__(self, key: str) -> bool:
         return self._places.get(key, (0, False))[1]
 
+    def done(self) -> set[str]:
+        """Return the keys of the finished cells."""
+        return {key for key, (_, done) in self._places.items() if done}
+
     @property
     def changed(self) -> float:
         """When its latest file was written, in seconds since 1970."""
@@ -250,6 +254,7 @@ class Writer:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._elsewhere = 0  # cells of the plan that another file has done
         _check_place(self.path)
         with ExitStack() as opened:
             try:
@@ -307,11 +312,19 @@ class Writer:
         except sqlite3.Error as error:
             raise _unwritable(self.path, error) from None
 
-    def plan(self, cells: Iterable[Cell]) -> None:
-        """Add the cells of a plan, which may be there already; `planned` and `counts` are of these."""
+    def plan(
+        self, cells: Iterable[Cell], elsewhere: Container[str] = frozenset()
+    ) -> None:
+        """Add the cells of a plan, which may be there already; `planned` and `counts` are of these.
+
+        Those with a key in `elsewhere` are done in another file: they are counted, and not added.
+        """
         with self.transaction():
             for cell in cells:
-                self.add(cell)
+                if cell.key in elsewhere:
+                    self._elsewhere += 1
+                else:
+                    self.add(cell)
 
     def add(self, cell: Cell) -> None:
         """Add one cell of a plan."""
@@ -335,7 +348,9 @@ class Writer:
     def counts(self) -> Counter[str]:
         """Return how many of the plan's cells are planned, done and quarantined."""
         query = "SELECT status, count(*) FROM planned JOIN cells USING (key) GROUP BY status"
-        return Counter(dict(self._db.execute(query).fetchall()))
+        counts = Counter(dict(self._db.execute(query).fetchall()))
+        counts["done"] += self._elsewhere
+        return +counts
 
     def cell(self, place: int) -> Cell:
         """Return the cell in a place."""

@@ -19,7 +19,7 @@ import pytest
 from posefit.errors import InputError
 from posefit.registry import registry
 from posefit.sweep.cell import other_version
-from posefit.sweep.command import swept
+from posefit.sweep.command import cells_of, swept
 from posefit.sweep.ledger import (
     ATTEMPTS,
     FILE,
@@ -511,6 +511,29 @@ def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(
         assert len(merged) == 5
         assert seeds == [0, 1, 2, 3, 4]
         assert joints["truth"][0, 0, 0] == 4.0
+
+
+def test_a_plan_that_grows_and_a_run_without_shards_repeat_nothing(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "results"
+    shards = [f"{k}/3" for k in (1, 2, 3)]
+    ran = 0
+    for count in (20, 30):
+        parts = [list(cells_of(cells(count), shard)) for shard in shards]
+        assert all(parts)
+        together = sorted(cell.seed for part in parts for cell in part)
+        assert together == list(range(count))
+        for shard in shards:
+            ran += swept(cells(count), folder, Instant(), print, shard=shard).ran
+        assert ran == count
+    # all in one, after a shard that was ended before it wrote anything
+    (folder / "ledger-1-of-4.sqlite").touch()
+    tally = swept(cells(32), folder, Instant(), print)
+    assert (tally.cells, tally.done, tally.ran) == (32, 32, 2)
+    assert swept(cells(32), folder, Instant(), print).ran == 0
+    (folder / "ledger-1-of-4.sqlite").unlink()
+    assert len(rows_in(folder)) == 32
 
 
 def test_a_name_changes_no_key_and_the_latest_plans_name_counts(tmp_path: Path) -> None:
