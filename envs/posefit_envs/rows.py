@@ -120,14 +120,15 @@ class VectorRows(Rows):
             observations, rows = self._vector.reset(seed=seeds, options=chosen or None)
             self._begun = True
             for i in np.flatnonzero(alike).tolist():
-                infos[i] = rows[i]
+                infos[i] = _plain(rows[i])
             waiting &= ~alike
         return observations, infos
 
     def step(self, actions: Any) -> tuple[Any, Any, Flags, list[Infos]]:
         """Step all rows; by SAME_STEP those that ended have begun again by themselves, see `begun`."""
-        observations, rewards, terminated, truncated, infos = self._vector.step(actions)
+        observations, rewards, terminated, truncated, rows = self._vector.step(actions)
         ended = terminated | truncated
+        infos = [_plain(row) for row in rows]
         self.truncated = truncated & ~terminated
         self.begun = observations, infos
         if self.mode is AutoresetMode.SAME_STEP and ended.any():
@@ -143,3 +144,16 @@ class VectorRows(Rows):
         if name in ("action_space", "observation_space"):
             return [getattr(self._vector, f"single_{name}")] * self.count
         return list(self._vector.unwrapped.get_attr(name))
+
+
+def _plain(info: Infos) -> Infos:
+    """Return infos as a single environment has them: numbers of Python instead of NumPy's."""
+    plain: Infos = {}
+    for name, value in info.items():
+        if isinstance(value, dict):
+            plain[name] = _plain(value)
+        elif isinstance(value, np.generic):
+            plain[name] = value.item()
+        else:
+            plain[name] = value
+    return plain

@@ -1,8 +1,9 @@
 """Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,7 +156,8 @@ class Stage:
     def set_scene(self, row: int, scene: Scene) -> None:
         """Let a row be a scene of the world, without a body."""
         self._has_body[row] = False
-        for column, value in zip(self._columns, scene, strict=True):
+        columns: Sequence[NDArray[Any]] = self._columns
+        for column, value in zip(columns, scene, strict=True):
             column[row] = value
         pixels = np.unpackbits(scene.masks, axis=1, count=self._width)
         np.multiply(pixels, OBSERVED, out=self._backdrops[row], dtype=np.uint16)

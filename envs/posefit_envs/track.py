@@ -47,7 +47,8 @@ class Sequence:
 
     def scene(self, problem: Problem) -> Scene:
         """Return the scene of the current frame's problem."""
-        return Scene.of(problem.cost, self.instance.truth.poses[self.frame])
+        cost: Any = problem.cost
+        return Scene.of(cost, self.instance.truth.poses[self.frame])
 
     def commit(self, proposal: Array) -> bool:
         """Commit a proposal (d,) to the current frame and go on; return whether it was the last frame."""

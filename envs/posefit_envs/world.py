@@ -43,6 +43,7 @@ from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
+from posefit.silhouette.drawn import uncounted
 
 SPLITS = {"train": TRAINING, "test": HELD_OUT}
 YAWS = ("guessed", "unknown")
@@ -387,10 +388,9 @@ def instance(
     noise = dict(world.noise)
     observations = []
     for pose, place in zip(truth.poses, truth.translations, strict=True):
-        masks = [
-            corrupted(project(body, camera, pose, place), noise, rng)
-            for camera in cameras
-        ]
+        with uncounted():  # to render the truth is no evaluation
+            shown = [project(body, camera, pose, place) for camera in cameras]
+        masks = [corrupted(mask, noise, rng) for mask in shown]
         observations.append(
             Observation([Silhouette.of(mask) for mask in masks], place.copy())
         )

@@ -189,7 +189,7 @@ def _with_true_cost(
     place = np.asarray(frame.translation, np.float64)[None]
     # without bits that it may change
     observed = [replace(silhouette) for silhouette in observation.silhouettes]
-    with uncounted():  # what is checked is no effort of the tracker
+    with uncounted():  # to check a frame is no evaluation
         costs, counts = pose_costs(
             task.body, task.cameras, observed, pose, place, audit.beta
         )
