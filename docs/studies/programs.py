@@ -98,7 +98,7 @@ def installed(program: str, folder: Path, python: str) -> Path:
     own = place.resolve() / "bin" / "python"
     if not (place / "done").exists():
         subprocess.run([python, "-m", "venv", "--clear", place], check=True)
-        pip = [own, "-m", "pip", "install", "--quiet", *VERSIONS[program]]
+        pip = [str(own), "-m", "pip", "install", "--quiet", *VERSIONS[program]]
         subprocess.run(pip, check=True)
         (place / "done").touch()
     return own
@@ -106,7 +106,7 @@ def installed(program: str, folder: Path, python: str) -> Path:
 
 def read(program: str, python: Path, folder: Path) -> Iterator[tuple[str, str]]:
     """Yield each file that a program reads, and what is wrong with it, nothing, or a dash."""
-    words = [python, READER, program, folder.resolve()]
+    words = [str(python), str(READER), program, str(folder.resolve())]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     missing = dict.fromkeys(PROGRAMS[program], f"ended with {done.returncode}")
     for line in done.stdout.splitlines():
