@@ -90,7 +90,7 @@ def minimise(
             "factory(space, rng, evaluations=...) or iterations=...",
             stacklevel=2,
         )
-    return problem
+    return problem  # SAPSO A1.3
 
 
 @final
@@ -194,6 +194,7 @@ class Problem:
         A call does this itself; it is for those who have the costs already, of several problems in one call.
         """
         # nan is below nothing
+        # SAPSO (5)
         for k in np.flatnonzero(costs < self.best_cost):
             if costs[k] < self.best_cost:
                 self.best_cost = float(costs[k])
