@@ -72,7 +72,8 @@ class Components:
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
-        angles = np.tile(self.mean, (len(latents), 1))
+        angles = np.empty((len(latents), len(self.mean)))
+        angles[:] = self.mean
         # a matrix product's last bits depend on rows and machine
         # SAPSO 2.1.3 recovery
         add_components(writeable(latents), writeable(self.components), angles)
