@@ -58,7 +58,7 @@ def minimise(
 
     Raises:
         BudgetError: the budget does not hold the first population.
-        InputError: the problem has no budget, or no proposal had a cost that is a number.
+        InputError: the problem has no budget, the optimiser proposed nothing, or no cost was a finite number.
 
     >>> import numpy as np
     >>> from posefit import optimiser, suite
@@ -76,6 +76,8 @@ def minimise(
         costs = problem(proposals)  # SAPSO A1.2a
         optimiser.tell(proposals, costs)
     used = problem.evaluations - before
+    if not used and not len(proposals):
+        raise InputError("the optimiser must propose a population, got an empty one")
     if not used:
         raise BudgetError(
             f"evaluations must hold one population of {len(proposals)}, "
@@ -105,8 +107,8 @@ class Problem:
         space: the box, as an optimiser knows it.
         budget: the largest number of evaluations; None for any number.
         repair: moves infeasible proposals (n, d) before they are evaluated; by default they are evaluated as they are.
-        noisy: returns what a call returns, of proposals (n, d) and the number of evaluations before them, where that
-            has noise. The best and the trace are always of `cost`.
+        noisy: where calls return costs with noise, these (n,), of proposals (n, d) and the number of evaluations before
+            them; the best and the trace are always of `cost`.
         targets: costs to be reached, falling.
         id: names the problem in messages.
 

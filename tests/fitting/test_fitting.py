@@ -318,6 +318,8 @@ def test_the_budget_is_used_in_whole_populations() -> None:
         BudgetError, match="evaluations must hold one population of 7, got 6"
     ):
         minimise(Problem(lambda x: x[:, 0], LINE, 6), Walker(7))
+    with pytest.raises(ValueError, match="must propose a population, got an empty"):
+        minimise(Problem(lambda x: x[:, 0], LINE, 6), Walker(0))
     with pytest.raises(ValueError, match="must have a budget to be minimised"):
         minimise(Problem(lambda x: x[:, 0], LINE), Walker(7))
 
