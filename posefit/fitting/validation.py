@@ -36,7 +36,7 @@ class CheckedOptimiser:
         name: str,
         evaluations: int | None = None,
     ) -> None:
-        self._optimiser = optimiser
+        self.plugin = optimiser
         self._space = space
         self._name = name
         self._evaluations, self._first, self._drawn = evaluations, True, PoseCount()
@@ -44,7 +44,7 @@ class CheckedOptimiser:
     def ask(self) -> Array:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
         with self._called("ask"):
-            proposals = self._optimiser.ask()
+            proposals = self.plugin.ask()
         check_population(proposals, self._space, self._name)
         count = len(proposals)
         budget = self._evaluations
@@ -62,14 +62,14 @@ class CheckedOptimiser:
         """Pass the costs on."""
         self._first = False
         with self._called("tell"):
-            self._optimiser.tell(proposals, costs)
+            self.plugin.tell(proposals, costs)
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
         self._space = space
         self._first = True
         with self._called("advance"):
-            self._optimiser.advance(space)  # type: ignore[attr-defined]
+            self.plugin.advance(space)  # type: ignore[attr-defined]
 
     @contextmanager
     def _called(self, what: str) -> Iterator[None]:

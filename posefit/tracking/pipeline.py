@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from posefit.fitting.carried import with_carried
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, on_device
@@ -215,7 +216,7 @@ def track_hypotheses(
                 track_hypothesis(hypothesis, method, ahead, gap, behind), count - done
             ):
                 recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
-                frames.append(frame)
+                frames.append(with_carried(frame, None))
         tracked.append(replace(hypothesis, frames=frames))
     return tracked
 
@@ -234,6 +235,7 @@ def track_hypothesis(
     back and again from there; its frame has the effort of both.
     """
     task = after(hypothesis.task, behind[0]) if behind else hypothesis.task
+    task = replace(task, resumable=True)
     frames = relocalised(task, method.follow, ahead, hypothesis.rng, gap)
     if behind:
         pivot = next(frames)
