@@ -29,15 +29,15 @@ class UnknownError(Exception):
 
 def carried(
     optimiser: Any, space: SearchSpace, rng: np.random.Generator
-) -> dict[str, Any] | None:
-    """Return what a filter holds after a frame, searched in `space`; None where it is no plain values."""
+) -> dict[str, Any]:
+    """Return what a filter holds after a frame, searched in `space`; nothing if it is no plain values."""
     try:
         return {
             "optimiser": _kept(vars(optimiser), space, rng),
             "space": _fields(space),
         }
     except (UnknownError, TypeError):  # one without attributes has no `vars`
-        return None
+        return {}
 
 
 def revived(

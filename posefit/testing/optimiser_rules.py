@@ -12,7 +12,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start, draw_population
 from posefit.fitting.optimiser import Filter, NextFrame, Optimiser, populations
-from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
+from posefit.fitting.validation import BrokenRuleError, Checked
 from posefit.settings import planned
 from posefit.testing import common
 from posefit.testing.common import PluginCase, check_speed, duplicates, unchanged
@@ -235,9 +235,7 @@ def budget(case: Case) -> str:
 def evaluations(case: Case) -> None:
     """All evaluations are the search's: neither ask nor tell draws poses of its own."""
     problem = pose_problem()
-    checked = CheckedOptimiser(
-        case.build(problem.space), problem.space, "the optimiser"
-    )
+    checked = Checked(case.build(problem.space), "the optimiser", problem.space)
     try:
         for _ in case.steps(checked, problem.space, problem.evaluate, 4):
             pass

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from posefit.fitting.carried import with_carried
+from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, on_device
@@ -202,6 +202,11 @@ def track_hypotheses(
             frames = list(hypothesis.frames)
             of_several = f" of {which}, {hypothesis.guess}" if total > 1 else ""
             progress.log(f"going on from frame {done} of {count}{of_several}")
+            if _starts_anew(method, frames):
+                progress.warn(
+                    f"{method.name} starts anew at frame {done}: the frames from there on may be "
+                    "others than those of a track that was not interrupted"
+                )
         elif not done and total > 1:
             progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
@@ -342,6 +347,12 @@ def _hypothesis(
         number, first, scene.yaw, options.first_pose == "given", estimate
     )
     return Hypothesis(guess, task, stream(options.seed, "hypothesis", number))
+
+
+def _starts_anew(method: Method, recorded: Sequence[Frame]) -> bool:
+    """Return whether what a method knew after recorded frames is lost: it is a tracker, or a filter of other values."""
+    kept = [frame.details[CARRIED] for frame in recorded if CARRIED in frame.details]
+    return method.prior is None or (bool(kept) and not kept[-1])
 
 
 def _resumed(

@@ -124,7 +124,7 @@ def test_what_a_plugin_prints_is_in_no_result() -> None:
 def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
     for kind, name, what in (
         ("optimiser", "exits-in-tell", "tell"),
-        ("tracker", "exits-in-track", "it"),
+        ("tracker", "exits-in-track", "track"),
     ):
         ran = posefit(*TRACK, name)
         assert (ran.returncode, ran.stdout) == (2, "")

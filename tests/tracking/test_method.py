@@ -86,7 +86,7 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
     installed: Any,
 ) -> None:
     installed("optimiser", planted.WrongSignature)
-    rule = "it must not fail, got TypeError: .*"
+    rule = "construction must not fail, got TypeError: .*"
     with pytest.raises(
         BrokenRuleError, match=f"^optimiser 'bad' of posefit-bad 1.0: {rule}$"
     ):
@@ -112,7 +112,15 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
         ({"feasible": lambda z: True}, r"feasible must return shape \(3,\), got \(\)"),
         (
             {"transform": lambda angles: 1 / 0},
-            "it must not fail, got ZeroDivisionError",
+            "transform must not fail, got ZeroDivisionError",
+        ),
+        (
+            {"transform": lambda angles: angles @ np.zeros((60, 6))},
+            r"transform must not fail, got ValueError: matmul: .* \(test_method.py:[0-9]+\)",
+        ),
+        (
+            {"inverse_transform": lambda z: np.full((len(z), 63), 0.01)},
+            "inverse_transform must turn joints about their free axes only, got 0.01 rad about the [xyz] axis of [a-z]+",
         ),
         (
             {"low": np.full(6, 9.0)},

@@ -1,5 +1,6 @@
 """A track that was interrupted and goes on has the bits of one that was not, whatever its method."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,18 +9,14 @@ import pytest
 
 import posefit
 from posefit.output.folder import OutputFolder
+from posefit.progress import Progress
 from posefit.registry import registry
+from posefit_filters.annealed import Annealed
 from tests.cases import each
 
 FRAMES = 6
 HOW: dict[str, Any] = {"size": (120, 90), "evaluations": 200}
 OFFERS = registry().offers
-# which learn more than a test has the time for
-TRACKERS = [
-    name
-    for name, offer in OFFERS["tracker"].items()
-    if not offer.missing and name not in ("exemplars", "regression")
-]
 FILTERS = [
     name
     for name, offer in OFFERS["optimiser"].items()
@@ -79,12 +76,47 @@ def test_a_filter_goes_on_with_its_particles(method: str, tmp_path: Path) -> Non
     check_same(method, (1, 2, 4), tmp_path)
 
 
-@each("method", ["sapso", "cma", *(name for name in TRACKERS)])
-def test_a_method_goes_on_as_if_nothing_had_been(method: str, tmp_path: Path) -> None:
+@each("method", ["sapso", "cma", "random"])
+def test_an_optimiser_goes_on_as_if_nothing_had_been(
+    method: str, tmp_path: Path
+) -> None:
     check_same(method, (2, 3), tmp_path)
 
 
 @pytest.mark.slow
 @each("method", OTHERS)
-def test_every_other_method_does(method: str, tmp_path: Path) -> None:
+def test_every_other_optimiser_does(method: str, tmp_path: Path) -> None:
     check_same(method, (3,), tmp_path)
+
+
+class Holds:
+    """A tracker that gives the mean pose, and counts its frames."""
+
+    def __init__(self, task: Any) -> None:
+        self.task = task
+        self.pose = np.concatenate([np.zeros(3), task.angles.mean(axis=0)])
+
+    def track(self, observations: Any, rng: Any) -> Any:
+        for observation in observations:
+            yield posefit.Frame(
+                self.pose, observation.translation, 0.0, np.zeros((1, 3)), 0
+            )
+
+
+class Lists(Annealed):
+    """A filter that holds something else than plain values."""
+
+    def __init__(self, space: Any, rng: Any) -> None:
+        super().__init__(space, rng, evaluations=HOW["evaluations"])
+        self.held = {1, 2}
+
+
+@each("method", [Holds, (Lists, "pca")])
+def test_a_method_that_starts_anew_says_so_when_it_goes_on(
+    method: Any, tmp_path: Path
+) -> None:
+    log: list[str] = []
+    how = {"progress": Progress(log.append)}
+    resumed(method, (2,), tmp_path / "out", **how)
+    (line,) = [line for line in log if "starts anew" in line]
+    assert re.search("(Holds|Lists@pca) starts anew at frame 2: the frames from", line)
