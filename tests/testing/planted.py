@@ -514,7 +514,8 @@ class Remembers(Holds, breaks="used_twice"):
 
     def track(self, observations: Any, rng: Any) -> Any:
         self.count += 1
-        self.pose = self.pose + 0.01 * self.count
+        self.pose = self.pose.copy()
+        self.pose[0] += 0.01 * self.count
         yield from super().track(observations, rng)
 
 
