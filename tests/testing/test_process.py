@@ -129,7 +129,9 @@ def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
         ran = posefit(*TRACK, name)
         assert (ran.returncode, ran.stdout) == (2, "")
         (line,) = [
-            line for line in ran.stderr.splitlines() if line.startswith("posefit: ")
+            line
+            for line in ran.stderr.splitlines()
+            if line.startswith(f"posefit: {kind} ")
         ]
         blame = f"posefit: {kind} '{name}' of posefit-sabotage 1.0: {what}"
         assert line.startswith(f"{blame} must not end the program, got SystemExit: 0")
