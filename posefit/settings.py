@@ -106,9 +106,15 @@ def planned(
     """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
 
     These are `evaluations` itself, and `iterations`, the populations after the first. What is given stays as it is.
+    Raises InputError if the population that is asked for is larger than the budget: it may be larger than the memory.
     """
     known = {setting.name: setting.default for setting in settings_of(factory)}
     filled = dict(chosen)
+    asked = filled.get("population_size")
+    if isinstance(asked, int) and asked > evaluations:
+        raise InputError(
+            f"evaluations must hold one population of {asked}, got {evaluations}"
+        )
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:

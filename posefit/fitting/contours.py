@@ -14,6 +14,7 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
+from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import (
     Mask,
     coarser_camera,
@@ -242,6 +243,7 @@ def fitted(
     places = start[1].copy()
     weights = precisions[np.append([0, 1, 2], 3 + angles)]
     for scale in scales:
+        count_poses(STEP_EVALUATIONS * len(views) * len(poses))
         hessians, gradients, *_ = contour_squares(body, views, poses, places, scale)
         off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
         np.einsum("nii->ni", hessians)[:] += weights  # on the diagonals

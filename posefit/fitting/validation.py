@@ -12,8 +12,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import BudgetError
 from posefit.fitting.prior import Latents
+from posefit.fitting.problem import BudgetError
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton
 from posefit.silhouette.drawn import PoseCount
 

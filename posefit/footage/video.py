@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS, page_count, read_image
-from posefit.footage.readers import numbered
+from posefit.footage.readers import Numbered
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 
@@ -25,9 +25,17 @@ HEAD = 2_000  # bytes at the beginning of a file by which a text is recognised
 SQUARE = 0.02  # by how much the sides of a pixel may differ
 Order = NDArray[np.int64]  # (T,) numbers of frames
 CODE = "mp4v"
+# MPEG-4 counts time in at most so many parts of a second, and OpenCV gives it a rate as
+# a decimal fraction of at most three places
+MAX_TICKS = 65_535
+WRITTEN_RATES = 0.01, 60_000.0  # frames a second of a file that OpenCV writes
 # of the distance between frames: one that comes so much too early or too late is not in
 # its place
 UNEVEN = 0.75
+# seconds that the times of frames are rounded to in many files
+STAMP = 1e-3
+# by which share the length of a film may differ from its rate's without a word
+SAME_RATE = 5e-3
 # times the mean rate: frames are not taken more often, however short some of them are
 DENSEST = 4.0
 # posefit reports once what is wrong with a file; a user may set the variable to get FFmpeg's own messages
@@ -90,7 +98,8 @@ class Video:
         finally:
             capture.release()
         stated = np.isfinite(fps) and 0.0 < fps <= 1000.0
-        order, filmed, rate = _even(_moments(path), fps if stated else FPS)
+        moments = _moments(path)
+        order, filmed, rate = _even(moments, fps if stated else FPS)
         warnings = []
         if across > 0.0 < down and abs(across / down - 1.0) > SQUARE:
             aspect = f"{across / down:.3g} times as wide as high"
@@ -103,11 +112,17 @@ class Video:
                 f"{path}: its frames come at uneven times; it is sampled {rate:.3g} times a second, so that {held} of "
                 f"{len(order)} frames stand for moments without a filmed one, and are held"
             )
-        guesses = (
-            []
-            if stated
-            else [f"{path}: {FPS:g} frames a second, which the file does not state"]
-        )
+        guesses = []
+        by_stamps = rate != (fps if stated else FPS)
+        if not stated:
+            unsaid = (
+                "by its frames' times" if by_stamps else "which the file does not state"
+            )
+            guesses.append(f"{path}: {rate:.4g} frames a second, {unsaid}")
+        elif by_stamps and not uneven:
+            guesses.append(
+                f"{path}: {rate:.4g} frames a second by its frames' times, where its head says {fps:.4g}"
+            )
         size = image.shape[1], image.shape[0]
         video = cls(
             path,
@@ -118,10 +133,10 @@ class Video:
             _order=order,
             _filmed=filmed,
         )
-        # what a file says counts the frames as they were filmed
+        # what a file says counts the frames as they were filmed, often by its length and the rate in its head
         return (
             replace(video, claimed=int(claimed))
-            if 0.0 < claimed < 1e9 and not uneven
+            if 0.0 < claimed < 1e9 and not (uneven or by_stamps)
             else video
         )
 
@@ -133,17 +148,17 @@ class Video:
         return cls(name, fps, size, pictures=images, _order=order, _filmed=order >= 0)
 
     @classmethod
-    def of_pictures(
-        cls, files: Sequence[Path], name: Path, fps: float | None
-    ) -> "Video":
+    def of_pictures(cls, images: Numbered, name: Path, fps: float | None) -> "Video":
         """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
-        frames, guesses = numbered(files, str(name))
+        files = [file for file in images.files if file is not None]
+        guesses = list(images.guesses)
         pictures: list[tuple[Path, int] | Image] = [
             (file, page) for file in files for page in range(page_count(file))
         ]
         image = _picture(pictures[0])
-        filmed = np.array([file is not None for file in frames])
-        order = np.cumsum(filmed) - 1
+        filmed = np.array([file is not None for file in images.files])
+        # a film that begins with missing pictures holds the first one
+        order = np.maximum(np.cumsum(filmed) - 1, 0)
         if len(pictures) > len(files):
             order = np.arange(len(pictures))
             filmed = np.ones(len(pictures), dtype=bool)
@@ -283,8 +298,9 @@ def _even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
     if len(times) < 3 or not (apart > 0.0).all():  # a file that does not say
         return whole, whole >= 0, fps
     mean = float(apart.mean())
-    if np.abs(times - times[0] - mean * whole).max() <= UNEVEN * mean:
-        return whole, whole >= 0, fps
+    off = float(np.abs(times - times[0] - mean * whole).max())
+    if off <= UNEVEN * mean:
+        return whole, whole >= 0, _rate(times, off, fps)
     usual = max(float(np.median(apart)), mean / DENSEST)
     # stamps are rounded
     usual = float(apart.sum() / np.maximum(np.round(apart / usual), 1.0).sum())
@@ -298,18 +314,47 @@ def _even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
     return order, off == least[order], 1.0 / usual
 
 
+def video_rate(fps: float) -> float:
+    """Return the rate that an .mp4 file has for `fps`: 119.88 for 119.8765.
+
+    It is rounded to three decimals up to 65 frames a second, to two up to 655, and to one above.
+    """
+    rate = float(np.clip(fps, *WRITTEN_RATES))
+    digits = next(digits for digits in (3, 2, 1, 0) if rate * 10**digits <= MAX_TICKS)
+    return round(rate, digits)
+
+
+def _rate(times: Array, off: float, stated: float) -> float:
+    """Return how many frames a second come at even times, which are `off` seconds off at most.
+
+    It is the stated rate where the times allow it, or else the nearest whole rate, or 1000 / 1001 of one, that they do.
+    """
+    intervals = len(times) - 1
+    lasted = float(times[-1] - times[0])
+    rate = intervals / lasted
+    # the first and the last may be off by as much
+    slack = max(STAMP + 2.0 * off, SAME_RATE * lasted)
+    for likely in (stated, float(round(rate)), round(rate * 1.001) / 1.001):
+        if likely > 0.0 and abs(intervals / likely - lasted) <= slack:
+            return likely
+    return rate
+
+
 class VideoWriter:
-    """Writes an .mp4 whose number of frames is checked at the end: OpenCV says nothing when the disk is full."""
+    """Writes an .mp4 whose number of frames is checked at the end: OpenCV says nothing when the disk is full.
+
+    Its rate is `video_rate`, which is rounded.
+    """
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
         self._path = path
         self._count = 0
         self._writer = cv2.VideoWriter(
-            opencv_name(path), cv2.VideoWriter.fourcc(*CODE), fps, size
+            opencv_name(path), cv2.VideoWriter.fourcc(*CODE), video_rate(fps), size
         )
         if not self._writer.isOpened():
             raise InputError(
-                f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot"
+                f"expected OpenCV to write {CODE} video, got a build or a disk that cannot"
             )
 
     def write(self, image: Image) -> None:

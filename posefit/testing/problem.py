@@ -5,8 +5,9 @@ from functools import lru_cache
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.prior import Components
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.problem import Problem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -34,9 +35,14 @@ def principal(angles: Array) -> Components:
     return Components(mean, components, latents.min(axis=0), latents.max(axis=0))
 
 
-@lru_cache(maxsize=1)
-def pose_problem() -> PoseProblem:
+def pose_problem(budget: int | None = None) -> Problem:
     """Return the problem: known translation, six components of the walks, viewed from 45 degrees."""
+    cost = _pose_cost()
+    return Problem(cost, cost.space, budget)
+
+
+@lru_cache(maxsize=1)
+def _pose_cost() -> SilhouetteCost:
     motion = built_in.motion("walk", frames=1)
     body = Body.of(motion.skeleton)
     prior = principal(walking_angles())
@@ -47,4 +53,4 @@ def pose_problem() -> PoseProblem:
     silhouette = Silhouette.of(
         project(body, camera, motion.poses[0], motion.translations[0])
     )
-    return PoseProblem(body, [camera], [silhouette], space)
+    return SilhouetteCost(body, [camera], [silhouette], space)
