@@ -270,8 +270,9 @@ class CMAES:
         known = finite_costs(costs)
         mean = self.strategy.mean
         self.home = self.asked[known.argmin()]
-        # HANSEN2016 (B.5): what lies beyond the box costs more than all that is in it,
-        # and the more the farther away it is
+        # what lies beyond the box costs more than all that is in it, and the more the
+        # farther away it is
+        # HANSEN2016 (B.5)
         ranked = np.where(self.beyond > 0.0, known.max() + self.beyond, known)
         learned = self.learned
         # the mean goes on past the end of a circle, and so must what it learns from
