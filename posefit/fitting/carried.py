@@ -98,8 +98,8 @@ def _kept(value: Any, space: Any, rng: Any) -> Any:
     if isinstance(value, Start):
         return {KIND: "start", "values": _kept(vars(value), space, rng)}
     if type(value) in (list, tuple):
-        kept = [_kept(member, space, rng) for member in value]
-        return {KIND: type(value).__name__, "values": kept}
+        members = [_kept(member, space, rng) for member in value]
+        return {KIND: type(value).__name__, "values": members}
     if type(value) is dict and all(type(key) is str for key in value):
         kept = {key: _kept(member, space, rng) for key, member in value.items()}
         return {KIND: "dict", "values": kept}
