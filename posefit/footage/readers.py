@@ -625,10 +625,10 @@ class ValueCounts:
             raise self._several(name, labels)
         threshold = float(labels[0] // 2) if labels else self._half[0]
         # what is far above the only label is no edge of it, as the 255 around the objects of PASCAL VOC
-        most = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
-        if self.highest > most:
-            return _between(threshold, most), [
-                f"{ends}: the person is above {threshold:g}, and what is above {most:g} is not"
+        ceiling = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
+        if self.highest > ceiling:
+            return _between(threshold, ceiling), [
+                f"{ends}: the person is above {threshold:g}, and what is above {ceiling:g} is not"
             ]
         return _above(threshold), [
             f"{ends}: the person is above {threshold:g}, what is between is an edge"
