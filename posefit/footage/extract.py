@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from posefit.errors import InputError
@@ -47,13 +48,18 @@ def extract(
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
         masks, rows, _, warnings, *_ = segmentation.read(progress)
-        with VideoWriter(building / "preview.mp4", video.fps, masks.size) as preview:
-            for k, image in enumerate(
-                video.frames(segmentation.start, segmentation.stop, masks.size)
-            ):
-                preview.write(
-                    _painted(image, masks.silhouette(k), bool(masks.usable[k]))
-                )
+        preview = building / "preview.mp4"
+        try:
+            with VideoWriter(preview, video.fps, masks.size) as writer:
+                for k, image in enumerate(
+                    video.frames(segmentation.start, segmentation.stop, masks.size)
+                ):
+                    silhouette = masks.silhouette(k)
+                    writer.write(_painted(image, silhouette, bool(masks.usable[k])))
+        except (InputError, cv2.error) as error:
+            # such as of a build of OpenCV without the format: the masks are the work
+            preview.unlink(missing_ok=True)
+            warnings = [*warnings, f"preview.mp4 is missing: {error}"]
         _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(rows[0]))

@@ -625,10 +625,10 @@ class ValueCounts:
             raise self._several(name, labels)
         threshold = float(labels[0] // 2) if labels else self._half[0]
         # what is far above the only label is no edge of it, as the 255 around the objects of PASCAL VOC
-        ceiling = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
-        if self.highest > ceiling:
-            return _between(threshold, ceiling), [
-                f"{ends}: the person is above {threshold:g}, and what is above {ceiling:g} is not"
+        limit = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
+        if self.highest > limit:
+            return _between(threshold, limit), [
+                f"{ends}: the person is above {threshold:g}, and what is above {limit:g} is not"
             ]
         return _above(threshold), [
             f"{ends}: the person is above {threshold:g}, what is between is an edge"

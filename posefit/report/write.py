@@ -40,20 +40,20 @@ def write_report(
         from posefit.report.figures import library, write_figures
 
         library("figure")
-    ledger = Ledger(*paths)
-    runs = runs_of(ledger)
-    if runs.kind.name == "search" and figures is not None:
-        raise InputError(
-            "--figures must be given with a sweep of tracks, got one of single searches"
-        )
-    data = data_of(ledger, runs)
-    if out is not None:
-        with replaced_file(out, MARK.encode()) as building:
-            building.write_text(document(data), encoding="utf-8", newline="\n")
-    if figures is not None:
-        write_figures(runs, figures)
-    if csv is not None:
-        write_csv(map(flat, ledger.all_rows()), csv)
+    with Ledger(*paths) as ledger:
+        runs = runs_of(ledger)
+        if runs.kind.name == "search" and figures is not None:
+            raise InputError(
+                "--figures must be given with a sweep of tracks, got one of single searches"
+            )
+        data = data_of(ledger, runs)
+        if out is not None:
+            with replaced_file(out, MARK.encode()) as building:
+                building.write_text(document(data), encoding="utf-8", newline="\n")
+        if figures is not None:
+            write_figures(runs, figures)
+        if csv is not None:
+            write_csv(map(flat, ledger.all_rows()), csv)
     return {
         "out": out,
         **dict(plain({name: data[name] for name in PRINTED if name in data})),

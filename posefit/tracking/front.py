@@ -98,6 +98,7 @@ def track(
             if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
                 scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
+        recorder.begin(scene)
         training = training_motions(clips, scene.fps)
         track = track_scene(
             scene, training, chosen, recorder=recorder, progress=progress

@@ -103,7 +103,7 @@ def track_live(
     with threadpool_limits(1):
         task = task_of(scene, chosen, training)
         method = prepare(chosen, task)
-        task, _, _ = initialise(scene, method, task, chosen, progress)
+        task = initialise(scene, method, task, chosen, progress).task
         hypothesis = Hypothesis(SEARCHED, task, np.random.default_rng(chosen.seed))
         for frame in track_hypothesis(
             hypothesis, method, coming(), method.relocalise_gap

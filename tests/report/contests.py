@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from posefit.report.kind import Contest
+from posefit.report.kind import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.runs import runs_of
 from posefit.report.summary import leader_sentences
@@ -18,9 +18,15 @@ FIRST = cells(1)[0]
 Errors = dict[tuple[str, int, int], float]  # of method, instance and seed
 
 
+def runs_in(path: Path) -> Runs:
+    """Return the runs of a ledger."""
+    with Ledger(path) as ledger:
+        return runs_of(ledger)
+
+
 def contest_in(path: Path) -> Contest:
     """Return the contest of a ledger."""
-    contest = contest_of(runs_of(Ledger(path)))
+    contest = contest_of(runs_in(path))
     assert contest is not None
     return contest
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from posefit.evaluation.measures import BASELINES
+from posefit.evaluation.measures import BASELINES, MEASURES
 from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import run_cell
 from tests.report.contests import FIRST
@@ -35,6 +35,20 @@ def test_every_figure_has_its_place_in_a_row(row):
         **{f"baseline_{name}": row["baselines_degrees"][name] for name in BASELINES},
     }
     assert {name: values[name] for name in expected} == expected
+
+
+def test_a_figure_is_shown_as_that_of_a_single_track_is(row):
+    renamed = {"evaluations_used": "evaluations"}
+    for name, column in COLUMNS.items():
+        raw = row
+        for part in column.path:
+            raw = raw[part]
+        if column.per_frame:
+            raw /= row["spec"]["frames"]
+        place = column.path[0]
+        measure = MEASURES[renamed.get(place, place)]
+        shown = column.measure.factor * column.value(row)
+        assert shown == pytest.approx(measure.factor * raw), name
 
 
 def test_a_row_has_how_often_the_likeliest_mode_was_right(row):

@@ -8,8 +8,6 @@ import pytest
 
 from posefit.report.charts import certainty, convergence, grid, joint_errors
 from posefit.report.leaderboard import contest_of, leaderboard, paired_tests
-from posefit.report.runs import runs_of
-from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result, sure
 from tests.report.contests import (
     FIRST,
@@ -17,6 +15,7 @@ from tests.report.contests import (
     contest_of_errors,
     contest_of_results,
     full,
+    runs_in,
     three_methods,
 )
 
@@ -171,12 +170,8 @@ def test_certainty_is_pooled_over_runs_frame_by_frame(tmp_path: Path) -> None:
 def test_without_errors_there_is_no_contest(tmp_path: Path) -> None:
     assert (
         contest_of(
-            runs_of(
-                Ledger(
-                    ledger(
-                        tmp_path / "results", [result(FIRST, 1.0, error_degrees=None)]
-                    )
-                )
+            runs_in(
+                ledger(tmp_path / "results", [result(FIRST, 1.0, error_degrees=None)])
             )
         )
         is None

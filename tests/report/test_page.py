@@ -12,10 +12,9 @@ import pytest
 
 from posefit.errors import printable
 from posefit.report.repeat import repeat_command
-from posefit.sweep.ledger import Ledger
 from tests.report.browser import EVIL, ledger, opened, result, sure, written
 from tests.report.searched import cell, problems, search_result, searched
-from tests.sweep.fake import cells
+from tests.sweep.fake import cells, rows_in
 
 FIRST = replace(cells(1)[0], frames=4)
 METHODS = 9  # more than there are colours
@@ -270,7 +269,7 @@ def test_hostile_names_are_text_and_commands_repeat_their_rows(
             buttons.nth(k).click()
             commands.add(page.locator("#command").text_content())
             page.locator("#again .close").click()
-        assert commands == {repeat_command(row["spec"]) for row in Ledger(made).rows()}
+        assert commands == {repeat_command(row["spec"]) for row in rows_in(made)}
         buttons.nth(0).click()
         page.locator("#copy").click()
         page.get_by_text("copied").wait_for()

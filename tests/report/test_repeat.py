@@ -14,9 +14,8 @@ import pytest
 from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import run_cell
 from posefit.sweep.check import cell_of, search_of
-from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
-from tests.sweep.fake import cells
+from tests.sweep.fake import cells, rows_in
 
 SMALL: dict[str, Any] = {"frames": 2, "size": [80, 60], "evaluations": 80}
 SPECS: list[dict[str, Any]] = [
@@ -87,7 +86,7 @@ def test_the_command_runs_the_row_again(tmp_path: Path) -> None:
     subprocess.run(
         words, cwd=tmp_path, env=environment, check=True, capture_output=True
     )
-    (row,) = Ledger(tmp_path / "rerun").rows()
+    (row,) = rows_in(tmp_path / "rerun")
     expected = run_cell(cell).row
     for name in ("seconds", "seconds_per_frame", "cpu_seconds_per_frame"):
         row.pop(name), expected.pop(name)

@@ -8,19 +8,18 @@ from typing import Any
 import numpy as np
 
 from posefit.report.kind import Runs
-from posefit.report.runs import distinct, runs_of
+from posefit.report.runs import distinct
 from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import CellResult
-from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
-from tests.report.contests import FIRST, full, results_of
+from tests.report.contests import FIRST, full, results_of, runs_in
 
 SAPSO = replace(FIRST, method="sapso@pca")
 COOLER = replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
 
 
 def read(path: Path, *results: CellResult) -> Runs:
-    return runs_of(Ledger(ledger(path / "results", results)))
+    return runs_in(ledger(path / "results", results))
 
 
 def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_first(

@@ -15,7 +15,7 @@ from posefit.sweep.ledger import Ledger
 from tests.commands import error_of, run
 from tests.files import csv_rows
 from tests.report.browser import data_in, ledger, result, written
-from tests.report.contests import FIRST, baselines, contest_in, sentences
+from tests.report.contests import FIRST, baselines, contest_in, runs_in, sentences
 from tests.report.searched import cell, problems, search_result, searched
 
 LOST = (
@@ -100,7 +100,7 @@ def test_methods_differ_in_settings_budget_and_infeasible_proposals(
         for fields in more
         for i in range(2)
     ]
-    assert sorted(runs_of(Ledger(ledger(tmp_path / "r", made))).methods) == [
+    assert sorted(runs_in(ledger(tmp_path / "r", made)).methods) == [
         "pso (budget 100, infeasible reject)",
         "pso (budget 100, infeasible repair)",
         "pso (budget 30, infeasible repair)",
@@ -110,8 +110,10 @@ def test_methods_differ_in_settings_budget_and_infeasible_proposals(
 
 def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> None:
     # 9 + 2 and 9; 9 and 9 + 1
-    results = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))
-    data = data_of(results, runs_of(results))
+    with Ledger(
+        searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2))
+    ) as results:
+        data = data_of(results, runs_of(results))
     assert [chart["title"] for chart in data["charts"]] == [
         "All functions",
         "1 single image",

@@ -13,7 +13,7 @@ from posefit.sweep.plan import Plan
 from tests.cases import each
 from tests.commands import error_of, printed, run
 from tests.report.browser import ledger, result
-from tests.sweep.fake import cells
+from tests.sweep.fake import cells, rows_in
 
 PLAN = """
 [defaults]
@@ -55,7 +55,7 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(
     }  # fmt: skip
     assert again.stderr == "8 of 8 cells are done already\n"
     assert run("sweep", plan, "--out", out, "--quiet").stderr == ""
-    rows = list(Ledger(out).rows())
+    rows = rows_in(out)
     assert {row["spec"]["method"] for row in rows} == {"sapso@pca", "random@full"}
     sapso = next(row for row in rows if row["spec"]["method"] == "sapso@pca")
     assert sapso["spec"]["settings"] == {"sapso.cooling": 0.9}
@@ -65,7 +65,8 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(
     )
     assert set(sapso["skill"]) == {"mean_pose", "persistence", "nearest"}
     assert (sapso["evaluations_used"], sapso["dimensions"]) == (2 * 80, 9)
-    assert Ledger(out).joints(sapso["key"])["estimate"].shape == (2, 27, 3)
+    with Ledger(out) as ledger:
+        assert ledger.joints(sapso["key"])["estimate"].shape == (2, 27, 3)
 
 
 def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:
@@ -119,6 +120,10 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(
         (["PLAN", "--out", "OUT", "--workers", "1", "--scheduler", "tcp://a:1"], "--workers must not be given with --scheduler"),
         (["PLAN", "--out", "OUT", "--shard", "3/2"], "--shard must be I/N such as 2/8, got 3/2"),
         (["PLAN", "--out", "OUT", "--shard", "2"], "--shard must be I/N such as 2/8, got 2"),
+        (["PLAN", "--dry-run", "--shard", "3/2"], "--shard must be I/N such as 2/8, got 3/2"),
+        (["PLAN", "--dry-run", "--shard", "a/b"], "--shard must be I/N such as 2/8, got a/b"),
+        (["PLAN", "--dry-run", "--shard", "0/2"], "--shard must be I/N such as 2/8, got 0/2"),
+        (["PLAN", "--dry-run", "--shard", "1/0", "--json"], "--shard must be I/N such as 2/8, got 1/0"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "0"], "the limit of seconds must lie in 0.001 to 1e+08, got 0.0"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "inf"], "the limit of seconds must lie in 0.001 to 1e+08, got inf"),
         (["PLAN", "--out", "OUT", "--cell-gigabytes", "1e30"], "limit of gigabytes must lie in 0.001 to 1e+06, got 1e+30"),
