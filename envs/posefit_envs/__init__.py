@@ -17,7 +17,7 @@ and `to_sb3_vec_env` adapts a vector environment to Stable-Baselines3.
 | FitImage-v0, Track-v0 | fit.py, track.py |
 | Race-v0: racing | race.py |
 | single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
-| arguments and numbered instances (as in sweeps: `posefit.motion.instance`) | instance.py |
+| arguments and numbered instances (as in sweeps: `posefit.motion.instances`) | instance.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
 | rendering | rendering.py |
 | optimisers that search an environment; policies | driving.py, policies.py |

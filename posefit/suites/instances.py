@@ -21,7 +21,7 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
 from posefit.motion.instances import TRAINING, generator
 from posefit.silhouette.corruption import corrupted
-from posefit.silhouette.cost import mean_over_views, project
+from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.suites.boxes import (
     CONSTANT,
@@ -79,7 +79,8 @@ class SuiteInstance:
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) without noise: the means over the frames."""
-        return mean_over_views([frame(proposals) for frame in self.frames])
+        costs = [frame(proposals) for frame in self.frames]
+        return np.asarray(np.mean(costs, axis=0))
 
     def evaluate_noisy(self, proposals: Array, first: int) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) with noise: the evaluations from number `first` on."""
@@ -249,6 +250,8 @@ def _noisy(draft: _Draft) -> SuiteInstance:
             mask,
             dict(zip(DAMAGES, rng.uniform(0.0, STRENGTH, len(DAMAGES)), strict=True)),
             rng,
+            # the instances of a published suite stay as they are
+            shows=False,
         )
         noisy.append(replace(made.frames[0], silhouettes=[Silhouette.of(damaged)]))
     return replace(made, noisy=noisy)

@@ -137,9 +137,8 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         [optimiser] if prior is None else [optimiser, prior], options.settings
     )
     plugin_settings.setdefault("prior", {})
-    planned = settings.planned(
-        optimiser.factory, plugin_settings["optimiser"], task.evaluations
-    )
+    stated = plugin_settings["optimiser"]
+    planned = settings.planned(optimiser.factory, stated, task.evaluations)
     plugin_settings["optimiser"] = settings.check(
         optimiser.name, optimiser.factory, planned
     )
@@ -164,10 +163,14 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     tilt = prediction.tilted(learned, task.training)
 
     def build(task: Task) -> Tracker:
-        def optimiser_of(space: Space, rng: np.random.Generator) -> Optimiser:
+        def optimiser_of(
+            space: Space, rng: np.random.Generator, evaluations: int = task.evaluations
+        ) -> Optimiser:
+            # schedules follow the budget
+            values = settings.planned(optimiser.factory, stated, evaluations)
             with _rules(optimiser):
-                made = optimiser.factory(space, rng, **plugin_settings["optimiser"])
-            return CheckedOptimiser(made, space, optimiser.label, task.evaluations)
+                made = optimiser.factory(space, rng, **values)
+            return CheckedOptimiser(made, space, optimiser.label, evaluations)
 
         return SynthesisTracker(
             task, learned, optimiser_of, optimiser.next_frame, prediction, tilt

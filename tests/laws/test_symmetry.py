@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.fitting.problem import align
+from posefit.fitting.cost import align
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import rotation_from_root_angles, wrapped
