@@ -21,8 +21,8 @@ from posefit.geometry.rotation import wrapped
 from posefit.motion.instances import instance_number
 from posefit.reading import quoted, suggestion
 from posefit_envs.rendering import MODES, Picture, check_mode
-from posefit_envs.stage import Rows
-from posefit_envs.world import ArgumentError, World, checked, world_of
+from posefit_envs.stage import Drawn, Rows, Stage
+from posefit_envs.world import ArgumentError, Instance, World, checked, world_of
 
 Flags = NDArray[np.bool_]  # (n,)
 Infos = dict[str, Any]
@@ -106,6 +106,20 @@ def error_degrees(truth: Array, pose: Array) -> Any:
     return np.degrees(np.abs(wrapped(truth - pose))).mean(axis=-1)
 
 
+def proposal_infos(
+    stage: Stage, drawn: Drawn, numbers: NDArray[np.int64], errors: bool
+) -> Infos:
+    """Return the infos (n, ...) of proposals that were drawn, by name; with `errors` against the truth."""
+    infos: Infos = {
+        "cost": drawn.costs.copy(),
+        "areas": drawn.areas,
+        "instance": numbers.copy(),
+    }
+    if errors:
+        infos["error_degrees"] = error_degrees(stage.truths, drawn.poses)
+    return infos
+
+
 def checked_options(
     options: Mapping[str, Any] | None, known: Sequence[str]
 ) -> Mapping[str, Any]:
@@ -141,6 +155,12 @@ class SearchEnv(Env[Any, Any], ABC):
         self.check_reset()
         assert self._problem is not None
         return self._problem
+
+    @property
+    def instance(self) -> Instance:
+        """The episode's instance. Raises gymnasium.error.ResetNeeded before the first reset."""
+        instance: Instance = self.problem.instance
+        return instance
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with the problem's own: a problem alone is not sent where its evaluations get lost."""
@@ -209,6 +229,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
     single_action_space: Box
+    _problems: Problems
 
     def __init__(
         self,
@@ -399,9 +420,10 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         return problem if name == "problem" else getattr(problem, name)
 
     @property
-    @abstractmethod
     def problems(self) -> Problems:
-        """The problem of each environment, as `posefit.Problems`."""
+        """The problems whose evaluations the steps are. Raises gymnasium.error.ResetNeeded before the first reset."""
+        self.check_reset()
+        return self._problems
 
     @abstractmethod
     def begin(self, rows: Rows) -> None:

@@ -17,7 +17,7 @@ from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_envs.rows import AnyEnv, Rows
+from posefit_envs.rows import AnyEnv, rows_of
 from posefit_envs.track import TrackEnv, committed_infos
 
 
@@ -31,7 +31,7 @@ class FitImageSteps:
     def __init__(self, env: AnyEnv) -> None:
         _check_actions_reach(env)
         self._env = env
-        self._rows = Rows.of(env)
+        self._rows = rows_of(env)
         self._numbers: list[int] = []
 
     def begin(
@@ -76,14 +76,12 @@ def _check_actions_reach(env: AnyEnv) -> None:
             )
         wrapper = wrapper.env
     try:
-        (space, *_) = Rows.of(env).attribute("action_space")
-        names = Rows.of(env).attribute("max_evaluations")
+        (space, *_) = rows_of(env).attribute("action_space")
+        rows_of(env).attribute("max_evaluations")
     except AttributeError:
-        names = []
-    if not names:
         raise error.Error(
             f"env must be posefit/FitImage-v0, got {type(env.unwrapped).__name__}"
-        )
+        ) from None
     if (space.low != -1.0).any() or (space.high != 1.0).any():
         raise error.Error(f"env must take proposals in [-1, 1], got actions in {space}")
 

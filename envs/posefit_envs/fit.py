@@ -14,16 +14,16 @@ from posefit_envs.base import (
     Infos,
     SearchEnv,
     SearchVectorEnv,
-    error_degrees,
     image_spaces,
+    proposal_infos,
     reward_of_cost,
+    row_of,
 )
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Rows, Stage, first_scene
 from posefit_envs.world import (
     FirstFrame,
     Image,
-    Instance,
     World,
     checked,
     first_problem,
@@ -131,16 +131,11 @@ class FitImageEnv(SearchEnv):
         self._cost = float(drawn.costs[0])
         reward = float(reward_of_cost(self._cost))
         self.ended = not problem.remaining_evaluations
-        infos = {
-            "cost": self._cost,
-            "areas": drawn.areas[0],
-            "best_cost": problem.best_cost,
-            "evaluations": problem.evaluations,
-            "instance": self.number,
-        }
-        if self.world.errors:
-            errors = error_degrees(self.stage.truths, drawn.poses)
-            infos["error_degrees"] = float(errors[0])
+        numbers = np.array([self.number])
+        infos = proposal_infos(self.stage, drawn, numbers, self.world.errors)
+        infos = row_of(infos, 0)
+        infos["best_cost"] = problem.best_cost
+        infos["evaluations"] = problem.evaluations
         return drawn.pictures[0], reward, False, self.ended, infos
 
     @property
@@ -148,12 +143,6 @@ class FitImageEnv(SearchEnv):
         """The box of the episode's proposals."""
         self.check_reset()
         return self.stage.space(0)
-
-    @property
-    def instance(self) -> Instance:
-        """The episode's instance."""
-        instance: Instance = self.problem.instance
-        return instance
 
     def picture(self) -> Picture:
         """Return the picture of the last proposal."""
@@ -212,23 +201,11 @@ class FitImageVectorEnv(SearchVectorEnv):
         self._costs = drawn.costs
         rewards = reward_of_cost(drawn.costs)
         truncated = problems.evaluations >= self.max_evaluations
-        infos = {
-            "cost": drawn.costs.copy(),
-            "areas": drawn.areas,
-            "best_cost": problems.best_costs.copy(),
-            "evaluations": problems.evaluations.copy(),
-            "instance": self.numbers.copy(),
-        }
-        if self.world.errors:
-            infos["error_degrees"] = error_degrees(self.stage.truths, drawn.poses)
+        infos = proposal_infos(self.stage, drawn, self.numbers, self.world.errors)
+        infos["best_cost"] = problems.best_costs.copy()
+        infos["evaluations"] = problems.evaluations.copy()
         ends = np.zeros_like(truncated), truncated
         return self.end_step(stepping, drawn.pictures, rewards, ends, infos)
-
-    @property
-    def problems(self) -> Problems:
-        """The problems of the episodes, which count the steps. Raises gymnasium.error.ResetNeeded before a reset."""
-        self.check_reset()
-        return self._problems
 
     def picture(self, i: int) -> Picture:
         """Return the picture of the last proposal in environment i."""

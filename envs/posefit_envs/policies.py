@@ -11,7 +11,7 @@ from gymnasium.vector import VectorEnv
 
 from posefit.arrays import Array
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES
-from posefit_envs.rows import AnyEnv, Rows
+from posefit_envs.rows import AnyEnv, rows_of
 
 Policy = Callable[[Any, int], Array]
 
@@ -28,7 +28,7 @@ def rollout(
     a list, the seeds are `seed`, `seed` + 1 and so on, and the policy is called with the observations of all. An
     environment whose episode has ended begins it again until all others have ended.
     """
-    rows = Rows.of(env)
+    rows = rows_of(env)
     numbers = [instance] * rows.count if isinstance(instance, int) else instance
     options = [{"instance": number} for number in numbers]
     seeds = [seed + i for i in range(rows.count)]

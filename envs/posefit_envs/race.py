@@ -28,7 +28,6 @@ from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Rows, Stage, first_scene
 from posefit_envs.world import (
     ArgumentError,
-    Instance,
     World,
     checked,
     first_problem,
@@ -329,12 +328,6 @@ class RaceEnv(SearchEnv):
         self.check_reset()
         return self.races.problems[0]
 
-    @property
-    def instance(self) -> Instance:
-        """The episode's instance."""
-        instance: Instance = self.problem.instance
-        return instance
-
     def picture(self) -> Picture:
         """Return the picture of the best proposal."""
         return self.races.picture(0)
@@ -364,6 +357,7 @@ class RaceVectorEnv(SearchVectorEnv):
             threads=self.threads,
         )
         self.set_spaces(*self.races.spaces)
+        self._problems = self.races.problems
 
     def begin(self, rows: Rows) -> None:
         """Begin episodes in some environments, with the instances of `numbers`."""
@@ -391,12 +385,6 @@ class RaceVectorEnv(SearchVectorEnv):
         observations = self.races.observations()
         ends = terminated, np.zeros_like(terminated)
         return self.end_step(stepping, observations, rewards, ends, infos)
-
-    @property
-    def problems(self) -> Problems:
-        """The problems of the episodes. Raises gymnasium.error.ResetNeeded before the first reset."""
-        self.check_reset()
-        return self.races.problems
 
     def picture(self, i: int) -> Picture:
         """Return the picture of the best proposal in environment i."""

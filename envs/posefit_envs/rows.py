@@ -4,7 +4,6 @@
 Gymnasium's SyncVectorEnv or AsyncVectorEnv of any environments.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,43 +18,13 @@ AnyEnv = VectorEnv[Any, Any, Any] | Env[Any, Any]
 Options = Sequence[Mapping[str, Any]]
 
 
-class Rows(ABC):
-    """Environments that are stepped together; infos are a list, an element a row."""
-
-    count: int
-
-    @staticmethod
-    def of(env: AnyEnv) -> "Rows":
-        """Return the rows of a vector, or the only one of a single environment."""
-        return VectorRows(env) if isinstance(env, VectorEnv) else SingleRow(env)
-
-    @abstractmethod
-    def reset(
-        self,
-        seeds: Sequence[int | None] | None,
-        options: Options,
-        mask: Flags | None = None,
-    ) -> tuple[Any, list[Infos]]:
-        """Reset some rows, all by default, each with its own options and seed; return observations and infos.
-
-        Rows that are not reset keep their observations; their infos mean nothing.
-        """
-
-    @abstractmethod
-    def step(self, actions: Any) -> tuple[Any, Any, Flags, list[Infos]]:
-        """Step all rows; return observations, rewards, which episodes have ended, and infos.
-
-        Observations and infos of a row whose episode has ended are the episode's last. Reset it before the next step,
-        whatever the autoreset mode.
-        """
-
-    @abstractmethod
-    def attribute(self, name: str) -> list[Any]:
-        """Return an attribute of each row's environment. Raises AttributeError where they have none of that name."""
+def rows_of(env: AnyEnv) -> "SingleRow | VectorRows":
+    """Return the rows of a vector, or the only row of a single environment."""
+    return VectorRows(env) if isinstance(env, VectorEnv) else SingleRow(env)
 
 
-class SingleRow(Rows):
-    """A single environment."""
+class SingleRow:
+    """A single environment, as a vector of one row; `VectorRows` says what its methods do."""
 
     count = 1
 
@@ -86,8 +55,8 @@ class SingleRow(Rows):
         return [getattr(self._env.unwrapped, name)]
 
 
-class VectorRows(Rows):
-    """A vector environment."""
+class VectorRows:
+    """A vector environment, row by row; infos are a list, an element a row."""
 
     def __init__(self, vector: VectorEnv[Any, Any, Any]) -> None:
         self.count = vector.num_envs
@@ -105,7 +74,10 @@ class VectorRows(Rows):
         options: Options,
         mask: Flags | None = None,
     ) -> tuple[Any, list[Infos]]:
-        """Reset some rows, those with the same options in one call."""
+        """Reset some rows, all by default, each with its own options and seed; return observations and infos.
+
+        Rows that are not reset keep their observations; their infos mean nothing.
+        """
         seeds = [None] * self.count if seeds is None else list(seeds)
         waiting = np.ones(self.count, dtype=bool) if mask is None else mask.copy()
         infos: list[Infos] = [{} for _ in range(self.count)]
@@ -125,7 +97,11 @@ class VectorRows(Rows):
         return observations, infos
 
     def step(self, actions: Any) -> tuple[Any, Any, Flags, list[Infos]]:
-        """Step all rows; by SAME_STEP those that ended have begun again by themselves, see `begun`."""
+        """Step all rows; return observations, rewards, which episodes have ended, and infos.
+
+        Observations and infos of a row whose episode has ended are the episode's last. Reset it before the next step,
+        whatever the autoreset mode; by SAME_STEP it has also begun again by itself, see `begun`.
+        """
         observations, rewards, terminated, truncated, rows = self._vector.step(actions)
         ended = terminated | truncated
         infos = [_plain(row) for row in rows]
@@ -140,7 +116,7 @@ class VectorRows(Rows):
         return observations, rewards, ended, infos
 
     def attribute(self, name: str) -> list[Any]:
-        """Return an attribute of each environment."""
+        """Return an attribute of each environment. Raises AttributeError where they have none of that name."""
         if name in ("action_space", "observation_space"):
             return [getattr(self._vector, f"single_{name}")] * self.count
         return list(self._vector.unwrapped.get_attr(name))

@@ -53,12 +53,12 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
 
         def step_wait(self) -> Any:
             observations, rewards, done, infos = rows.step(self._actions)
+            infos = [dict(info) for info in infos]
+            for info, truncated in zip(infos, rows.truncated.tolist(), strict=True):
+                info["TimeLimit.truncated"] = truncated
             if done.any():
-                infos = [dict(info) for info in infos]
-                truncated = rows.truncated
                 for i in np.flatnonzero(done).tolist():
                     infos[i]["terminal_observation"] = observations[i].copy()
-                    infos[i]["TimeLimit.truncated"] = bool(truncated[i])
                 fresh, fresh_infos = rows.begun
                 if rows.mode is not AutoresetMode.SAME_STEP:
                     fresh, fresh_infos = rows.reset(None, no_options, done)

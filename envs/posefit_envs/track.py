@@ -15,9 +15,10 @@ from posefit_envs.base import (
     Infos,
     SearchEnv,
     SearchVectorEnv,
-    error_degrees,
     image_spaces,
+    proposal_infos,
     reward_of_cost,
+    row_of,
 )
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Rows, Scene, Stage
@@ -135,16 +136,11 @@ class TrackEnv(SearchEnv):
         self._cost = float(drawn.costs[0])
         observation = drawn.pictures[0]
         reward = float(reward_of_cost(self._cost))
-        infos = {
-            "cost": self._cost,
-            "areas": drawn.areas[0],
-            "best_cost": problem.best_cost,
-            "evaluations": problem.evaluations,
-            "instance": self.number,
-        }
-        if self.world.errors:
-            errors = error_degrees(self.stage.truths, drawn.poses)
-            infos["error_degrees"] = float(errors[0])
+        numbers = np.array([self.number])
+        infos = proposal_infos(self.stage, drawn, numbers, self.world.errors)
+        infos = row_of(infos, 0)
+        infos["best_cost"] = problem.best_cost
+        infos["evaluations"] = problem.evaluations
         if not problem.remaining_evaluations:
             poses, places = self.stage.decode(problem.best[None, None], rows)
             infos |= committed_infos(
@@ -238,15 +234,9 @@ class TrackVectorEnv(SearchVectorEnv):
         problems.count(rows, proposals[rows, None], drawn.costs[rows, None])
         self._costs = drawn.costs
         rewards = reward_of_cost(drawn.costs)
-        infos = {
-            "cost": drawn.costs.copy(),
-            "areas": drawn.areas,
-            "best_cost": problems.best_costs.copy(),
-            "evaluations": problems.evaluations.copy(),
-            "instance": self.numbers.copy(),
-        }
-        if self.world.errors:
-            infos["error_degrees"] = error_degrees(self.stage.truths, drawn.poses)
+        infos = proposal_infos(self.stage, drawn, self.numbers, self.world.errors)
+        infos["best_cost"] = problems.best_costs.copy()
+        infos["evaluations"] = problems.evaluations.copy()
         full = stepping & (problems.evaluations >= self.evaluations_per_frame)
         terminated, committed = self._commit(np.flatnonzero(full), drawn.pictures)
         infos["frame"] = self._frames()
@@ -285,12 +275,6 @@ class TrackVectorEnv(SearchVectorEnv):
         """Return the current frame (n,) of each environment."""
         frames = [self._sequences[i].frame for i in range(self.num_envs)]
         return np.minimum(frames, self.frames - 1)
-
-    @property
-    def problems(self) -> Problems:
-        """The problems of the frames, which count the steps. Raises gymnasium.error.ResetNeeded before a reset."""
-        self.check_reset()
-        return self._problems
 
     def row_attribute(self, name: str, i: int) -> Any:
         """Return an attribute that environment i has for itself."""

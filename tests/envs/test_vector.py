@@ -334,11 +334,6 @@ def test_stable_baselines3_chooses_environments_by_indices() -> None:
         ):
             call()
     adapted.close()
-    same = gym.make_vec(
-        "CartPole-v1", 2, "sync", {"autoreset_mode": AutoresetMode.SAME_STEP}
-    )
-    with pytest.raises(error.Error, match="autoreset_mode must be NEXT_STEP, got"):
-        to_sb3_vec_env(same)
 
 
 def test_the_package_is_light_to_import() -> None:

@@ -19,6 +19,7 @@ from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import drive, drive_each, to_sb3_vec_env
 from posefit_envs.policies import rollout
+from posefit_envs.rows import VectorRows
 from posefit_envs.world import first_problem, world_of
 
 MODES = list(AutoresetMode)
@@ -205,6 +206,20 @@ def test_a_rollout_of_episodes_of_several_lengths_keeps_each() -> None:
         for row, single in zip(rows, expected, strict=True):
             assert np.array_equal(row["rewards"], single["rewards"])
     assert len(lengths) == COUNT, "seeds whose episodes are as long try nothing"
+
+
+@pytest.mark.parametrize(("form", "mode"), FIT_FORMS)
+def test_each_row_resets_with_its_own_options(form: str, mode: AutoresetMode) -> None:
+    singles = [gym.make(FIT, **NAMES[FIT]) for _ in range(COUNT)]
+    with made(form, mode, FIT) as vector:
+        rows = VectorRows(vector)
+        for seeds, numbers in (([5, 6], [17, 4]), (None, [4, 17]), ([7, None], [3, 3])):
+            options = [{"instance": number} for number in numbers]
+            observations, infos = rows.reset(seeds, options)
+            for i, single in enumerate(singles):
+                seed = None if seeds is None else seeds[i]
+                expected = single.reset(seed=seed, options=options[i])
+                assert data_equivalence((observations[i], infos[i]), expected)
 
 
 @pytest.mark.parametrize(("form", "mode"), FIT_FORMS)
