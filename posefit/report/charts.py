@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.report.columns import mean
 from posefit.report.kind import Contest
-from posefit.statistics.means import MIN_RUNS, Intervals, mean_intervals
+from posefit.statistics.means import Intervals, block_means
 from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
 
@@ -106,23 +106,10 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
                 for used, best in traces
             ]
         )
-        means = run_intervals(contest, costs.T)
+        means = block_means(costs.T, contest.instance)
         return Line(points, means.values, means.low, means.high)
 
     return [line(rows) for rows in contest.blocks]
-
-
-def run_intervals(contest: Contest, values: Array) -> Intervals:
-    """Return the means of values (rows, blocks) with their intervals, which are for other seeds of the instances.
-
-    Fewer than 8 runs have no interval.
-    """
-    blocks = len(contest.instance)
-    means = mean_intervals(values, contest.instance, np.arange(blocks))
-    if blocks >= MIN_RUNS:
-        return means
-    unknown = np.full(len(means.values), np.nan)
-    return Intervals(means.values, unknown, unknown)
 
 
 def joint_errors(contest: Contest) -> list[Intervals]:
@@ -131,7 +118,7 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     if not np.isfinite(joints).all():
         return []
     return [
-        run_intervals(contest, method_errors.T.astype(np.float64))
+        block_means(method_errors.T.astype(np.float64), contest.instance)
         for method_errors in joints
     ]
 

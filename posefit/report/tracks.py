@@ -19,6 +19,7 @@ from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed, mean
 from posefit.report.kind import Contest, Kind, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
+from posefit.statistics.means import block_means
 from posefit.uncertainty.calibration import BINS
 
 LOSS = "error_with_losses_degrees"
@@ -208,7 +209,7 @@ class Tracks:
         A skill is 1 - the row's error with losses / the baseline's error on the same runs.
         """
         figures = contest.runs.figures
-        intervals = charts.run_intervals(contest, contest.scores)
+        intervals = block_means(contest.scores, contest.instance)
         shared = {row["baseline"]: row[LOSS] for row in self.baseline_rows(contest)}
         board: dict[int, dict[str, Any]] = {}
         for m in range(len(contest.runs.methods)):

@@ -1,6 +1,7 @@
 """What `posefit report` does: a page, and on request figures, tables and files for other tools."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -60,28 +61,28 @@ def write_report(
 
         check_folder(figures)
         library("figure")
-    ledger = Ledger(*paths)
-    runs = runs_of(ledger, methods, latest=latest)
-    if runs.kind.name == "search" and figures is not None:
-        raise InputError(
-            "--figures must be given with a sweep of tracks, got one of single searches"
-        )
-    data = data_of(ledger, runs)
-    if latex is not None and "leaderboard" not in data:
-        raise InputError("--latex must be of runs with errors, got none")
-    if out is not None:
-        with replaced_file(out, MARK.encode()) as building:
-            building.write_text(document(data), encoding="utf-8", newline="\n")
-    if figures is not None:
-        write_figures(runs, figures)
-    if csv is not None:
-        with replaced_file(csv, CSV_MARK.encode()) as building:
-            building.unlink()
-            write_csv(_csv_rows(ledger, runs.kind), building)
-    if latex is not None:
-        with replaced_file(latex, LATEX_MARK.encode()) as building:
-            text = latex_table(runs.kind.score, data["leaderboard"])
-            building.write_text(text, encoding="utf-8", newline="\n")
+    with closing(Ledger(*paths)) as ledger:
+        runs = runs_of(ledger, methods, latest=latest)
+        if runs.kind.name == "search" and figures is not None:
+            raise InputError(
+                "--figures must be given with a sweep of tracks, got one of single searches"
+            )
+        data = data_of(ledger, runs)
+        if latex is not None and "leaderboard" not in data:
+            raise InputError("--latex must be of runs with errors, got none")
+        if out is not None:
+            with replaced_file(out, MARK.encode()) as building:
+                building.write_text(document(data), encoding="utf-8", newline="\n")
+        if figures is not None:
+            write_figures(runs, figures)
+        if csv is not None:
+            with replaced_file(csv, CSV_MARK.encode()) as building:
+                building.unlink()
+                write_csv(_csv_rows(ledger, runs.kind), building)
+        if latex is not None:
+            with replaced_file(latex, LATEX_MARK.encode()) as building:
+                text = latex_table(runs.kind.score, data["leaderboard"])
+                building.write_text(text, encoding="utf-8", newline="\n")
     return {
         "out": out,
         "kind": runs.kind.name,

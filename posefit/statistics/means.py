@@ -58,9 +58,19 @@ def run_means(errors: ArrayLike) -> Intervals:
     array = finite("errors", errors, ("methods", "instances", "seeds"))
     methods, instances, seeds = array.shape
     strata = np.repeat(np.arange(instances), seeds)
-    return mean_intervals(
-        array.reshape(methods, -1), strata, np.arange(instances * seeds)
-    )
+    runs = array.reshape(methods, -1)
+    return block_means(runs, strata)
+
+
+def block_means(runs: ArrayLike, instances: ArrayLike) -> Intervals:
+    """Return the means of runs (methods, n), of which each belongs to an instance (n,): see `run_means`."""
+    array = np.asarray(runs)
+    count = array.shape[1]
+    means = mean_intervals(array, instances, np.arange(count))
+    if count >= MIN_RUNS:
+        return means
+    unknown = np.full(len(array), np.nan)
+    return Intervals(means.values, unknown, unknown)
 
 
 def mean_interval(

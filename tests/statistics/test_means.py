@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from posefit.statistics.means import mean_interval
+from posefit.statistics.means import mean_interval, run_means
+from tests.cases import each
+from tests.statistics.studies import DRAWS, SHAPES, studies, truth
 
 
 def test_of_one_stratum_of_single_values_it_is_students_interval() -> None:
@@ -68,3 +71,57 @@ def test_unequal_lengths_and_values_that_are_not_finite_are_refused() -> None:
         mean_interval([1.0, 2.0], [0], [0, 1])
     with pytest.raises(ValueError, match="values must be finite"):
         mean_interval([1.0, math.nan], [0, 0], [0, 1])
+
+
+STUDIES = 4000  # by chance the share that hold the truth is off by 0.35 %
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("kind", DRAWS)
+def test_intervals_of_runs_hold_the_truth(kind: str, shape: tuple[int, int]) -> None:
+    draw, mean = DRAWS[kind]
+    runs = studies(draw, shape, STUDIES, np.random.default_rng(12))
+    means = run_means(runs)
+    true = truth(mean, shape[0])
+    inside = np.mean((means.low <= true) & (true <= means.high))
+    assert 0.92 <= inside <= 0.98
+
+
+def test_an_interval_of_runs_is_satterthwaites_of_two_instances_by_hand() -> None:
+    # variances of the instances' means: 2 / 4 and 8 / 4; of the mean of both (0.5 + 2) / 4 = 0.625, with
+    # 2.5^2 / (0.5^2 / 3 + 2^2 / 3) = 4.411765 degrees of freedom
+    first = [1.0, 1.0, 3.0 + math.sqrt(0.5), 3.0 - math.sqrt(0.5)]
+    deviations = np.array(first) - 2.0
+    deviations *= math.sqrt(2.0 / np.var(first, ddof=1))
+    means = run_means([[2.0 + deviations, 6.0 + 2.0 * deviations]])
+    assert means.values[0] == pytest.approx(4.0)
+    reach = stats.t.ppf(0.975, 4.411765) * math.sqrt(0.625)
+    assert means.high[0] - 4.0 == pytest.approx(reach)
+    assert 4.0 - means.low[0] == pytest.approx(reach)
+
+
+def test_differences_between_instances_do_not_widen_the_interval_of_runs() -> None:
+    runs = np.random.default_rng(1).normal(size=(1, 8, 10))
+    apart = runs + 1000.0 * np.arange(8)[:, None]
+    near, far = (run_means(errors) for errors in (runs, apart))
+    assert far.high - far.low == pytest.approx(near.high - near.low)
+
+
+def test_one_seed_or_fewer_than_eight_runs_give_no_interval() -> None:
+    for errors in ([[[1.0], [3.0]]], np.ones((1, 20, 1)), np.ones((1, 3, 2))):
+        means = run_means(errors)
+        assert np.isnan([means.low[0], means.high[0]]).all()
+    assert run_means(np.ones((1, 4, 2))).low[0] == 1.0
+
+
+@each(
+    ("errors", "message"),
+    [
+        (np.ones((2, 3)), r"must have shape \(methods, instances, seeds\), got \(2, 3\)"),
+        (np.ones((2, 0, 3)), r"must have shape .*, got \(2, 0, 3\)"),
+        ([[[1.0, np.nan]]], "errors must be finite, got 1 that are not"),
+    ],
+)  # fmt: skip
+def test_invalid_errors_are_refused(errors: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        run_means(errors)  # type: ignore[arg-type]
