@@ -1,5 +1,6 @@
 """The leaderboard as a table: as the command prints it, as CSV, and as LaTeX."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -104,4 +105,11 @@ def latex_table(score: Score, board: Sequence[Row]) -> str:
 
 def _latex_row(texts: Sequence[str]) -> str:
     escapes: Mapping[int, str] = str.maketrans(_LATEX)
-    return " & ".join(text.translate(escapes) for text in texts) + r" \\"
+    cells = []
+    for text in texts:
+        if text == "-":
+            cells.append("--")
+        else:
+            # a number's sign is no hyphen
+            cells.append(re.sub(r"^-(?=\d)", "−", text).translate(escapes))
+    return " & ".join(cells) + r" \\"

@@ -257,12 +257,11 @@ class Tracks:
         if not known:
             return []
         best = min(known, key=lambda row: float(row[LOSS]))
-        text = (
-            f"best baseline, the {BASELINES[best['baseline']]}, has {best[LOSS]:.2f}°."
-        )
+        name = BASELINES[best["baseline"]]
+        value = f"{best[LOSS]:.2f}°"
         if best[LOSS] > first[LOSS]:
-            return [f"The {text}"]
-        return [f"It does not beat the baselines: the {text}"]
+            return [f"The best baseline, the {name}, has {value}."]
+        return [f"It does not beat the baselines: the {name} has {value}."]
 
     def page(self, runs: Runs, contest: Contest | None, /) -> dict[str, Any]:
         """Return the charts, the joints, the uncertainty and the rows, and the list of sections."""
