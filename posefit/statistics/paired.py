@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from posefit.arrays import Array
-from posefit.statistics.means import CONFIDENCE
 from posefit.statistics.pairing import finite
 
 SIGNIFICANCE = 0.05
@@ -29,7 +28,8 @@ class PairedTest:
     first: int
     second: int
     difference: float  # mean of first - second, below 0 where the first is better
-    low: float  # of the difference's 95 % interval, nan for fewer than 6 blocks
+    # of the difference's 95 % interval, adjusted as p is; nan where so few blocks can show nothing
+    low: float
     high: float
     p_value: float
     adjusted: float  # Holm's, for all comparisons made together
@@ -45,8 +45,9 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
     simulated studies, this one in 7 %.
 
     p is at least 2 / 2^n for n blocks, which is the least that signs alone can give: so fewer than 6 blocks show
-    nothing, however equal their differences are. Holm's adjustment (1979) is over all pairs. `blocks_needed` is for a
-    power of 80 % at Bonferroni's level, with the difference and the spread that were found.
+    nothing, however equal their differences are. Holm's adjustment (1979) is over all pairs. Intervals are adjusted in
+    the same way, so that one excludes 0 just where the adjusted p is below 0.05. `blocks_needed` is for
+    a power of 80 % at Bonferroni's level, with the difference and the spread that were found.
 
     Args:
         errors: Finite numbers (methods, instances, seeds), of at least two methods and two blocks.
@@ -78,12 +79,15 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
         scale = np.abs(runs).max(initial=0.0)
         spreads[spreads < 1e-12 * scale] = 0.0
         p_values = np.maximum(_p_values(means, spreads, blocks), least_p)
+    accumulated = _accumulated(p_values)
+    adjusted = np.minimum(1.0, accumulated)
     reach = np.full(len(pairs), np.nan)
-    if least_p < SIGNIFICANCE:
-        t = stats.t.ppf(0.5 + CONFIDENCE / 2.0, blocks - 1)
+    if least_p * len(pairs) < SIGNIFICANCE:
+        # as Holm judges each difference at a level of its own, which is stricter than 5 %
+        levels = SIGNIFICANCE * p_values / accumulated
+        t = stats.t.ppf(1.0 - levels / 2.0, blocks - 1)
         reach = t * spreads / math.sqrt(blocks)
     needed = _blocks_needed(means, spreads)
-    adjusted = holm(p_values)
     table = zip(
         pairs,
         means.tolist(),
@@ -118,9 +122,13 @@ def _blocks_needed(means: Array, spreads: Array) -> Array:
 
 def holm(p_values: ArrayLike) -> Array:
     """Return p-values (m,) adjusted so that all m may be judged at one level. Holm, 1979."""
-    p = np.asarray(p_values, dtype=np.float64)
-    order = np.argsort(p, kind="stable")
-    factors = np.arange(len(p), 0, -1)
-    adjusted = np.empty_like(p)
-    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * factors))
-    return adjusted
+    return np.minimum(1.0, _accumulated(np.asarray(p_values, dtype=np.float64)))
+
+
+def _accumulated(p_values: Array) -> Array:
+    """Return Holm's products of p-values (m,) and the numbers of comparisons that are left, not cut at 1."""
+    order = np.argsort(p_values, kind="stable")
+    factors = np.arange(len(p_values), 0, -1)
+    products = np.empty_like(p_values)
+    products[order] = np.maximum.accumulate(p_values[order] * factors)
+    return products

@@ -23,18 +23,18 @@ from tests.report.contests import (
 WHERE = "on 6 instances of walk with 2 seeds each"
 
 
-def reach_of(differences: list[float]) -> float:
-    """Return half of Student's 95 % interval of a mean."""
+def reach_of(differences: list[float], comparisons: int) -> float:
+    """Return half of Student's 95 % interval of a mean, at a level that holds for some comparisons together."""
     count = len(differences)
     spread = float(np.std(differences, ddof=1)) / math.sqrt(count)
-    return float(stats.t.ppf(0.975, count - 1)) * spread
+    return float(stats.t.ppf(1.0 - 0.025 / comparisons, count - 1)) * spread
 
 
 def test_what_leads_what_by_how_much_and_how_certain_that_is(tmp_path: Path) -> None:
     contest = contest_of_errors(tmp_path, three_methods())
     first = leaderboard(contest)[0]
     # b is behind by 1, 1.02 and 1.04 in turn: p is below 1e-12
-    reach = reach_of([1.0, 1.02, 1.04] * 4)
+    reach = reach_of([1.0, 1.02, 1.04] * 4, 3)
     low, high = 1.02 - reach, 1.02 + reach
     assert sentences(contest) == [
         "a lost frames in none of 12 tracks and has an error with losses of 1.26° "

@@ -54,6 +54,32 @@ def test_p_is_at_least_what_signs_alone_can_give(blocks):
     assert math.isnan(pair.low) == (blocks < 6)
 
 
+def test_an_interval_excludes_0_just_where_the_adjusted_p_is_below_5_percent():
+    rng = np.random.default_rng(11)
+    shown = 0
+    for _ in range(40):
+        offsets = rng.normal(0.0, 0.7, 5)[:, None, None]
+        for pair in paired_tests(rng.normal(size=(5, 4, 4)) + offsets):
+            excludes = pair.low > 0.0 or pair.high < 0.0
+            assert excludes == (pair.adjusted < 0.05)
+            shown += excludes
+    assert 40 < shown < 360
+
+
+def test_intervals_are_at_holms_levels():
+    # of three differences the clearest is judged at a third of 5 %, the next one at half of it, the last one at 5 %
+    errors = np.random.default_rng(2).normal(size=(3, 24, 1))
+    errors += np.array([0.0, 0.6, 1.0])[:, None, None]
+    made = sorted(paired_tests(errors), key=lambda pair: pair.p_value)
+    ps = [pair.p_value for pair in made]
+    assert 2.0 / 2**24 < 3 * ps[0] < 2 * ps[1] < ps[2]
+    runs = errors[:, :, 0]
+    for level, pair in zip((0.05 / 3, 0.05 / 2, 0.05), made, strict=True):
+        values = runs[pair.first] - runs[pair.second]
+        expected = stats.ttest_1samp(values, 0.0).confidence_interval(1.0 - level)
+        assert (pair.low, pair.high) == pytest.approx(tuple(expected))
+
+
 def test_methods_that_are_equal_differ_by_nothing():
     (pair,) = paired_tests(np.ones((2, 3, 3)))
     assert (pair.difference, pair.p_value, pair.low, pair.high) == (0.0, 1.0, 0.0, 0.0)

@@ -31,7 +31,7 @@ function comparison() {
       about: "Below 0 the chosen method is better",
       down: true,
     }),
-    intervalColumn("Of the mean difference, from six runs on", "difference", 2, ["from", "to"]),
+    intervalColumn("Of the mean difference, adjusted as p after Holm is", "difference", 2, ["from", "to"]),
     column("p", "p", probability),
     column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P?.pairs.length} comparisons` }),
     textColumn("verdict", verdict),
