@@ -1,10 +1,18 @@
-"""Simulated studies whose truth is known: instances, some harder than others, some noisier."""
+"""Simulated studies whose truth is known: instances, some harder than others, some noisier.
+
+    python -m tests.statistics.studies
+
+prints how often the 95 % intervals of a report hold the truth.
+"""
 
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
+
+from posefit.report.tracks import MIN_LOST
+from posefit.statistics.means import Intervals, run_means
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, tuple[int, ...]], Array]
@@ -61,3 +69,45 @@ def truth(mean: float, instances: int) -> float:
     """Return the mean of all runs that there could be, of draws with a mean."""
     hardness = np.linspace(2.0, 6.0, instances)
     return float((hardness + np.resize(NOISE, instances) * mean).mean())
+
+
+def holds(means: Intervals, true: float) -> NDArray[np.bool_]:
+    """Return which intervals hold the truth."""
+    return (means.low <= true) & (true <= means.high)
+
+
+def coverage(draw: Draw, mean: float, shape: tuple[int, int], count: int) -> float:
+    """Return the share of studies whose interval holds the truth."""
+    runs = studies(draw, shape, count, np.random.default_rng(12))
+    return float(holds(run_means(runs), truth(mean, shape[0])).mean())
+
+
+def shown_coverage(lost_share: float, shape: tuple[int, int], count: int) -> float:
+    """Return the share that hold the truth of the intervals that a report shows, where a share of runs is lost.
+
+    For a method that lost none the truth is the mean of runs that are not lost.
+    """
+    rng = np.random.default_rng(13)
+    lost = rng.random((count, *shape)) < lost_share
+    noise = np.resize(NOISE, shape[0])[:, None]
+    runs = studies(_gamma, shape, count, rng) + noise * LOSS * lost
+    means = run_means(runs)
+    counts = lost.sum(axis=(1, 2))
+    true = holds(means, truth(1.0 + LOSS * lost_share, shape[0]))
+    if_never_lost = holds(means, truth(1.0, shape[0]))
+    inside = np.where(counts == 0, if_never_lost, true)
+    return float(inside[(counts == 0) | (counts >= MIN_LOST)].mean())
+
+
+def main() -> None:
+    """Print a table of the shares, in percent."""
+    count = 10_000
+    for shape in SHAPES:
+        shares = [coverage(draw, mean, shape, count) for draw, mean in DRAWS.values()]
+        shares += [shown_coverage(lost, shape, count) for lost in (0.15, 0.05)]
+        cells = " | ".join(f"{100 * share:.1f}" for share in shares)
+        print(f"| {shape[0]} x {shape[1]} | {cells} |")
+
+
+if __name__ == "__main__":
+    main()
