@@ -7,8 +7,9 @@
 
 `fit` takes one mask, `compare` runs a small sweep, `suite` numbers problems for a benchmark. The pieces: `Skeleton`,
 `Body` and `Camera` describe the person and the view; `Silhouette` an observation; `SearchSpace` the box that optimisers
-search; `PoseProblem` the cost; `minimise` the loop; `SynthesisTracker` follows a sequence. What the author of a plugin
-imports is in `posefit.plugin`. Each name is imported when it is first used.
+search; `SilhouetteCost` what a proposal costs; `Problem` counts the evaluations and remembers the best; `minimise` is
+the loop; `SynthesisTracker` follows a sequence. What the author of a plugin imports is in `posefit.plugin`. Each name
+is imported when it is first used.
 """
 
 from pluggy import HookimplMarker

@@ -4,12 +4,13 @@ from pluggy import HookimplMarker
 
 from posefit.fitting.box import Space as Space
 from posefit.fitting.box import Start as Start
+from posefit.fitting.cost import SilhouetteCost as SilhouetteCost
 from posefit.fitting.optimiser import Filter as Filter
-from posefit.fitting.optimiser import Minimum as Minimum
 from posefit.fitting.optimiser import Optimiser as Optimiser
-from posefit.fitting.optimiser import minimise as minimise
 from posefit.fitting.prior import Prior as Prior
-from posefit.fitting.problem import PoseProblem as PoseProblem
+from posefit.fitting.problem import BudgetSpentError as BudgetSpentError
+from posefit.fitting.problem import Problem as Problem
+from posefit.fitting.problem import minimise as minimise
 from posefit.fitting.space import SearchSpace as SearchSpace
 from posefit.fitting.tracker import Frame as Frame
 from posefit.fitting.tracker import Observation as Observation
@@ -43,7 +44,6 @@ from posefit.silhouette.cuda.device import moved_to as moved_to
 from posefit.silhouette.mask import Silhouette as Silhouette
 from posefit.statistics.means import run_means as run_means
 from posefit.statistics.paired import paired_tests as paired_tests
-from posefit.suites.problem import Problem as Problem
 from posefit.suites.problem import Suite as Suite
 from posefit.suites.problem import suite as suite
 from posefit.suites.running import run_of as run_of

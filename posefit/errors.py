@@ -1,6 +1,8 @@
-"""The error that a mistake of the user raises, as opposed to a fault of the program."""
+"""What a mistake of the user raises, as opposed to a fault of the program, and the warning that a plugin is broken."""
 
 import re
+import warnings
+from typing import Any
 
 _LONG = re.compile(r"\S{300,}")  # longer than any one name of a file
 
@@ -28,3 +30,22 @@ class InputError(ValueError):
 
     def __init__(self, message: object = "") -> None:
         super().__init__(printable(str(message)))
+
+
+class PluginWarning(UserWarning):
+    """A plugin is left out; the message, on one line, names it and says why."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(printable(" ".join(str(message).split())))
+
+
+def warn_in_one_line() -> None:
+    """Have this process show a `PluginWarning` as one line, without the place in posefit where it was given."""
+    usual = warnings.formatwarning
+
+    def formatted(message: Any, category: type[Warning], *place: Any) -> str:
+        if issubclass(category, PluginWarning):
+            return f"posefit: {message}\n"
+        return usual(message, category, *place)
+
+    warnings.formatwarning = formatted  # type: ignore[assignment]

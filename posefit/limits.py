@@ -22,6 +22,8 @@ AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
 PARENT_POLL_SECONDS = 0.5
 # seconds, for a timer that should have ended meanwhile; 0 would switch it off
 SOON = 1e-6
+# seconds until an alarm that came before the body comes again
+EARLY = 1e-3
 # the variable of `check_decoded`, and its default
 DECODED = "POSEFIT_DECODED_GIGABYTES"
 DECODED_GIGABYTES = 4.0
@@ -36,43 +38,59 @@ class _OvertimeError(BaseException):
     """Ends what takes too long; no Exception, which it might swallow."""
 
 
-@contextmanager
-def timed(limit: float | None) -> Iterator[None]:
-    """Raise TimeoutError in the body once it has run for `limit` seconds.
+class timed:  # noqa: N801, a context as those of contextlib
+    """Raise TimeoutError in the body of a `with` once it has run for `limit` seconds; None is no limit.
 
     That needs an operating system with timers, and a body that runs Python in the main thread: elsewhere, and inside a
     call of compiled code that does not return, there is no limit. An earlier limit of a caller's holds as well, and
     goes on afterwards.
     """
-    if (
-        limit is None
-        or not hasattr(signal, "setitimer")
-        or threading.current_thread() is not threading.main_thread()
-    ):
-        yield
-        return
-    callers = signal.getitimer(signal.ITIMER_REAL)[0]
-    if callers and callers <= limit:
-        yield
-        return
 
-    def stop(_: int, __: FrameType | None) -> None:
-        raise _OvertimeError
+    def __init__(self, limit: float | None) -> None:
+        self._limit = limit
+        self._runs = False
 
-    began = time.monotonic()
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, limit, AGAIN)
-    try:
-        yield
-    except _OvertimeError as overtime:
-        raise TimeoutError from overtime  # whose traceback says where it was
-    finally:
+    def __enter__(self) -> None:
+        if (
+            self._limit is None
+            or not hasattr(signal, "setitimer")
+            or threading.current_thread() is not threading.main_thread()
+        ):
+            return
+        self._callers = signal.getitimer(signal.ITIMER_REAL)
+        if 0.0 < self._callers[0] <= self._limit:
+            return
+        self._began = time.monotonic()
+        self._before = signal.signal(signal.SIGALRM, self._stop)
+        self._runs = True
+        signal.setitimer(signal.ITIMER_REAL, self._limit, AGAIN)
+
+    def _stop(self, _: int, frame: FrameType | None) -> None:
+        """End the body. An alarm may come while it is entered or left, and would then end the caller instead."""
+        own = [method.__code__ for method in (timed.__enter__, timed.__exit__)]
+        outside = False
+        while frame is not None and not outside:
+            outside = frame.f_code in own and frame.f_locals["self"] is self
+            frame = frame.f_back
+        if not self._runs:
+            return
+        if outside:
+            signal.setitimer(signal.ITIMER_REAL, EARLY, AGAIN)
+        else:
+            raise _OvertimeError
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        if not self._runs:
+            return
+        self._runs = False
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGALRM, self._before)
+        callers, again = self._callers
         if callers:
-            signal.setitimer(
-                signal.ITIMER_REAL, max(callers - (time.monotonic() - began), SOON)
-            )
+            left = callers - (time.monotonic() - self._began)
+            signal.setitimer(signal.ITIMER_REAL, max(left, SOON), again)
+        if isinstance(error, _OvertimeError):
+            raise TimeoutError from error  # whose traceback says where it was
 
 
 def end_with_parent(parent: int) -> None:

@@ -19,13 +19,13 @@ from posefit.fitting.check import one_of as one_of
 from posefit.fitting.check import positive as positive
 from posefit.fitting.check import whole as whole
 from posefit.fitting.contours import contour_fit as contour_fit
+from posefit.fitting.cost import align as align
 from posefit.fitting.optimiser import Adapter as Adapter
 from posefit.fitting.optimiser import Filter as Filter
 from posefit.fitting.optimiser import Optimiser as Optimiser
 from posefit.fitting.optimiser import check_tell as check_tell
 from posefit.fitting.optimiser import finite_costs as finite_costs
 from posefit.fitting.prior import Prior as Prior
-from posefit.fitting.problem import align as align
 from posefit.fitting.tracker import Frame as Frame
 from posefit.fitting.tracker import Initialiser as Initialiser
 from posefit.fitting.tracker import Observation as Observation

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
 import pluggy
 
 from posefit import hooks
-from posefit.errors import InputError
+from posefit.errors import InputError, PluginWarning
 from posefit.hooks import PROJECT
 from posefit.reading import quoted, suggestion
-from posefit.settings import Setting, settings_of
+from posefit.settings import Setting, check_hints, settings_of
 from posefit.version import posefit_build, source_digest
 
 if TYPE_CHECKING:
@@ -227,6 +227,7 @@ def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
             raise InputError(
                 f"a factory must have a name of its own, got {name}, which a plugin has registered"
             )
+        check_hints(f"optimiser {name!r}", factory)
         _own[name] = Plugin(
             name,
             OWN,
@@ -321,7 +322,9 @@ def load(
         plugins.append(plugin)
         if plugin.state == "broken":
             warnings.warn(
-                f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}",
+                PluginWarning(
+                    f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}"
+                ),
                 stacklevel=2,
             )
     return tuple(plugins)
@@ -386,7 +389,9 @@ def _offers(
             raise InputError(
                 f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}"
             )
-        add(f"{kind} {name!r}", Offer(kind, name, factory, owner, release, **more))
+        label = f"{kind} {name!r}"
+        add(label, Offer(kind, name, factory, owner, release, **more))
+        check_hints(label, factory)
 
     for kind in kinds:
         register = command if kind == COMMAND else partial(method, kind)

@@ -1,13 +1,14 @@
 """The settings of a plugin: read from its signature, so that a mistake is reported before anything runs."""
 
 import inspect
+import json
 import re
 import textwrap
-import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any
 
+from posefit import hints
 from posefit.errors import InputError
 from posefit.reading import quoted, suggestion
 
@@ -30,21 +31,30 @@ class Setting:
     @property
     def type(self) -> str:
         """The type as it is shown: `float`, or the choices there are."""
-        return _shown(self.annotation, self.default)
+        return hints.shown(self.annotation, self.default)
 
 
 def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     """Return the settings that a factory takes, in the order of its signature."""
-    try:
-        signature = inspect.signature(factory, eval_str=True)
-    # an annotation that cannot be resolved is no annotation
-    except (NameError, TypeError, ValueError):
-        signature = inspect.signature(factory)
+    # the others may be hints of names that only a type checker imports
     return tuple(
-        Setting(parameter.name, parameter.annotation, parameter.default)
-        for parameter in signature.parameters.values()
+        Setting(
+            parameter.name,
+            hints.resolved(factory, parameter.annotation),
+            parameter.default,
+        )
+        for parameter in inspect.signature(factory).parameters.values()
         if parameter.kind is inspect.Parameter.KEYWORD_ONLY
     )
+
+
+def check_hints(plugin: str, factory: Callable[..., Any]) -> None:
+    """Raise InputError, naming the plugin and the setting, if values cannot be checked by a setting's type."""
+    for setting in settings_of(factory):
+        if not hints.checkable(setting.annotation):
+            raise InputError(
+                f"{plugin}: the type of the setting {setting.name} must be {hints.KNOWN}, got {setting.type}"
+            )
 
 
 def settings_in(text: str) -> dict[str, tuple[str, str]]:
@@ -81,12 +91,12 @@ def check(
     values = {}
     for name, value in chosen.items():
         setting = _known(plugin, name, known)
-        plain = _plain(value)
-        if not accepts(setting.annotation, plain):
+        try:
+            values[name] = hints.fitted(setting.annotation, _plain(value))
+        except hints.UnfitError:
             raise InputError(
                 f"{plugin}.{name} must be {setting.type}, got {quoted(value)}"
-            )
-        values[name] = plain
+            ) from None
     return values
 
 
@@ -96,9 +106,15 @@ def planned(
     """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
 
     These are `evaluations` itself, and `iterations`, the populations after the first. What is given stays as it is.
+    Raises InputError if the population that is asked for is larger than the budget: it may be larger than the memory.
     """
     known = {setting.name: setting.default for setting in settings_of(factory)}
     filled = dict(chosen)
+    asked = filled.get("population_size")
+    if isinstance(asked, int) and asked > evaluations:
+        raise InputError(
+            f"evaluations must hold one population of {asked}, got {evaluations}"
+        )
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:
@@ -132,14 +148,12 @@ def parse(
     values = {}
     for name, text in chosen.items():
         setting = _known(plugin, name, known)
-        readings = [
-            value for value in _readings(text) if accepts(setting.annotation, value)
-        ]
-        if not readings:
+        try:
+            values[name] = hints.read(setting.annotation, text)
+        except hints.UnfitError:
             raise InputError(
                 f"{plugin}.{name} must be {setting.type}, got {quoted(text)}"
-            )
-        values[name] = readings[0]
+            ) from None
     return values
 
 
@@ -169,41 +183,19 @@ def settings_text(settings: Mapping[str, Any]) -> list[str]:
 
 
 def setting_text(value: Any) -> str:
-    """Return a setting's value as `--set` takes it."""
+    """Return a setting's value as `--set` takes it: numbers with commas between them, other lists as JSON has them."""
     if isinstance(value, bool) or value is None:
         return str(value).lower()
-    if isinstance(value, list | tuple):
-        return ",".join(map(setting_text, value))
-    return str(value)
-
-
-def accepts(annotation: Any, value: Any) -> bool:
-    """Return whether a value fits an annotation; one that is not understood accepts everything."""
-    origin = get_origin(annotation)
-    if origin is Literal:
-        return value in get_args(annotation)
-    if origin in (Union, types.UnionType):
-        return any(accepts(member, value) for member in get_args(annotation))
-    if origin is tuple:
-        parts: tuple[Any, ...] = get_args(annotation)
-        return (
-            isinstance(value, tuple)
-            and len(value) == len(parts)
-            and all(map(accepts, parts, value))
-        )
-    if annotation in (None, type(None)):
-        return value is None
-    if annotation is float:
-        return isinstance(value, float | int) and not isinstance(value, bool)
-    if annotation is int:
-        return isinstance(value, int) and not isinstance(value, bool)
-    return not (annotation in (bool, str) and not isinstance(value, annotation))
+    if not isinstance(value, list | tuple):
+        return str(value)
+    numbers = all(type(member) in (int, float) for member in value)
+    return ",".join(map(str, value)) if value and numbers else json.dumps(value)
 
 
 def _plain(value: Any) -> Any:
-    """Return a number of NumPy as Python's own, in a tuple too; anything else as it is."""
-    if isinstance(value, tuple):
-        return tuple(map(_plain, value))
+    """Return a number of NumPy as Python's own, in a tuple or a list too; anything else as it is."""
+    if type(value) in (tuple, list):
+        return type(value)(map(_plain, value))
     return (
         value.item()
         if type(value).__module__ == "numpy" and not getattr(value, "shape", (0,))
@@ -218,34 +210,3 @@ def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
             f"a setting of {plugin} must be {listed}, got {quoted(name)}{suggestion(name, known)}"
         )
     return known[name]
-
-
-def _readings(text: str) -> list[Any]:
-    """Return everything a text may mean, the most special first."""
-    words: dict[str, Any] = {"true": True, "false": False, "none": None}
-    numbers: list[Any] = []
-    for kind in (int, float):
-        try:
-            numbers.append(kind(text))
-        except ValueError:
-            continue
-    if "," in text:
-        numbers.append(tuple(_readings(part)[0] for part in text.split(",")))
-    return [*([words[text.lower()]] if text.lower() in words else []), *numbers, text]
-
-
-def _shown(annotation: Any, default: Any) -> str:
-    if annotation is inspect.Parameter.empty:
-        return (
-            "any"
-            if default in (None, inspect.Parameter.empty)
-            else type(default).__name__
-        )
-    origin = get_origin(annotation)
-    if origin is Literal:
-        return " | ".join(map(str, get_args(annotation)))
-    if origin in (Union, types.UnionType):
-        return " | ".join(_shown(member, default) for member in get_args(annotation))
-    if annotation is type(None):
-        return "none"
-    return annotation.__name__ if isinstance(annotation, type) else str(annotation)

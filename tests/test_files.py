@@ -182,7 +182,7 @@ def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():
         "import sys\n"
         "sys.modules['fcntl'] = sys.modules['resource'] = None\n"
         "import numpy as np\n"
-        "from posefit import Body, Camera, PoseProblem, Silhouette\n"
+        "from posefit import Body, Camera, SilhouetteCost, Silhouette\n"
         "from posefit.files import Unfinished\n"
         "from posefit.limits import allowed_bytes\n"
         "from posefit.motion import built_in\n"
@@ -190,9 +190,9 @@ def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():
         "body, pose = Body.of(built_in.average_skeleton()), np.zeros((1, 66))\n"
         "camera = Camera.around(np.zeros(3), 0.0, 4.0, (40, 30))\n"
         "observed = Silhouette.of(project(body, camera, pose[0], np.zeros(3)))\n"
-        "print(PoseProblem.__name__, pose_costs(body, [camera], [observed], pose, np.zeros((1, 3)))[0][0])\n"
+        "print(SilhouetteCost.__name__, pose_costs(body, [camera], [observed], pose, np.zeros((1, 3)))[0][0])\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=False
     )
-    assert done.stdout == "PoseProblem 0.0\n", done.stderr
+    assert done.stdout == "SilhouetteCost 0.0\n", done.stderr

@@ -18,7 +18,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers.vector import ResizeObservation, TransformObservation
 
-from posefit import Minimum, PoseProblem, minimise
+from posefit import Problem, minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
@@ -162,21 +162,24 @@ def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]
                 ),
             )
         costs.append(
-            minimum(problem, space, name, training.budget, [training.seed, number]).cost
+            minimum(
+                problem, space, name, training.budget, [training.seed, number]
+            ).best_cost
         )
     return costs if start is None else np.minimum(costs, start["costs"]).tolist()
 
 
 def minimum(
-    problem: PoseProblem, space: Space, name: str, budget: int, seed: Sequence[int]
-) -> Minimum:
-    """Return what an optimiser finds in a space of a problem, with one population where the budget holds no more."""
+    problem: Problem, space: Space, name: str, budget: int, seed: Sequence[int]
+) -> Problem:
+    """Return a problem minimised in a space, with one population where the budget holds no more."""
     factory = registry().optimiser(name)
     settings = planned(
         factory, {"population_size": budget} if budget < 40 else {}, budget
     )
     optimiser = factory(space, np.random.default_rng(seed), **settings)
-    return minimise(problem.evaluate, optimiser, budget, budget_known=True)
+    searched = Problem(problem.cost, space, budget)
+    return minimise(searched, optimiser, budget_known=True)
 
 
 def ppo(vector: Any, seed: int) -> Any:

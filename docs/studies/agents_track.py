@@ -84,7 +84,7 @@ def searched(name: str, budget: int) -> Array:
     costs = []
     for frame in range(FRAMES):
         best = [
-            minimum(problem, problem.space, name, budget, [frame, number]).proposal
+            minimum(problem, problem.space, name, budget, [frame, number]).best
             for number, problem in enumerate(env.unwrapped.problems)
         ]
         for _ in range(2):  # the fewest proposals that commit one

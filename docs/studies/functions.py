@@ -21,7 +21,8 @@ from posefit.cli.output import Command
 from posefit.files import check_new
 from posefit.fitting.box import draw_population
 from posefit.fitting.cma import Strategy, default_population_size
-from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, suite_function
+from posefit.motion.instances import HELD_OUT
+from posefit.suites.functions import FUNCTIONS, SUITE, suite_function
 from posefit.suites.problem import suite
 from posefit.suites.running import run_on
 from posefit_reproduce.jobs import each
@@ -228,7 +229,7 @@ def measured(
     rng = np.random.default_rng([instance, number])
     points = draw_population(problem.space, rng, POINTS)
     truth = np.array(problem.made.truth)
-    row, basins = features(problem.evaluate, problem.noise_free, truth, points, rng)
+    row, basins = features(problem, problem.noise_free, truth, points, rng)
     reached: Shares = {name: [] for name in METHODS}
     for method, costs in reached.items():
         problem.reset()

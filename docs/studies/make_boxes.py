@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
@@ -32,7 +33,7 @@ RANGE = 0.005
 MARGIN = np.radians(5.0)
 
 
-def learned_from(poses: Array) -> dict[str, Array]:
+def learned_from(poses: Array) -> dict[str, NDArray[np.int32]]:
     """Return the statistics of poses (n, 66), as whole multiples of `STEP`."""
     angles = poses[:, 3:]
     mean = np.round(angles.mean(axis=0) / STEP) * STEP
@@ -63,13 +64,11 @@ def learned_from(poses: Array) -> dict[str, Array]:
         "low": np.where(moved, low - MARGIN, mean - CONSTANT),
         "high": np.where(moved, high + MARGIN, mean + CONSTANT),
     }
-    rounded = {
+    learned = {
         name: np.round(value / STEP).astype(np.int32) for name, value in values.items()
     }
-    return {
-        **rounded,
-        "order": np.argsort(-angles.std(axis=0), kind="stable").astype(np.int32),
-    }
+    learned["order"] = np.argsort(-angles.std(axis=0), kind="stable").astype(np.int32)
+    return learned
 
 
 def upright_poses(subjects: tuple[str, ...]) -> Array:

@@ -237,7 +237,9 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
 @click.argument("ledger", type=click.Path(exists=True, path_type=Path))
 @click.argument("out", type=click.Path(file_okay=False, path_type=Path))
 def main(ledger: Path, out: Path) -> None:
-    rows = list(Ledger(ledger).rows())
+    with Ledger(ledger) as opened:
+        rows = list(opened.rows())
+        version = opened.version
     if not rows:
         raise InputError(
             f"{ledger}: expected finished cells of docs/studies/related.toml, got none"
@@ -254,7 +256,7 @@ def main(ledger: Path, out: Path) -> None:
         for of in (condition_of, lambda row: row["spec"]["seed"])
     )
     click.echo(
-        f"{out}: {len(rows):,} tracks, {conditions} conditions, {seeds} seeds, {Ledger(ledger).version}"
+        f"{out}: {len(rows):,} tracks, {conditions} conditions, {seeds} seeds, {version}"
     )
 
 

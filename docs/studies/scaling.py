@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 from posefit.fitting.box import draw_population
-from posefit_reproduce.bench.kernel import bench_problem, fastest
+from posefit_reproduce.bench.kernel import bench_cost, fastest
 
 POSES = 400
 WIDTHS = (80, 160, 320, 640, 1280)
@@ -21,24 +21,24 @@ POPULATIONS = (1, 4, 10, 40, 400)
 @click.command()
 def main() -> None:
     """Print the four curves."""
-    problem = bench_problem()
+    usual = bench_cost()
     curves = {
-        "width, pixels": {width: bench_problem(width=width) for width in WIDTHS},
-        "views": {views: bench_problem(views=views) for views in VIEWS},
-        "dimensions": {m + 3: bench_problem(components=m) for m in COMPONENTS},
-        "population": dict.fromkeys(POPULATIONS, problem),
+        "width, pixels": {width: bench_cost(width=width) for width in WIDTHS},
+        "views": {views: bench_cost(views=views) for views in VIEWS},
+        "dimensions": {m + 3: bench_cost(components=m) for m in COMPONENTS},
+        "population": dict.fromkeys(POPULATIONS, usual),
     }
-    for name, problems in curves.items():
-        counts = {x: x if name == "population" else POSES for x in problems}
+    for name, costs_of in curves.items():
+        counts = {x: x if name == "population" else POSES for x in costs_of}
         jobs = {
             str(x): partial(
-                own.evaluate,
+                own,
                 draw_population(own.space, np.random.default_rng(0), counts[x]),
             )
-            for x, own in problems.items()
+            for x, own in costs_of.items()
         }
         took = fastest(jobs)
-        costs = {x: 1e6 * took[str(x)] / counts[x] for x in problems}
+        costs = {x: 1e6 * took[str(x)] / counts[x] for x in costs_of}
         click.echo(
             f"| {name} | "
             + " | ".join(f"{x}: {cost:.3g}" for x, cost in costs.items())

@@ -180,23 +180,21 @@ def evaluations() -> None:
         posterior = Lookup(task).posterior(observation)
         spaces = {"blind": space, "from the start": space}
         if posterior is not None:
-            problem = posefit.PoseProblem(
+            cost = posefit.SilhouetteCost(
                 task.body, task.cameras, observation.silhouettes, space
             )
-            start = start_in(problem, modes_apart(task.body.skeleton, posterior))
+            start = start_in(cost, modes_apart(task.body.skeleton, posterior))
             spaces["from the start"] = replace(space, start=start)
         for optimiser, (kind, searched) in product(("sapso", "cma"), spaces.items()):
-            problem = posefit.PoseProblem(
+            cost = posefit.SilhouetteCost(
                 task.body, task.cameras, observation.silhouettes, searched
             )
+            problem = posefit.Problem(cost, searched, MARKS[-1])
             made = posefit.optimiser(optimiser)(searched, np.random.default_rng(seed))
-            best = posefit.minimise(
-                problem.evaluate, made, MARKS[-1], budget_known=True
-            )
-            rows = np.searchsorted(best.trace[:, 0], MARKS, "right") - 1
-            costs.setdefault(f"{optimiser}, {kind}", []).append(
-                best.trace[np.maximum(rows, 0), 1]
-            )
+            posefit.minimise(problem, made, budget_known=True)
+            used, best_costs = problem.trace
+            rows = np.searchsorted(used, MARKS, "right") - 1
+            costs.setdefault(f"{optimiser}, {kind}", []).append(best_costs[rows])
     cells = [
         [name, *(f"{cost:.1f}" for cost in np.mean(rows, axis=0))]
         for name, rows in costs.items()

@@ -15,7 +15,7 @@ import numpy as np
 import psutil
 
 from posefit.cli.output import Command
-from posefit_envs.instance import SPLITS
+from posefit.motion.instances import TRAINING
 from table import markdown
 
 NAME = "posefit_envs:posefit/FitImage-v0"
@@ -56,7 +56,7 @@ def steps_per_second(kind: str, count: int) -> Iterator[float]:
 @click.command(cls=Command, help=__doc__)
 def main() -> None:
     met = gym.make_vec(NAME, 100, errors=False)
-    for first in range(0, SPLITS["train"][1], 100):
+    for first in TRAINING[::100]:
         met.reset(options={"instance": list(range(first, first + 100))})
     lines = []
     for count in COUNTS:

@@ -57,10 +57,10 @@ def rows(plan: Plan, workers: int | None, ledger: str | None) -> list[dict[str, 
         tally = swept(plan, folder, Pool(workers or cores(), Limits(), run_cell), say)
         if tally.stopped:
             raise KeyboardInterrupt
-        found = Ledger(folder)
-        for one in found.quarantined():
-            raise ValueError(f"{one['key']}: {one['reasons'][-1]}")
-        rows = {row["key"]: row for row in found.rows()}
+        with Ledger(folder) as found:
+            for one in found.quarantined():
+                raise ValueError(f"{one['key']}: {one['reasons'][-1]}")
+            rows = {row["key"]: row for row in found.rows()}
         return [rows[cell.key] for cell in plan]
 
 

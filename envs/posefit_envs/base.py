@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from posefit import PoseProblem
+from posefit import Problem
 from posefit.arrays import Array
 from posefit.fitting.check import one_of, whole
 from posefit.fitting.dlpack import as_numpy
@@ -140,7 +140,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         return [self._episode(i) for i in range(self.num_envs)]
 
     @property
-    def problems(self) -> list[PoseProblem]:
+    def problems(self) -> list[Problem]:
         """The problem of each environment's proposals. Raises gymnasium.error.ResetNeeded before the first reset."""
         return [episode.problem for episode in self.episodes]
 
@@ -340,7 +340,7 @@ class SearchEnv(Env[Any, Any]):
         return self._vector.episodes[0].instance
 
     @property
-    def problem(self) -> PoseProblem:
+    def problem(self) -> Problem:
         """The problem that proposals are evaluated on. Raises gymnasium.error.ResetNeeded before the first reset."""
         return self._vector.episodes[0].problem
 

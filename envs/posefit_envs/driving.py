@@ -8,9 +8,9 @@ import numpy as np
 from gymnasium import Env, error
 from gymnasium.vector import VectorEnv
 
-from posefit import Minimum, Optimiser, SearchSpace, minimise
+from posefit import Optimiser, Problem, SearchSpace, minimise
 from posefit.arrays import Array
-from posefit.fitting.optimiser import BudgetError, minimum_of
+from posefit.fitting.problem import BudgetError
 from posefit.motion.clips import training_clips, training_motions
 from posefit.reading import quoted
 from posefit.registry import registry
@@ -81,8 +81,8 @@ def drive(
     instance: int | None = None,
     evaluations: int = 2440,
     **settings: Any,
-) -> Minimum:
-    """Return the minimum of an optimiser that steps `posefit/FitImage-v0`, a single one or a vector.
+) -> Problem:
+    """Return the problem, minimised by an optimiser that steps `posefit/FitImage-v0`, a single one or a vector.
 
     A population of any size is proposed in as many steps as it takes; the last of them is filled up with its last
     proposal, which does not count. An episode that ends begins again with the same instance: only `evaluations` end the
@@ -99,7 +99,8 @@ def drive(
     if isinstance(optimiser, str):
         optimiser = _optimiser(space, optimiser, seed, evaluations, settings)
     try:
-        return minimise(objective.costs, optimiser, evaluations, budget_known=True)
+        problem = Problem(objective.costs, space, evaluations)
+        return minimise(problem, optimiser, budget_known=True)
     except BudgetError as mistake:
         raise error.Error(str(mistake)) from None
 
@@ -112,32 +113,32 @@ def drive_each(
     instances: Sequence[int] | None = None,
     evaluations: int = 2440,
     **settings: Any,
-) -> list[Minimum]:
-    """Return the minimum of a search of its own in each environment of a vector of `FitImage-v0`.
+) -> list[Problem]:
+    """Return the problem of each environment of a vector of `FitImage-v0`, minimised by a search of its own.
 
     The searches run side by side, a proposal of each in a step, with a population of any size and the seeds `seed`,
     `seed` + 1 and so on. `instances` names an instance for each environment; by default each has a random one. Raises
     gymnasium.error.Error as `drive` does.
     """
     objective = EnvObjective(env)
-    searches = [
-        _stepwise(
-            _optimiser(space, optimiser, seed + i, evaluations, settings), evaluations
-        )
-        for i, space in enumerate(objective.begin(seed, instances)[0])
-    ]
+    problems = []
+    searches = []
+    for i, space in enumerate(objective.begin(seed, instances)[0]):
+        problem = Problem(objective.step, space, evaluations)
+        made = _optimiser(space, optimiser, seed + i, evaluations, settings)
+        problems.append(problem)
+        searches.append(_stepwise(problem, made))
     proposals = np.stack([next(search) for search in searches])
-    minima: dict[int, Minimum] = {}
-    while len(minima) < len(searches):
+    searching = set(range(len(searches)))
+    while searching:
         costs = objective.step(proposals).tolist()
-        for i, search in enumerate(searches):
-            if i in minima:
-                continue
+        for i in sorted(searching):
             try:
-                proposals[i] = search.send(costs[i])
-            except StopIteration as stop:
-                minima[i], proposals[i] = stop.value, 0.0
-    return [minima[i] for i in range(len(searches))]
+                proposals[i] = searches[i].send(costs[i])
+            except StopIteration:
+                searching.remove(i)
+                proposals[i] = 0.0
+    return problems
 
 
 def track_reference(
@@ -181,27 +182,23 @@ def track_reference(
     ]
 
 
-def _stepwise(
-    optimiser: Optimiser, evaluations: int
-) -> Generator[Array, float, Minimum]:
-    """Yield the proposals (d,) of an optimiser, each to be sent its cost, and return the minimum.
+def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float, None]:
+    """Yield the proposals (d,) of an optimiser, each to be sent its cost, as `minimise` would evaluate them.
 
-    Only whole populations are evaluated. Raises gymnasium.error.Error where the budget does not hold one.
+    Raises gymnasium.error.Error where the budget does not hold one population.
     """
-    populations: list[tuple[Array, Array]] = []
-    left = evaluations
-    while 0 < len(asked := optimiser.ask()) <= left:
-        costs = np.empty(len(asked))
-        for k, proposal in enumerate(asked):
+    while len(proposals := optimiser.ask()):
+        if len(proposals) > problem.remaining_evaluations:
+            break
+        costs = np.empty(len(proposals))
+        for k, proposal in enumerate(proposals):
             costs[k] = yield proposal
-        left -= len(costs)
-        populations.append((asked, costs))
-        optimiser.tell(asked, costs)
-    if not populations:
+        problem.count(proposals, costs)
+        optimiser.tell(proposals, costs)
+    if not problem.evaluations:
         raise error.Error(
-            f"evaluations must hold one population of {len(asked)}, got {evaluations}"
+            f"evaluations must hold one population of {len(proposals)}, got {problem.budget}"
         )
-    return minimum_of(populations)
 
 
 def _optimiser(

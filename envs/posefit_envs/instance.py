@@ -12,15 +12,17 @@ from typing import Any
 import numpy as np
 from gymnasium import error, logger
 from numpy.typing import NDArray
+from posefit.motion.instance import motion_of_instance, variation
 
 from posefit import (
     Body,
     Camera,
     Motion,
     Observation,
-    PoseProblem,
+    Problem,
     SearchSpace,
     Silhouette,
+    SilhouetteCost,
     Task,
 )
 from posefit.arrays import Array
@@ -30,7 +32,6 @@ from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.geometry.body import varied
 from posefit.motion import built_in
 from posefit.motion.clips import load_motion
-from posefit.motion.instance import motion_of_instance, variation
 from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
@@ -304,13 +305,10 @@ class Instance:
     def episode(self, frame: int, space: SearchSpace) -> "Episode":
         """Return the search for the pose of a frame in a space."""
         silhouettes = self.observations[frame].silhouettes
-        return Episode(
-            self,
-            frame,
-            PoseProblem(
-                self.task.body, self.task.cameras, silhouettes, space, blank=True
-            ),
+        cost = SilhouetteCost(
+            self.task.body, self.task.cameras, silhouettes, space, blank=True
         )
+        return Episode(self, frame, Problem(cost, space))
 
     @cached_property
     def joints(self) -> Array:
@@ -324,7 +322,7 @@ class Episode:
 
     instance: Instance
     frame: int
-    problem: PoseProblem
+    problem: Problem
 
     @property
     def truth(self) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 from gymnasium import error
 from numpy.typing import NDArray
 
-from posefit import PoseProblem
+from posefit import Problem
 from posefit.arrays import Array
 from posefit.output.drawing import blank, side_view, write
 from posefit.output.picture import OVERLAP, panel_of
@@ -26,7 +26,7 @@ def check_mode(mode: str | None) -> None:
 
 
 def render_frame(
-    problem: PoseProblem, pose: Array | None, translation: Array | None, label: str
+    problem: Problem, pose: Array | None, translation: Array | None, label: str
 ) -> Picture:
     """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side."""
     panels = []

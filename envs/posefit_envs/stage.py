@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit import PoseProblem
+from posefit import Problem
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.cost import mean_over_views, mismatch
@@ -42,7 +42,7 @@ class Evaluation(NamedTuple):
     pictures: Image  # (n, height, width, 2 views)
 
 
-def values_of(problem: PoseProblem) -> tuple[NDArray[Any], ...]:
+def values_of(problem: Problem) -> tuple[NDArray[Any], ...]:
     """Return everything of a problem that a stage stores: its masks as bits, its box, and the rest in order."""
     cameras = problem.cameras
     silhouettes = problem.silhouettes

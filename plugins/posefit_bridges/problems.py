@@ -19,8 +19,9 @@ budget is the tool's, since that of a problem ends the tool's loop by an error.
 from typing import Any
 
 from posefit.arrays import Array
+from posefit.fitting.problem import Problem
 from posefit.suites.functions import SUITE
-from posefit.suites.problem import Infeasible, Problem, suite
+from posefit.suites.problem import Infeasible, suite
 
 # function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
 FIRST_IOH_ID = 26_300
@@ -108,7 +109,7 @@ def pymoo_problem(problem: Problem) -> Any:
         def _evaluate(
             self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any
         ) -> None:
-            out["F"] = problem.evaluate(x)
+            out["F"] = problem(x)
 
         def _calc_pareto_front(self, *args: Any, **kwargs: Any) -> list[float] | None:
             return None if problem.optimum is None else [problem.optimum]

@@ -4,12 +4,15 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import is_
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.arrays.compiling import state_of
+from posefit.arrays.stored import Arrays, stored
 from posefit.errors import InputError
 from posefit.fitting.tracker import Task
 from posefit.geometry import symmetry
@@ -137,54 +140,58 @@ class Exemplars:
     tiles: Tiles  # of the codes, group by group
     centre_tiles: Tiles  # of the centres' codes, as one group
     coding: Coding
+    # of what it was learned from; empty where nothing of it is kept on the machine
+    digest: bytes = b""
 
     @classmethod
     def of(
         cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False
     ) -> Self:
         """Return the states of motions as the person with this skeleton would move, and of their mirror images."""
-        if not motions:
-            raise InputError("exemplars must have motions to learn from, got none")
-        for motion in motions:
-            if len(motion) < 2:
-                raise InputError(
-                    f"{motion.name} must have at least 2 frames to be followed, got 1"
-                )
-        joints = [facing_joints(skeleton, motion.poses) for motion in motions]
-        if mirrored:
-            joints += [
-                facing_joints(skeleton, mirror_image(motion).poses)
-                for motion in motions
-            ]
-        coding = Coding.of(skeleton, joints)
-        thinned: list[tuple[Array, Codes, Array, Array]] = []
-        for number, clip_joints in enumerate(joints):
-            codes = coding.of_joints(clip_joints)
+        learned = learned_from(motions, skeleton, mirrored)
+        return cls.assembled(motions, skeleton, learned)
+
+    @classmethod
+    def assembled(
+        cls,
+        motions: Sequence[Motion],
+        skeleton: Skeleton,
+        learned: Arrays,
+        digest: bytes = b"",
+    ) -> Self:
+        """Return the states of motions from what was learned from these, see `learned_from`."""
+        counts = learned["counts"]  # of each clip; mirror images follow all motions
+        ends = np.cumsum(counts)
+        parts = list[tuple[Array, Array, Array]]()
+        for number, rows in enumerate(np.split(learned["rows"], ends[:-1])):
             motion = motions[number % len(motions)]
-            rows = kernels.frames_apart(codes, np.float32(MIN_FRAME_DISTANCE**2))
-            clip = replace(
-                motion, poses=motion.poses[rows], translations=motion.translations[rows]
-            )
-            clip = clip if number < len(motions) else mirror_image(clip)
-            thinned.append(
-                (clip.poses, codes[rows], clip.translations, rows / clip.fps)
-            )
-        poses, codes, places, times = (
-            np.concatenate(parts) for parts in zip(*thinned, strict=True)
-        )
-        ends = np.cumsum([len(frames) for frames, *_ in thinned])
-        numbers = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
-        centres, groups = farthest_first(codes, GROUPS)
-        _, coarse_groups = farthest_first(codes, COARSE_GROUPS)
+            poses = motion.poses[rows]
+            places = motion.translations[rows]
+            if number >= len(motions):
+                poses, places = _mirrored(motion.skeleton, poses, places)
+            parts.append((poses, places, rows / motion.fps))
+        poses, places, times = map(np.concatenate, zip(*parts, strict=True))
+        codes = learned["codes"]
+        centres = learned["centres"]
+        groups = learned["groups"].astype(np.int64)
         members = np.argsort(groups, kind="stable")
         starts = np.searchsorted(groups[members], np.arange(len(centres) + 1))
-        tiles = (
-            Tiles.of(codes, members, starts),
-            Tiles.of(codes, centres, np.array([0, len(centres)])),
-        )
-        states = poses, codes, places, times, numbers, ends - 1
         return cls(
-            *states, centres, groups, coarse_groups, members, starts, *tiles, coding
+            poses=poses,
+            codes=codes,
+            places=places,
+            times=times,
+            clips=np.repeat(np.arange(len(ends)), counts),
+            last_states=ends - 1,
+            centres=centres,
+            groups=groups,
+            coarse_groups=learned["coarse_groups"].astype(np.int64),
+            members=members,
+            starts=starts,
+            tiles=Tiles.of(codes, members, starts),
+            centre_tiles=Tiles.of(codes, centres, np.array([0, len(centres)])),
+            coding=Coding(skeleton, learned["mean"], learned["axes"]),
+            digest=digest,
         )
 
     def __len__(self) -> int:
@@ -270,29 +277,84 @@ class Exemplars:
         return poses
 
 
-# the key and the states of the latest motions: restarts, builds and cells of a sweep learn from the same ones
-_latest: tuple[bytes, Exemplars] | None = None
+def learned_from(
+    motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool
+) -> Arrays:
+    """Return what takes long to learn from motions, and from their mirror images, which follow all of them.
+
+    They are the `rows` of each clip that are states, and how many, `counts`; `codes` with their `mean` and `axes`; and
+    `centres`, `groups` and `coarse_groups`, see `Exemplars`.
+    """
+    if not motions:
+        raise InputError("exemplars must have motions to learn from, got none")
+    for motion in motions:
+        if len(motion) < 2:
+            raise InputError(
+                f"{motion.name} must have at least 2 frames to be followed, got 1"
+            )
+    clips = [*motions, *map(mirror_image, motions if mirrored else ())]
+    joints = [facing_joints(skeleton, clip.poses) for clip in clips]
+    coding = Coding.of(skeleton, joints)
+    rows = list[Rows]()
+    parts = list[Codes]()
+    for clip_joints in joints:
+        codes = coding.of_joints(clip_joints)
+        apart = kernels.frames_apart(codes, np.float32(MIN_FRAME_DISTANCE**2))
+        rows.append(apart)
+        parts.append(codes[apart])
+    codes = np.concatenate(parts)
+    centres, groups = farthest_first(codes, GROUPS)
+    _, coarse_groups = farthest_first(codes, COARSE_GROUPS)
+    return {
+        "rows": np.concatenate(rows),
+        "counts": np.array([len(apart) for apart in rows]),
+        "codes": codes,
+        "mean": coding.mean,
+        "axes": coding.axes,
+        "centres": centres,
+        # of a thousand groups at most
+        "groups": groups.astype(np.int16),
+        "coarse_groups": coarse_groups.astype(np.int16),
+    }
+
+
+# the latest motions and their states: restarts, builds and cells of a sweep learn from
+# the same ones
+_latest = list[tuple[tuple[Motion, ...], Exemplars]]()
 
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton) -> Exemplars:
     """Return the states of motions and their mirror images, by the joints of a person of average lengths.
 
-    The latest are cached.
+    The latest are cached in the process, and what takes long on the machine.
     """
-    global _latest
-    digest = hashlib.blake2b(
-        repr([(motion.name, motion.fps, len(motion)) for motion in motions]).encode()
-    )
+    average = replace(skeleton, offsets=average_skeleton().offsets)
+    # a copy: another thread may replace them at any time
+    for known, exemplars in [*_latest]:
+        axes = exemplars.coding.skeleton.axes
+        same = len(known) == len(motions) and all(map(is_, known, motions))
+        if same and np.array_equal(axes, skeleton.axes):
+            return exemplars
+    digest = _digest(motions, skeleton)
+    for _, exemplars in [*_latest]:
+        if exemplars.digest == digest:
+            return exemplars
+    learned = stored("exemplars", digest, lambda: learned_from(motions, average, True))
+    exemplars = Exemplars.assembled(motions, average, learned, digest)
+    _latest[:] = [(tuple(motions), exemplars)]
+    return exemplars
+
+
+def _digest(motions: Sequence[Motion], skeleton: Skeleton) -> bytes:
+    """Return a digest of motions and of all that the states made of them depend on."""
+    heads = [(motion.name, motion.fps, len(motion)) for motion in motions]
+    digest = hashlib.sha256(repr((state_of(__name__), heads)).encode())
     digest.update(skeleton.axes.tobytes())
     for motion in motions:
-        for array in (motion.skeleton.axes, motion.poses, motion.translations):
-            digest.update(array.tobytes())
-    key = digest.digest()
-    latest = _latest  # read once: another thread may replace it at any time
-    if latest is None or latest[0] != key:
-        average = replace(skeleton, offsets=average_skeleton().offsets)
-        latest = _latest = key, Exemplars.of(motions, average, mirrored=True)
-    return latest[1]
+        digest.update(motion.skeleton.axes.tobytes())
+        digest.update(np.ascontiguousarray(motion.poses))
+        digest.update(np.ascontiguousarray(motion.translations))
+    return digest.digest()
 
 
 def exemplars_for(task: Task) -> Exemplars:
@@ -307,11 +369,15 @@ def exemplars_for(task: Task) -> Exemplars:
 
 def mirror_image(motion: Motion) -> Motion:
     """Return a motion mirrored in the plane x = 0: left and right are exchanged."""
-    poses = symmetry.mirrored_poses(motion.skeleton, motion.poses)
-    poses[:, 0] *= -1.0
-    return replace(
-        motion, poses=poses, translations=motion.translations * [-1.0, 1.0, 1.0]
-    )
+    poses, translations = _mirrored(motion.skeleton, motion.poses, motion.translations)
+    return replace(motion, poses=poses, translations=translations)
+
+
+def _mirrored(skeleton: Skeleton, poses: Array, places: Array) -> tuple[Array, Array]:
+    """Return poses (n, 66) and places (n, 3) mirrored in the plane x = 0."""
+    mirrored = symmetry.mirrored_poses(skeleton, poses)
+    mirrored[:, 0] *= -1.0
+    return mirrored, places * [-1.0, 1.0, 1.0]
 
 
 def about_vertical(vectors: Array, yaws: Array) -> Array:

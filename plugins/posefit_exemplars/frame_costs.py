@@ -4,8 +4,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.contours import POINT_SPACING, MaskContours
+from posefit.fitting.cost import align
 from posefit.fitting.landmarks import GROUPS, landmark_likelihoods, side_odds
-from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, known_views, pose_costs

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.arrays.compiling import state_of
+from posefit.arrays.stored import Arrays, stored
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import pinhole_matrix
@@ -59,37 +61,55 @@ class Table(NamedTuple):
 
     @classmethod
     def of(cls, exemplars: Exemplars, elevation: float) -> Self:
-        """Return the table of the average body that a camera sees from an elevation, radians."""
-        body = Body.of(exemplars.coding.skeleton)
-        states = np.arange(len(exemplars))
-        if len(states) > POSES:
-            states = np.unique(
-                exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE))
+        """Return the table of the average body that a camera sees from an elevation, radians.
+
+        It is made once on a machine for what the exemplars were learned from.
+        """
+        if not exemplars.digest:
+            return cls(**_learned(exemplars, elevation))
+        state = repr((state_of(__name__), elevation)).encode()
+        return cls(
+            **stored(
+                "lookup",
+                exemplars.digest + state,
+                lambda: _learned(exemplars, elevation),
             )
-        yaws = np.tile(YAW_STEP * np.arange(YAWS), len(states))
-        poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
-        camera = looking_at(0.0, elevation)
-        small = list[Codes]()
-        for part in np.array_split(poses, YAWS):  # pictures take memory
-            small.append(
-                small_pictures(
-                    masks_of(
-                        body, camera, part, -body.skeleton.joints(part).mean(axis=1)
-                    )
-                )
-            )
-        pixels = np.concatenate(small)
-        mean = pixels.mean(axis=0)
-        _, axes = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
-        axes = axes[:, : -DIMENSIONS - 1 : -1].astype(np.float32)
-        codes = (pixels - mean) @ axes
-        return cls(states, mean, axes, codes, (codes**2).sum(axis=1))
+        )
 
     def distances(self, picture: Mask) -> Codes:
         """Return the squared distances (n, YAWS) of all silhouettes from that of a picture (height, width)."""
         code = (small_pictures(picture[None])[0] - self.mean) @ self.axes
         squares = self.squares - 2.0 * (self.codes @ code) + code @ code
         return np.asarray(squares.reshape(-1, YAWS))
+
+
+def _learned(exemplars: Exemplars, elevation: float) -> Arrays:
+    """Return the arrays of the table of an elevation: the silhouettes of some states at each yaw."""
+    body = Body.of(exemplars.coding.skeleton)
+    states = np.arange(len(exemplars))
+    if len(states) > POSES:
+        states = np.unique(
+            exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE))
+        )
+    yaws = np.tile(YAW_STEP * np.arange(YAWS), len(states))
+    poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
+    camera = looking_at(0.0, elevation)
+    small = list[Codes]()
+    for part in np.array_split(poses, YAWS):  # pictures take memory
+        masks = masks_of(body, camera, part, -body.skeleton.joints(part).mean(axis=1))
+        small.append(small_pictures(masks))
+    pixels = np.concatenate(small)
+    mean = pixels.mean(axis=0)
+    _, directions = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
+    axes = directions[:, : -DIMENSIONS - 1 : -1].astype(np.float32)
+    codes = (pixels - mean) @ axes
+    return {
+        "states": states,
+        "mean": mean,
+        "axes": axes,
+        "codes": codes,
+        "squares": (codes**2).sum(axis=1),
+    }
 
 
 _table = lru_cache(maxsize=4)(Table.of)

@@ -10,7 +10,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.check import choices, positive
-from posefit.fitting.problem import align
+from posefit.fitting.cost import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import TOPOLOGY, most_probable

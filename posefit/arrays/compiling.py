@@ -22,6 +22,8 @@ import numpy as np
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from posefit.arrays.stored import cache_folder
+
 config: Any = numba.config
 MAX_FOLDERS = 256  # of a user's cache: those of older sources are removed
 
@@ -94,8 +96,8 @@ class TolerantCache(FunctionCache):
 
 
 @lru_cache
-def _folder(module: str) -> str:
-    """Return the name of the folder of a module's functions: a digest of all that what is compiled has copies of.
+def state_of(module: str) -> str:
+    """Return a module's name and a digest of its state, on which all depends that its functions compile or compute.
 
     That is the module's source, the constants that it imports, and the same of the modules whose functions it imports.
     """
@@ -125,13 +127,8 @@ def cached(dispatcher: Any) -> Any:
     """Return a function of numba's, which finds in its folder what any process compiled before."""
     before = config.CACHE_DIR
     try:
-        name = _folder(dispatcher.py_func.__module__)
-        base = (
-            Path(before)
-            if before
-            else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
-            / "posefit"
-        )
+        name = state_of(dispatcher.py_func.__module__)
+        base = Path(before) if before else cache_folder()
         if not (base / name).is_dir():
             (base / name).mkdir(parents=True)
             for old in (

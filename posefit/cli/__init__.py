@@ -16,6 +16,7 @@ from posefit.cli import plugins, suite, sweeping, tracking
 from posefit.cli.group import Group
 from posefit.cli.motions import motions
 from posefit.cli.output import MISTAKE, Command, drop, open_streams, say
+from posefit.errors import warn_in_one_line
 from posefit.reading import cut
 from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
@@ -90,6 +91,7 @@ for _command in chain.from_iterable(GROUPS.values()):
 def run() -> None:
     """Run the command that was asked for, and end the process even where a plugin left a thread running."""
     open_streams()
+    warn_in_one_line()
     try:
         main()
     except OSError as error:

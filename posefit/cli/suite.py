@@ -23,7 +23,8 @@ def suite(context: click.Context, as_json: bool) -> None:
     """List the functions of the numbered benchmark, and their dimensions."""
     if context.invoked_subcommand is not None:
         return
-    from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
+    from posefit.motion.instances import HELD_OUT, TRAINING
+    from posefit.suites.functions import FUNCTIONS, SUITE
 
     lines = [f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100"]
     lines += [
@@ -146,7 +147,7 @@ def listed(dimensions: Sequence[int]) -> str:
 
 def _numbers(start: int | None, stop: int | None) -> range:
     """Return the instances of a range A:B. Raises InputError where there are none."""
-    from posefit.suites.functions import INSTANCES
+    from posefit.motion.instances import INSTANCES
 
     first = start or 0
     last = INSTANCES.stop if stop is None else stop

@@ -1,13 +1,14 @@
-"""The problem that optimisers solve, the loop that drives them, and trackers that go from frame to frame.
+"""The problem that optimisers minimise, and trackers that go from frame to frame.
 
 | looking for | file |
 |---|---|
+| the function that an optimiser minimises, which counts; the loop that minimises it. SAPSO (5) | problem.py |
 | the box [-1, 1]^d that every optimiser searches, and where a search starts in it | box.py |
 | proposals as poses: root angles, translation, a prior's coordinates | space.py |
 | where a search starts when poses are guessed for its frame | start.py |
 | what a prior is: poses as fewer numbers, and which of them are feasible; the tilt of the root with them | prior.py |
-| where a body stands; the cost of proposals for one observation, and at smaller sizes. SAPSO (5) | problem.py |
-| what an optimiser is, the base of adapters of other libraries, the loop that drives one | optimiser.py |
+| the cost of proposals for one observation, where a body is placed, and smaller pictures | cost.py |
+| what an optimiser is, and the base of adapters of other libraries | optimiser.py |
 | what a tracker is; the search a frame around a prediction. SAPSO section 4 | tracker.py |
 | weights of costs, how many samples they are worth | weights.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
 from posefit.errors import InputError
+from posefit.hints import choices_of, resolved
 from posefit.reading import cut, quoted, suggestion
 
 MAX_BITS = 1_024  # of a whole number, so that it can be written down
@@ -87,11 +88,11 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
         )
 
 
-def choices(settings: object, values: Mapping[str, object]) -> None:
+def choices(settings: Any, values: Mapping[str, object]) -> None:
     """Raise InputError where a value is none of those that its annotation, a `Literal`, lists.
 
     `settings` is a function with such parameters, or a class with such attributes; `values` may hold others too.
     """
     for name, annotation in settings.__annotations__.items():
-        if get_origin(annotation) is Literal:
-            one_of(name, values[name], get_args(annotation))
+        if listed := choices_of(resolved(settings, annotation)):
+            one_of(name, values[name], listed)

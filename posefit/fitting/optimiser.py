@@ -1,10 +1,7 @@
-"""What an optimiser is, the base of those made from another library's ask and tell, and the loop that drives one."""
+"""What an optimiser is, and the base of optimisers made from another library's ask and tell."""
 
-import math
-import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from typing import Literal, Protocol
 
 import numpy as np
@@ -103,98 +100,3 @@ class Adapter(ABC):
         check_tell(0 if self._asked is None else len(self._asked), proposals, costs)
         self.learn(np.asarray(proposals), finite_costs(costs))
         self._asked = None
-
-
-@dataclass(frozen=True, eq=False)
-class Minimum:
-    """The result of a search."""
-
-    proposal: Array  # (d,) the best one
-    cost: float
-    evaluations: int
-    # (populations, 2) evaluations so far and best cost, after each population
-    trace: Array = field(repr=False)
-
-
-class BudgetError(InputError):
-    """A budget does not hold one population."""
-
-
-def populations(
-    optimiser: Optimiser, evaluate: Callable[[Array], Array], evaluations: int
-) -> Iterator[tuple[Array, Array]]:
-    """Yield each population (n, d) that an optimiser proposes, with its costs (n,): the loop that every search is.
-
-    The optimiser learns the costs before its next population is asked for. The search ends when it proposes none, or
-    one beyond the budget, which is not evaluated. Raises BudgetError where the first one does, and
-    TypeError where `evaluate` returns anything else than an array of costs (n,).
-    """
-    used = 0
-    while len(proposals := optimiser.ask()) and used + len(proposals) <= evaluations:
-        used += len(proposals)
-        costs = evaluate(proposals)  # SAPSO A1.2a
-        if not isinstance(costs, np.ndarray) or costs.shape != (len(proposals),):
-            came = (
-                f"shape {costs.shape}"
-                if isinstance(costs, np.ndarray)
-                else type(costs).__name__
-            )
-            raise TypeError(
-                f"evaluate must return an array of costs of shape ({len(proposals)},), got {came}"
-            )
-        yield proposals, costs
-        optimiser.tell(proposals, costs)
-    if not used:
-        raise BudgetError(
-            f"evaluations must hold one population of {len(proposals)}, got {evaluations}"
-        )
-
-
-def minimise(
-    evaluate: Callable[[Array], Array],
-    optimiser: Optimiser,
-    evaluations: int,
-    *,
-    budget_known: bool = False,
-) -> Minimum:
-    """Return the best proposal of a search within a budget of whole populations.
-
-    `evaluate` returns the costs (n,) of proposals (n, d). A population beyond `evaluations` is not
-    evaluated. A cost that is nan never counts as best. A warning is given where an optimiser ends its search before
-    half of the budget is used, unless it was built with the budget, `budget_known`: the schedules of some follow it.
-    Raises BudgetError where the budget does not hold one population, and InputError where every cost is nan.
-    """
-    best = minimum_of(populations(optimiser, evaluate, evaluations))
-    if not budget_known and 2 * best.evaluations < evaluations:
-        warnings.warn(
-            f"the optimiser ended its search after {best.evaluations} of {evaluations} evaluations: if its schedule "
-            "follows the budget, build it with it, as factory(space, rng, evaluations=...) or iterations=...",
-            stacklevel=2,
-        )
-    return best
-
-
-def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
-    """Return the best of the proposals (n, d) of one population or more, each with its costs (n,).
-
-    A cost that is nan never counts as best. Raises InputError where every cost is nan.
-    """
-    best = None
-    cost = np.inf
-    used = 0
-    trace = list[tuple[int, float]]()
-    for proposals, costs in searched:
-        used += len(proposals)
-        lowest = costs.argmin()
-        # argmin prefers nan to any number
-        if math.isnan(least := float(costs[lowest])):
-            lowest = np.where(np.isnan(costs), np.inf, costs).argmin()
-            least = float(costs[lowest])
-        if best is None or math.isnan(cost) or least < cost:
-            # SAPSO (5)
-            best = proposals[lowest].copy()
-            cost = least
-        trace.append((used, cost))
-    if best is None or math.isnan(cost):
-        raise InputError(f"costs must be numbers, got nan for all {used} proposals")
-    return Minimum(best, cost, used, np.array(trace))  # SAPSO A1.3

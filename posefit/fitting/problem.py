@@ -1,179 +1,314 @@
-"""The problem that an optimiser solves: the proposal whose body has the observed silhouettes."""
+"""A function to minimise, and the loop in which an optimiser minimises it: all that posefit asks of an optimiser.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any
+    from posefit import Problem, minimise, optimiser
+
+    problem = Problem(cost, space, budget=2440)
+    minimise(problem, optimiser("sapso")(space, rng))
+    print(problem.best_cost, problem.evaluations)
+
+Everything that posefit searches is a problem: a frame of a track, a person's build, a numbered instance of a suite, an
+episode of an environment. The problem counts its evaluations and remembers its best proposal; nothing else does.
+"""
+
+import warnings
+from collections.abc import Callable
+from copy import copy
+from pickle import PicklingError
+from typing import Any, final
 
 import numpy as np
 
-from posefit.arrays import Array, writeable
+from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.check import at_least, between
+from posefit.fitting.box import Space, draw_population
+from posefit.fitting.check import whole
 from posefit.fitting.dlpack import as_numpy
-from posefit.fitting.kernels import move_to_borders
-from posefit.fitting.space import SearchSpace
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
-from posefit.silhouette.cost import (
-    BETA,
-    Areas,
-    costs_in,
-    drawing_of,
-    known_views,
-    mean_over_views,
-    pose_costs,
-)
-from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette
-from posefit.silhouette.sharing import parts_of, work_through
+from posefit.fitting.optimiser import Optimiser
+from posefit.reading import quoted
+
+# Returns the costs (n,) of proposals (n, d); lower is better.
+Cost = Callable[[Array], Array]
 
 
-def align(
-    body: Body,
-    cameras: Sequence[Camera],
-    silhouettes: Sequence[Silhouette],
-    poses: Array,
-    anchors: Array,
-) -> Array:
-    """Return the translations (n, 3) that bring poses (n, 66) to the silhouettes' boxes. Interpretation S4, `aligned`.
+class BudgetError(InputError):
+    """A budget does not hold one population."""
 
-    Each border of a box says where the outermost disc of the body must touch, and that is linear in the translation:
-    `focal (x + t_x) +- focal radius = (border - centre) (z + t_z)`. All borders of all views are solved for together,
-    by least squares, starting from anchors (n, 3). A border at the image's edge is unknown and does not count.
+
+class BudgetSpentError(Exception):
+    """A call goes beyond the evaluations of a problem's budget."""
+
+
+def minimise(
+    problem: "Problem", optimiser: Optimiser, *, budget_known: bool = False
+) -> "Problem":
+    """Return the problem, once an optimiser has used its budget.
+
+    The search ends when the optimiser proposes nothing, or a population larger than the rest of the budget, which is
+    not evaluated. It warns where the optimiser ends before half of the budget is used, unless the optimiser was built
+    with the budget (`budget_known`): the schedules of some follow it.
+
+    Args:
+        problem: what to minimise; it must have a budget.
+        optimiser: an object with `ask` and `tell`, built for `problem.space`.
+        budget_known: whether the optimiser was built with the budget.
+
+    Returns:
+        The same problem: `problem.best`, `problem.best_cost`, `problem.trace`.
+
+    Raises:
+        BudgetError: the budget does not hold the first population.
+        InputError: the problem has no budget, or no proposal had a cost that is a number.
+
+    >>> import numpy as np
+    >>> from posefit import optimiser, suite
+    >>> problem = suite("posefit-2026.3", function=1, instance=17, dimension=9, budget=200)
+    >>> minimise(problem, optimiser("cma")(problem.space, np.random.default_rng(0))).evaluations
+    200
+
     """
-    translations = writeable(anchors.copy())
-    move_to_borders(
-        writeable(body.skeleton.joints(poses)),
-        body.joint_radii(),
-        np.array([camera.rotation for camera in cameras]),
-        np.array([camera.translation for camera in cameras]),
-        np.array([camera.focal for camera in cameras]),
-        np.array([camera.centre for camera in cameras]),
-        np.array([silhouette.extent for silhouette in silhouettes]),
-        translations,
-    )
-    return translations
+    if problem.budget is None:
+        raise InputError(f"{problem.id} must have a budget to be minimised, got none")
+    before = problem.evaluations
+    while len(proposals := optimiser.ask()):
+        if len(proposals) > problem.remaining_evaluations:
+            break
+        costs = problem(proposals)  # SAPSO A1.2a
+        optimiser.tell(proposals, costs)
+    used = problem.evaluations - before
+    if not used:
+        raise BudgetError(
+            f"evaluations must hold one population of {len(proposals)}, "
+            f"got {problem.remaining_evaluations:g}"
+        )
+    if not np.isfinite(problem.best_cost):
+        raise InputError(f"costs must be numbers, got none in {used} evaluations")
+    if not budget_known and 2 * problem.evaluations < problem.budget:
+        warnings.warn(
+            f"the optimiser ended its search after {used} of {problem.budget} "
+            "evaluations: if its schedule follows the budget, build it with it, as "
+            "factory(space, rng, evaluations=...) or iterations=...",
+            stacklevel=2,
+        )
+    return problem
 
 
-@dataclass(frozen=True, eq=False)
-class PoseProblem:
-    """One observation, from one camera or several, and the space in which its pose is searched. SAPSO (5).
+@final
+class Problem:
+    """A function to minimise over proposals in the box [-1, 1]^d.
 
-    `evaluate` is pure: a proposal's cost has the same bits whatever the others are and however many threads work.
+    Call it with proposals (n, d) for their costs (n,), or with one proposal (d,) for a float. Every proposal counts as
+    one evaluation, whether it is feasible or not.
+
+    Args:
+        cost: returns the costs (n,) of proposals (n, d).
+        space: the box, as an optimiser knows it.
+        budget: the largest number of evaluations; None for any number.
+        repair: moves infeasible proposals (n, d) before they are evaluated; by default they are evaluated as they are.
+        noisy: returns what a call returns, of proposals (n, d) and the number of evaluations before them, where that
+            has noise. The best and the trace are always of `cost`.
+        targets: costs to be reached, falling.
+        id: names the problem in messages.
+
+    Attributes that a problem lacks are those of its cost function: `problem.decode` of a frame, `problem.look` of a
+    suite's. Attributes have the names of COCO's problems where those have them.
+
+    >>> import numpy as np
+    >>> from posefit.testing.toy import Toy, sphere
+    >>> problem = Problem(sphere, Toy(2), budget=3)
+    >>> problem(np.array([[0.3, 0.3], [1.0, 0.3]])).tolist()
+    [0.0, 12.25]
+    >>> problem.best.tolist(), problem.best_cost, problem.evaluations
+    ([0.3, 0.3], 0.0, 2)
+
     """
 
-    body: Body = field(repr=False)
-    cameras: Sequence[Camera]
-    silhouettes: Sequence[Silhouette] = field(repr=False)
-    space: SearchSpace
-    beta: float = BETA
-    threads: int = 1
-    # whether silhouettes may be empty, as they may be in the middle of a track
-    blank: bool = False
-    _coarser: dict[int, "PoseProblem"] = field(
-        init=False, repr=False, default_factory=dict
-    )
+    number_of_objectives = 1
+    number_of_constraints = 0
+    evaluations_constraints = 0
 
-    def __post_init__(self) -> None:
-        if len(self.cameras) != len(self.silhouettes) or not self.cameras:
-            raise InputError(
-                f"silhouettes must be one a camera ({len(self.cameras)}), got {len(self.silhouettes)}"
-            )
-        for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
-            if silhouette.size != (camera.width, camera.height):
-                size = (camera.height, camera.width)
-                raise InputError(
-                    f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}"
-                )
-        if not self.blank and not any(
-            silhouette.mask.any() for silhouette in self.silhouettes
-        ):
-            raise InputError("silhouettes must show a person, got an empty mask")
-        between("beta", self.beta, 0.0, 1.0)
-        at_least("threads", self.threads, 1)
+    def __init__(
+        self,
+        cost: Cost,
+        space: Space,
+        budget: int | None = None,
+        *,
+        repair: Callable[[Array], Array] | None = None,
+        noisy: Callable[[Array, int], Array] | None = None,
+        targets: Array | None = None,
+        id: str = "problem",  # noqa: A002, as COCO has it
+    ) -> None:
+        if budget is not None:
+            whole("budget", budget, 1)
+        self.cost = cost
+        self.space = space
+        self.budget = budget
+        self.targets = np.empty(0) if targets is None else targets
+        self.id = id
+        self.index = 0  # in a suite
+        self._repair = repair
+        self._noisy = noisy
+        self.reset()
 
-    def evaluate(self, proposals: Any) -> Any:
-        """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4).
+    def reset(self) -> None:
+        """Forget all evaluations: the count, the best and the trace."""
+        self.evaluations = 0
+        self.best_cost = np.inf
+        # where the cost fell: evaluations so far, and the proposal (d,) with its cost
+        self._falls: list[tuple[int, float, Array]] = []
 
-        Arrays may be of any library that has DLPack; the costs come as an array of the same one.
+    def __call__(self, proposals: Any) -> Any:
+        """Return the costs (n,) of proposals (n, d), or the cost of one proposal (d,).
+
+        Arrays may be of any library that has DLPack; the costs come as an array of the same library.
+
+        Raises:
+            ValueError: the shape does not fit, or a number is not finite. Nothing is counted.
+            BudgetSpentError: the budget does not hold so many. Nothing is evaluated.
+
         """
         values, back = as_numpy("proposals", proposals)
-        return back(self._evaluated(writeable(values)))
-
-    def _evaluated(self, proposals: Array) -> Array:
-        if proposals.shape[1:] != (self.space.dimensions,):
-            # raises InputError with this shape, not that of one thread's part
-            self.space.decode(proposals)
-        if self.on_device:
-            return self.cost_and_areas(*self.decode(proposals))[0]
-        parts = parts_of(len(proposals), self.threads)
-        if len(parts) == 1:
-            return self._cost(*self.decode(proposals))
-        costs = np.empty(len(proposals))
-
-        def count(part: slice, poses: Array, translations: Array) -> None:
-            costs[part] = self._cost(poses, self._aligned(poses, translations))
-
-        work_through(
-            parts, self.threads, lambda part: self.space.decode(proposals[part]), count
-        )
-        return costs
-
-    def coarser(self, factor: int) -> "PoseProblem":
-        """Return the same problem on every `factor`th pixel of every `factor`th row; made once.
-
-        It has the same space, and a proposal means the same pose. See `posefit.silhouette.mask`.
-        """
-        if factor not in self._coarser:
-            self._coarser[factor] = replace(
-                self,
-                cameras=[coarser_camera(camera, factor) for camera in self.cameras],
-                silhouettes=[
-                    coarser_silhouette(silhouette, factor)
-                    for silhouette in self.silhouettes
-                ],
-                blank=True,  # a small silhouette may be empty
+        checked = self.checked(values)
+        rows = checked.reshape(-1, self.dimension)
+        if len(rows) > self.remaining_evaluations:
+            raise BudgetSpentError(
+                f"{self.id}: {self.remaining_evaluations:g} of {self.budget} evaluations are left, got {len(rows)}"
             )
-        return self._coarser[factor]
+        if self._repair is not None:
+            rows = self._repair(rows)
+        costs = self.cost(rows)
+        if not isinstance(costs, np.ndarray) or costs.shape != (len(rows),):
+            came = getattr(costs, "shape", type(costs).__name__)
+            raise TypeError(
+                f"cost must return an array of shape ({len(rows)},), got {came}"
+            )
+        measured = costs
+        if self._noisy is not None:
+            measured = self._noisy(rows, self.evaluations)
+        self.count(rows, costs)
+        return float(measured[0]) if checked.ndim == 1 else back(measured)
 
-    def decode(self, proposals: Array) -> tuple[Array, Array]:
-        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space says so."""
-        poses, translations = self.space.decode(proposals)
-        return poses, self._aligned(poses, translations)
+    def count(self, rows: Array, costs: Array) -> None:
+        """Count proposals (n, d) that cost (n,), and remember each whose cost is the lowest so far. SAPSO (5).
 
-    def cost_and_areas(self, poses: Array, translations: Array) -> tuple[Array, Areas]:
-        """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
-        return pose_costs(
-            self.body,
-            self.cameras,
-            self.silhouettes,
-            poses,
-            translations,
-            self.beta,
-            self.threads,
+        A call does this itself; it is for those who have the costs already, of several problems in one call.
+        """
+        # nan is below nothing
+        for k in np.flatnonzero(costs < self.best_cost):
+            if costs[k] < self.best_cost:
+                self.best_cost = float(costs[k])
+                used = self.evaluations + int(k) + 1
+                self._falls.append((used, self.best_cost, rows[k].copy()))
+        self.evaluations += len(rows)
+
+    def checked(self, proposals: object) -> Array:
+        """Return proposals (d,) or (n, d) as float64. Raises ValueError for anything else."""
+        try:
+            checked = np.asarray(proposals, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"proposals must be numbers, got {quoted(proposals)}"
+            ) from None
+        d = self.dimension
+        if checked.ndim not in (1, 2) or checked.shape[-1] != d:
+            raise InputError(
+                f"proposals must have shape ({d},) or (n, {d}), got {checked.shape}"
+            )
+        if not np.isfinite(checked).all():
+            raise InputError("proposals must be finite, got nan or infinity")
+        return checked
+
+    @property
+    def remaining_evaluations(self) -> float:
+        """How many evaluations the budget has left; infinite without one."""
+        return np.inf if self.budget is None else self.budget - self.evaluations
+
+    @property
+    def best(self) -> Array:
+        """The best proposal (d,) so far, as it was evaluated. Raises ValueError before there is one."""
+        if not self._falls:
+            raise InputError(
+                f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost"
+            )
+        return self._falls[-1][2].copy()
+
+    @property
+    def points(self) -> Array:
+        """The proposals (k, d) at which the cost fell, as they were evaluated."""
+        points = [point for _, _, point in self._falls]
+        return np.array(points).reshape(-1, self.dimension)
+
+    @property
+    def trace(self) -> tuple[Array, Array]:
+        """The evaluations (k,) at which the cost fell, and the last one; with the best cost (k,) at each.
+
+        It begins with the first cost that is a finite number.
+        """
+        used = [float(used) for used, _, _ in self._falls]
+        costs = [cost for _, cost, _ in self._falls]
+        if used and used[-1] < self.evaluations:
+            used.append(float(self.evaluations))
+            costs.append(costs[-1])
+        return np.array(used), np.array(costs)
+
+    @property
+    def dimension(self) -> int:
+        """d."""
+        return self.space.dimensions
+
+    @property
+    def lower_bounds(self) -> Array:
+        """-1 (d,)."""
+        return np.full(self.dimension, -1.0)
+
+    @property
+    def upper_bounds(self) -> Array:
+        """1 (d,)."""
+        return np.ones(self.dimension)
+
+    @property
+    def best_observed_fvalue1(self) -> float:
+        """COCO's name of `best_cost`."""
+        return self.best_cost
+
+    @property
+    def final_target_hit(self) -> bool:
+        """Whether the last of the targets was reached."""
+        return len(self.targets) > 0 and bool(self.best_cost <= self.targets[-1])
+
+    @property
+    def initial_solution(self) -> Array:
+        """The proposal (d,) to start from: the prediction, or the middle of the box."""
+        start = self.space.start
+        return np.zeros(self.dimension) if start is None else start.mean.copy()
+
+    def initial_solution_proposal(self, restart: int = 0) -> Array:
+        """Return the proposal (d,) to start from first, and a random one for each restart."""
+        if not restart:
+            return self.initial_solution
+        rng = np.random.default_rng([getattr(self, "instance", 0), restart])
+        drawn: Array = draw_population(self.space, rng, 1)[0]
+        return drawn
+
+    def __getattr__(self, name: str) -> Any:
+        # only called for what a problem lacks; `cost` itself is missing in a copy that is being made
+        if name.startswith("_") or name == "cost" or not hasattr(self.cost, name):
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        return getattr(self.cost, name)
+
+    def __copy__(self) -> "Problem":
+        """Return a problem with the same count, best and trace, which are its own from now on."""
+        twin: Problem = object.__new__(Problem)
+        twin.__dict__.update(self.__dict__, cost=copy(self.cost), _falls=[*self._falls])
+        return twin
+
+    def __deepcopy__(self, memo: object) -> "Problem":
+        return copy(self)
+
+    def __getstate__(self) -> Any:
+        raise PicklingError(
+            f"{self.id} counts evaluations in its own process and cannot be sent to another: make it there, as with "
+            "posefit.suite, or give it whole populations, in one process"
         )
 
-    @cached_property
-    def on_device(self) -> bool:
-        """Whether a GPU draws the poses: then all of them at once, and threads have nothing to share."""
-        return any(silhouette.device != "cpu" for silhouette in self.silhouettes)
-
-    @cached_property
-    def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
-        views = [
-            (drawing_of(self.body, camera, silhouette), silhouette)
-            for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
-        ]
-        return known_views(views, self.silhouettes)
-
-    def _cost(self, poses: Array, translations: Array) -> Array:
-        """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
-        return mean_over_views(
-            [costs_in(*view, poses, translations, self.beta) for view in self._drawings]
-        )
-
-    def _aligned(self, poses: Array, translations: Array) -> Array:
-        """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""
-        if self.space.translation != "aligned":
-            return translations
-        return align(self.body, self.cameras, self.silhouettes, poses, translations)
+    def __repr__(self) -> str:
+        return f"<{self.id}: {self.evaluations} evaluations, best {self.best_cost:.4g}>"

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.box import Start
 from posefit.fitting.cma import CMAES, default_population_size
-from posefit.fitting.optimiser import minimise
-from posefit.fitting.problem import align
+from posefit.fitting.cost import align
+from posefit.fitting.problem import Problem, minimise
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -244,5 +244,6 @@ def _search(
     )
     population = default_population_size(len(NAMES))
     optimiser = CMAES(box, rng, population_size=population)
-    best = minimise(evaluate, optimiser, population * generations, budget_known=True)
-    return np.asarray(np.exp(REACH * _ROOT @ best.proposal))
+    problem = Problem(evaluate, box, population * generations, id="the build")
+    minimise(problem, optimiser, budget_known=True)
+    return np.asarray(np.exp(REACH * _ROOT @ problem.best))

@@ -12,7 +12,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Start
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.skeleton import Skeleton
 from posefit.uncertainty.modes import Posterior, clusters_of, poses_apart
@@ -49,21 +49,20 @@ def modes_apart(
     return modes
 
 
-def start_in(problem: PoseProblem, modes: Sequence[tuple[float, Posterior]]) -> Start:
-    """Return the start of a problem around modes of what it may show, the likeliest first.
+def start_in(cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]) -> Start:
+    """Return the start of a search around modes of what it may show, the likeliest first.
 
     Each mode is around that of its poses which, projected onto the latents, costs least in a small picture; these costs
     weigh the modes again, as a space that cannot show a pose need not be searched there.
     """
-    space = problem.space
-    factor = max(min(problem.silhouettes[0].size) // MIN_SMALL_SIDE, 1)
+    space = cost.space
+    factor = max(min(cost.silhouettes[0].size) // MIN_SMALL_SIDE, 1)
     projected = [
         space.proposals(coordinates_of(space, mode.poses, mode.translations))
         for _, mode in modes
     ]
     costs = [
-        problem.coarser(factor).evaluate(poses)
-        + INFEASIBLE_COST * ~space.feasible(poses)
+        cost.coarser(factor)(poses) + INFEASIBLE_COST * ~space.feasible(poses)
         for poses in projected
     ]
     least = min(float(each.min()) for each in costs)

@@ -10,15 +10,17 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
 from posefit.fitting.check import at_least, between, choices, one_of, positive, whole
-from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
+from posefit.fitting.cost import SilhouetteCost
+from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
 from posefit.fitting.prior import Latents, Tilt
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.problem import Problem, minimise
 from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace, Translation
 from posefit.fitting.start import modes_apart, start_in
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, Areas
+from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
@@ -61,7 +63,7 @@ class Frame:
     cost: float
     areas: Areas = field(repr=False)  # (views, 3): R, B, Y
     evaluations: int
-    # (populations, 2) the evaluations so far and the best cost, after each population of the search
+    # (k, 2) the evaluations at which the cost fell, and the last one; with the best cost at each
     trace: Array = field(default_factory=lambda: np.empty((0, 2)), repr=False)
     # what else it may be, where a tracker reports it
     posterior: Posterior | None = field(default=None, repr=False)
@@ -277,16 +279,15 @@ class Predictor:
         if observation.translation is not None:
             space = space.around(space.centre, anchor=observation.translation)
         if modes := task.modes or guessed_modes(task, observation):
-            beta = self._prediction.beta
-            problem = PoseProblem(
+            cost = SilhouetteCost(
                 task.body,
                 task.cameras,
                 observation.silhouettes,
                 space,
-                beta=beta,
+                beta=self._prediction.beta,
                 blank=True,
             )
-            return replace(space, start=start_in(problem, modes))
+            return replace(space, start=start_in(cost, modes))
         if task.first_pose is not None:
             return replace(
                 space, start=self._start_at_known_pose(space, task.first_pose)
@@ -370,11 +371,9 @@ class SynthesisTracker:
                     rng,
                 )
             problem = self.problem(space, observation)
-            best = minimise(
-                problem.evaluate, optimiser, task.evaluations, budget_known=True
-            )
-            predictor.commit(best.proposal)
-            latest = _frame(problem, best)
+            minimise(problem, optimiser, budget_known=True)
+            predictor.commit(problem.best)
+            latest = _frame(problem, space)
             yield latest
 
     def _held(
@@ -388,35 +387,36 @@ class SynthesisTracker:
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
         problem = self.problem(space, observation)
-        costs, areas = problem.cost_and_areas(poses, places)
+        with uncounted():
+            costs, areas = problem.cost_and_areas(poses, places)
         return Frame(poses[0], places[0], float(costs[0]), areas[:, 0], 0)
 
-    def problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
-        """Return the problem that a frame is."""
+    def problem(self, space: SearchSpace, observation: Observation) -> Problem:
+        """Return the problem that a frame is: its pose in a space, within the task's budget."""
         task = self.task
-        beta = self.prediction.beta
-        silhouettes = observation.silhouettes
-        return PoseProblem(
+        cost = SilhouetteCost(
             task.body,
             task.cameras,
-            silhouettes,
+            observation.silhouettes,
             space,
-            beta=beta,
+            beta=self.prediction.beta,
             threads=task.threads,
             blank=True,
         )
+        return Problem(cost, space, task.evaluations, id="a frame")
 
 
-def _frame(problem: PoseProblem, best: Minimum) -> Frame:
-    poses, translations = problem.decode(best.proposal[None])
-    counts = problem.cost_and_areas(poses, translations)[1][:, 0]
-    details = {COORDINATES: problem.space.coordinates(best.proposal)}
+def _frame(problem: Problem, space: SearchSpace) -> Frame:
+    best = problem.best
+    poses, translations = problem.decode(best[None])
+    with uncounted():  # its result drawn again is no evaluation
+        areas = problem.cost_and_areas(poses, translations)[1][:, 0]
     return Frame(
         poses[0],
         translations[0],
-        best.cost,
-        counts,
-        best.evaluations,
-        best.trace,
-        details=details,
+        problem.best_cost,
+        areas,
+        problem.evaluations,
+        np.column_stack(problem.trace),
+        details={COORDINATES: space.coordinates(best)},
     )

@@ -11,8 +11,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import BudgetError, Optimiser
+from posefit.fitting.optimiser import Optimiser
 from posefit.fitting.prior import Latents
+from posefit.fitting.problem import BudgetError
 from posefit.silhouette.drawn import PoseCount
 
 FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior

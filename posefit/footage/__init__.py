@@ -22,5 +22,5 @@ What happens to a mask, an arrow a file:
 
 What is decoded becomes bits at once, and later stages unpack these. What a source does not state is guessed in one of
 these places, and is in `Scene.guesses`. From a mask to its cost it goes on through `silhouette/mask.py`,
-`fitting/tracker.py`, `fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
+`fitting/tracker.py`, `fitting/cost.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
 """

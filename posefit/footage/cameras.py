@@ -1,5 +1,6 @@
 """The scene of real cameras: their masks or videos, with their calibrations."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -372,10 +373,12 @@ def listed(
 def calibrated(
     cameras: Sequence[Camera | Calibration | str | Path],
     filmed: Sequence[tuple[int, int] | None],
+    names: Sequence[str] = (),
 ) -> list[Camera | Calibration]:
     """Return the cameras of as many views, none for a single view without one; `filmed` are the sizes of videos.
 
-    Raises InputError where cameras and views do not fit each other.
+    Cameras have the order of the views, whose `names` are those of their sources; where both have the same names, they
+    are paired by these. Raises InputError where cameras and views do not fit each other.
     """
     known = listed(cameras)
     views = len(filmed)
@@ -384,12 +387,12 @@ def calibrated(
             f"camera must be given for each of several views, {views}, got none"
         )
     if known and len(known) != views:
-        names = ", ".join(
+        came = ", ".join(
             camera.name for camera in known if isinstance(camera, Calibration)
         )
         chosen = (
-            f": {cut(names)}; FILE:NAME is one of a file"
-            if len(known) > views and names
+            f": {cut(came)}; FILE:NAME is one of a file"
+            if len(known) > views and came
             else ""
         )
         raise InputError(
@@ -401,12 +404,87 @@ def calibrated(
         raise InputError(
             "camera must say where each of several cameras stands, got a file without rotation"
         )
+    if views > 1 and len(names) == views:
+        known = [known[k] for k in order_by_name(known, names)]
     return [
         _fitting(camera, size)
         if isinstance(camera, Calibration) and size is not None
         else camera
         for camera, size in zip(known, filmed, strict=False)
     ]
+
+
+def order_by_name(
+    cameras: Sequence[Camera | Calibration], sources: Sequence[str]
+) -> list[int]:
+    """Return which camera took each source: the one with its name, where all have one, else the one at its place.
+
+    What all names share does not count, nor do zeros before a number: walk-a.mp4 and walk-b.mp4 are of the cameras a
+    and b, or cam_a and cam_b. Raises InputError where names can be paired in two ways.
+    """
+    in_order = list(range(len(cameras)))
+    if not all(isinstance(camera, Calibration) for camera in cameras):
+        return in_order
+    wanted = [camera.name for camera in cameras if isinstance(camera, Calibration)]
+    orders = set[tuple[int, ...]]()
+    for given in (
+        [Path(source).stem for source in sources],
+        [Path(source).parent.name for source in sources],
+        list(sources),
+    ):
+        for these, those in (
+            (list(map(_words, given)), list(map(_words, wanted))),
+            (_own_words(given), _own_words(wanted)),
+        ):
+            if len(set(these)) == len(these) and set(these) == set(those):
+                orders.add(tuple(those.index(words) for words in these))
+                break
+    if not orders:
+        orders = _order_by_part(wanted, sources)
+    if len(orders) > 1:
+        raise InputError(
+            f"cameras must have names that only fit one order of the sources, got {cut(', '.join(wanted))} for "
+            f"{cut(', '.join(sources))}; give one file a camera, of other names"
+        )
+    return list(*orders) if orders else in_order
+
+
+def _order_by_part(
+    cameras: Sequence[str], sources: Sequence[str]
+) -> set[tuple[int, ...]]:
+    """Return the order in which each source has one camera's name in its own, and each camera one source."""
+    words = [f" {' '.join(_words(camera))} " for camera in cameras]
+    order = []
+    for source in sources:
+        given = f" {' '.join(_words(Path(source).stem))} "
+        found = [
+            k for k, camera in enumerate(words) if camera.strip() and camera in given
+        ]
+        if len(found) != 1:
+            return set()
+        order += found
+    return {tuple(order)} if len(set(order)) == len(cameras) else set()
+
+
+def _words(name: str) -> tuple[str, ...]:
+    """Return the words and the numbers of a name, without regard to capitals and zeros in front."""
+    parts = re.findall(r"[0-9]+|[^\W\d_]+", name.casefold())
+    return tuple(part.lstrip("0") or "0" if part.isdigit() else part for part in parts)
+
+
+def _own_words(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the words of each name without those that all begin or end with."""
+    every = [_words(name) for name in names]
+    shortest = min(map(len, every))
+    before = 0
+    while before < shortest and len({words[before] for words in every}) == 1:
+        before += 1
+    after = 0
+    while (
+        after < shortest - before and len({words[-1 - after] for words in every}) == 1
+    ):
+        after += 1
+    return [words[before : len(words) - after] for words in every]
 
 
 def _fitting(

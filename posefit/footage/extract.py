@@ -2,51 +2,64 @@
 
 import csv
 import zipfile
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.files import check_new, new_folder, opencv_name
 from posefit.footage.masks import PackedMasks, Range
+from posefit.footage.readers import name_of
 from posefit.footage.segmentation import Extraction, Progress, Segmentation
+from posefit.footage.source import films_of, kind_of, sources_of
 from posefit.footage.video import Video, VideoWriter
+from posefit.motion.motion import Motion
+from posefit.reading import existing
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
 
 def extract(
-    source: str | Path,
+    source: str | Path | Sequence[str | Path],
     out: str | Path,
     how: Extraction | None = None,
     *,
     frames: Range = (None, None),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return a summary of a video's masks, and write them, a preview and a report to a new folder.
+    """Return a summary of a film's masks, and write them, a preview and a report to a new folder.
 
-    masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`, and `landmarks` (T, 27, 3) where a
-    segmenter gives any, see `Segmenter`. The folder appears whole or not at all. Raises InputError for every mistake
+    `source` is a video, or a folder or a list of pictures. masks.npz holds `masks` and `valid` (T, height, width),
+    `usable` (T,), `fps`, the number of the `first` frame in the film, and `landmarks` (T, 27, 3) where a segmenter
+    gives any, see `Segmenter`. The folder appears whole or not at all. Raises InputError for every mistake
     in arguments or files, where no frame shows a person, and on a full disk.
     """
     target = Path(out)
     check_new(target)
     opencv_name(target)  # a name that it cannot write is refused before the work
-    video = Video.of(source)
+    video = _film(source)
     how = how or Extraction()
     segmentation = Segmentation(video, how, frames)
     with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
         masks, rows, _, warnings, *_ = segmentation.read(progress)
-        with VideoWriter(building / "preview.mp4", video.fps, masks.size) as preview:
-            for k, image in enumerate(
-                video.frames(segmentation.start, segmentation.stop, masks.size)
-            ):
-                preview.write(
-                    _painted(image, masks.silhouette(k), bool(masks.usable[k]))
-                )
+        preview = building / "preview.mp4"
+        try:
+            with VideoWriter(preview, video.fps, masks.size) as writer:
+                for k, image in enumerate(
+                    video.frames(segmentation.start, segmentation.stop, masks.size)
+                ):
+                    silhouette = masks.silhouette(k)
+                    writer.write(_painted(image, silhouette, bool(masks.usable[k])))
+        except (InputError, cv2.error) as error:
+            # such as of a build of OpenCV without the format: the masks are the work
+            preview.unlink(missing_ok=True)
+            warnings = [*warnings, f"preview.mp4 is missing: {error}"]
         _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(rows[0]))
@@ -64,6 +77,24 @@ def extract(
         "warnings": warnings,
         "guesses": [*video.guesses],
     }
+
+
+def _film(source: str | Path | Sequence[str | Path]) -> Video:
+    """Return the film that a source names. Raises InputError where it is none, or several."""
+    sources = sources_of(source)
+    if len(sources) > 1:
+        raise InputError(f"source must be one film, got {len(sources)}")
+    (film,) = sources
+    if isinstance(film, Motion) or kind_of(film) == "masks":
+        if isinstance(film, str | Path):
+            existing(Path(film))
+        came = "a motion" if isinstance(film, Motion) else name_of(film)
+        raise InputError(
+            f"source must be a film to extract masks from, got {came}, which needs no extraction"
+        )
+    assert not isinstance(film, np.ndarray)
+    (video,) = films_of([film], None)
+    return video
 
 
 def _write_npz(path: Path, masks: PackedMasks) -> None:
@@ -86,6 +117,7 @@ def _write_npz(path: Path, masks: PackedMasks) -> None:
         rest = {
             "usable": masks.usable,
             "fps": np.array(masks.fps),
+            "first": np.array(masks.first),
             "landmarks": masks.landmarks,
         }
         for name, value in rest.items():

@@ -27,6 +27,11 @@ COLOUR_RANGE = 32
 COLOUR_SHARE = 0.02
 CHROMA_RANGE = 15  # the same, as a JPEG has it
 MANY_COLOURS = 64  # a picture of a place has more; so many labels are rare
+MANY_LABELS = (
+    16  # of a picture with transparent pixels: a person cut out has more colours
+)
+# of the pixels of labels have neighbours of their own label; of degrees few have
+FLAT = 0.5
 # as Pillow calls what has no colours
 _GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")
 # what is wrong with a file is reported by posefit
@@ -43,6 +48,7 @@ class Marks(NamedTuple):
     # 0xRRGGBB
     values: NDArray[Any]
     soft: bool = False  # whether they are degrees
+    alpha: bool = False  # of an alpha channel
     photo: bool = False  # a picture in many colours
 
 
@@ -151,9 +157,9 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
             bright, soft=True, photo=bool((off > CHROMA_RANGE).mean() > COLOUR_SHARE)
         )
     if not labelled and image.has_transparency_data:
-        alpha = np.asarray(image.convert("RGBA").getchannel("A"))
-        if (alpha != np.iinfo(alpha.dtype).max).any():
-            return Marks(alpha, soft=True)
+        transparent = _transparent_marks(image)
+        if transparent is not None:
+            return transparent
     if image.mode in ("1", "LA"):
         image = image.convert("L")
     if image.mode in ("L", "F") or image.mode.startswith("I"):
@@ -168,15 +174,71 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
         return Marks(np.asarray(image.convert("L")), soft=True)
     if image.mode == "P" and image.format != "GIF":
         return Marks(np.asarray(image))
+    numbers = _colour_numbers(colours)
+    return Marks(
+        numbers,
+        photo=_is_colourful(colours)
+        and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS
+        and flat_share(numbers) < FLAT,
+    )
+
+
+def _transparent_marks(image: Image.Image) -> Marks | None:
+    """Return how a picture with transparent pixels marks a person; None where it has none.
+
+    Its alpha channel does. Where that has two values only and few colours are opaque, these are labels, and what is
+    transparent is 0: of a single label the person is the same either way, and of several one is to be chosen.
+    """
+    coloured = np.asarray(image.convert("RGBA"))
+    alpha = coloured[..., 3]
+    levels = np.unique(alpha)
+    if levels[0] == np.iinfo(alpha.dtype).max:
+        return None
+    soft = Marks(alpha, soft=True, alpha=True)
+    if len(levels) > 2:
+        return soft
+    shown = alpha == levels[-1]
+    if len(levels) == 1 or levels[0] > 0:
+        return soft
+    if image.mode == "P" and image.format != "GIF":
+        numbers = np.asarray(image).astype(np.int32)
+    else:
+        numbers = _colour_numbers(coloured[..., :3])
+    labels = np.unique(numbers[shown])
+    # black, or the palette's first colour, alone is the person
+    if len(labels) > MANY_LABELS or not labels.any():
+        return Marks(np.where(shown, alpha, 0), soft=True, alpha=True)
+    return Marks(np.where(shown, numbers, 0))
+
+
+def _colour_numbers(colours: NDArray[np.uint8]) -> NDArray[np.int32]:
+    """Return colours (height, width, 3) as numbers 0xRRGGBB."""
     numbers = colours[..., 0].astype(np.int32)
     for channel in (1, 2):
         numbers <<= 8
         numbers |= colours[..., channel]
-    return Marks(
-        numbers,
-        photo=_is_colourful(colours)
-        and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS,
-    )
+    return numbers
+
+
+def flat_share(values: NDArray[Any]) -> float:
+    """Return which share of the pixels between the lowest and the highest tenth of values has equal neighbours.
+
+    Areas of labels are flat, and degrees pass from one value to the next.
+    """
+    middle = values[1:-1, 1:-1]
+    low, high = float(values.min()), float(values.max())
+    between = (middle > low + 0.1 * (high - low)) & (middle < high - 0.1 * (high - low))
+    if not between.any():
+        return 0.0
+    flat = np.ones(middle.shape, dtype=bool)
+    for neighbour in (
+        values[:-2, 1:-1],
+        values[2:, 1:-1],
+        values[1:-1, :-2],
+        values[1:-1, 2:],
+    ):
+        flat &= middle == neighbour
+    return float(np.count_nonzero(flat & between) / np.count_nonzero(between))
 
 
 def _is_colourful(colours: NDArray[np.uint8]) -> bool:

@@ -38,10 +38,25 @@ class PackedMasks:
     # (T, 27, 3), see `Segmenter`; None where there are none
     landmarks: Array | None = field(default=None, repr=False)
     first: int = 0  # the number of the first frame in the footage
+    # whether the source states its frames' numbers; else they are counted from 0
+    counted: bool = False
     guesses: Sequence[str] = ()  # what the source does not state
 
     def __len__(self) -> int:
         return len(self.masks)
+
+    def cut(self, start: int, stop: int) -> "PackedMasks":
+        """Return the masks of frames start to stop, by their numbers in the footage."""
+        rows = slice(start - self.first, stop - self.first)
+        return replace(
+            self,
+            names=self.names[rows],
+            masks=self.masks[rows],
+            valid=None if self.valid is None else self.valid[rows],
+            usable=self.usable[rows],
+            landmarks=None if self.landmarks is None else self.landmarks[rows],
+            first=start,
+        )
 
     def silhouette(self, k: int) -> Silhouette:
         """Return the silhouette of frame k."""
@@ -139,12 +154,49 @@ class Views(Sequence[Observation]):
         return silhouette
 
 
-def span(frames: Range, count: int) -> tuple[int, int]:
-    """Return start and stop of a range of `count` frames. Raises InputError where it holds none."""
-    start, stop, _ = slice(*frames).indices(count)
+def together(views: Sequence[PackedMasks], names: Sequence[str]) -> list[PackedMasks]:
+    """Return the masks of several cameras, cut to the frames whose numbers all of them have, where they state numbers.
+
+    Raises InputError where they have none in common, and where only some state that theirs begin elsewhere.
+    """
+    if not all(view.counted for view in views):
+        firsts = [view.first for view in views]
+        if len(set(firsts)) > 1:
+            came = " and ".join(
+                f"{first} of {name}" for first, name in zip(firsts, names, strict=True)
+            )
+            raise InputError(f"cameras must begin with one frame, got frame {came}")
+        return list(views)
+    ends = [(view.first, view.first + len(view)) for view in views]
+    start = max(first for first, _ in ends)
+    stop = min(last for _, last in ends)
+    came = ", ".join(
+        f"{first}:{last} of {name}"
+        for (first, last), name in zip(ends, names, strict=True)
+    )
+    if start >= stop:
+        raise InputError(f"cameras must have frames in common, got {came}")
+    if len(set(ends)) > 1:
+        used = f"the frames {start}:{stop} are used, which all cameras have, of {came}"
+        first = replace(views[0], guesses=[*views[0].guesses, used])
+        views = [first, *views[1:]]
+    return [view.cut(start, stop) for view in views]
+
+
+def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
+    """Return start and stop of a range of `count` frames, whose numbers begin at `first`, as indices.
+
+    Negative ends count from the last frame. Raises InputError where the range holds none.
+    """
+    ends = [
+        None if end is None else end if end < 0 else max(end - first, 0)
+        for end in frames
+    ]
+    start, stop, _ = slice(*ends).indices(count)
     if start >= stop:
         low, high = ("" if value is None else value for value in frames)
+        numbers = f" {first}:{first + count}" if first else ""
         raise InputError(
-            f"frames must choose some of the {count} frames, got {low}:{high}"
+            f"frames must choose some of the {count} frames{numbers}, got {low}:{high}"
         )
     return start, stop

@@ -10,6 +10,7 @@ Values may be 0 and 1, 0 and 255, degrees, an alpha channel or labels. One file 
 all files are counted before any pixel is decided: an image is decoded once to count, and once to decide.
 """
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,7 +18,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -26,14 +27,23 @@ from numpy.typing import NDArray
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import (
+    FLAT,
     FORMATS,
     IMAGES,
     PIXELS,
     Marks,
+    flat_share,
     page_count,
     read_marks,
 )
-from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
+from posefit.footage.masks import (
+    PackedMasks,
+    Planes,
+    Range,
+    empty_planes,
+    span,
+    together,
+)
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
 from posefit.reading import existing, quoted
@@ -43,7 +53,8 @@ NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
 PACKED = 2_000_000_000  # bytes of an .npz file
 MAX_FPS = 1000.0
 _KINDS = {".jpeg": ".jpg", ".tiff": ".tif"}
-NAMES = ("masks", "valid", "usable", "fps", "landmarks")
+NAMES = ("masks", "valid", "usable", "fps", "first", "landmarks")
+LAST = 1_000_000_000  # number of a frame
 
 # missing numbers for each image: where there are more, the numbers count something else
 MOST_MISSING = 9.0
@@ -75,16 +86,13 @@ def read_masks(
     Images of a folder come in the natural order of their names: 2 before 10. `label` is the person's value, where masks
     hold several. Raises InputError naming the file.
     """
-    if isinstance(source, tuple):
-        return read_images(source, name_of(source), frames, label)
     if isinstance(source, np.ndarray):
         return _packed(name_of(source), {"masks": source}, frames, label)
-    if source.is_dir():
-        if not (images := images_in(source)):
-            raise InputError(
-                f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none"
-            )
-        return read_images(images, str(source), frames, label)
+    images = images_of(source)
+    if images is not None:
+        name = name_of(source)
+        return read_images(numbered(images, name), name, frames, label)
+    assert isinstance(source, Path)
     existing(source)
     if source.suffix.lower() == ".npy":
         stack = mapped(source)
@@ -93,6 +101,39 @@ def read_masks(
     with archived(source, NAMES, "the key masks", PACKED, single=True) as arrays:
         check_decoded(str(source), sum(array.nbytes for array in arrays.values()))
         return _packed(str(source), arrays, frames, label)
+
+
+def read_views(
+    sources: Sequence[Path | Masks], frames: Range, label: int | None = None
+) -> list[PackedMasks]:
+    """Return the masks of several cameras, as `read_masks` does.
+
+    Frames are of one moment where they have one number: in the names of images, or by `first` of .npz files, of which
+    those frames are used that all have. Raises
+    InputError where cameras have no frame in common.
+    """
+    names = [name_of(source) for source in sources]
+    images = [view for source in sources if (view := images_of(source)) is not None]
+    if len(images) < len(sources):
+        masks = [read_masks(source, frames, label) for source in sources]
+    else:
+        views = zip(numbered_together(images, names), names, strict=True)
+        masks = [read_images(view, name, frames, label) for view, name in views]
+    return together(masks, names)
+
+
+def images_of(source: Path | Masks) -> tuple[Path, ...] | None:
+    """Return the images of a source; None where it has none. Raises InputError for a folder without any."""
+    if isinstance(source, tuple):
+        return source
+    if isinstance(source, np.ndarray) or not source.is_dir():
+        return None
+    images = images_in(source)
+    if not images:
+        raise InputError(
+            f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none"
+        )
+    return tuple(images)
 
 
 def name_of(source: str | Path | Masks) -> str:
@@ -128,10 +169,20 @@ def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     ], file.name
 
 
-def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list[str]]:
-    """Return the images of successive frames, None for a number that is missing, and what was guessed of them.
+class Numbered(NamedTuple):
+    """The images of successive frames, and the numbers in their names."""
 
-    Raises InputError where files are of several kinds, or several have one number: some are no masks then.
+    files: list[Path | None]  # None for a number that is missing
+    guesses: list[str]
+    # of the frames, with the step from one to the next; None where names do not tell
+    numbers: range | None = None
+
+
+def numbered(images: Sequence[Path], name: str) -> Numbered:
+    """Return the images of successive frames, by the numbers in their names.
+
+    The number is the only one that changes, or else the last one. Raises InputError where files are of several kinds,
+    or several have one number: some are no masks then.
     """
     kinds = Counter(
         _KINDS.get(suffix := file.suffix.lower(), suffix) for file in images
@@ -142,11 +193,12 @@ def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list
             f"{name}: expected images of one kind, got {came}; name the files, such as masks/*.png"
         )
     parts = [re.split(r"([0-9]+)", file.stem) for file in images]
+    column = _changing(parts)
     if len(images) < 2 or not all(
-        len(part) >= 3 and len(part[-2]) < 19 for part in parts
+        len(part) >= 3 and len(part[column]) < 19 for part in parts
     ):
-        return list(images), []
-    numbers = [int(part[-2]) for part in parts]
+        return Numbered(list(images), [])
+    numbers = [int(part[column]) for part in parts]
     if len({tuple(part[::2]) for part in parts}) > 1:
         twice = next(
             (k for k, number in enumerate(numbers) if number in numbers[:k]), None
@@ -159,39 +211,120 @@ def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list
                 f"{name}: expected one image a frame, got {pair}; name the files, such as masks/*.png"
             )
     steps = np.diff(numbers)
-    if len({(*part[:-2], part[-1]) for part in parts}) > 1 or not (steps > 0).all():
-        return list(images), [] if (steps > 0).all() else [
-            f"{name}: the frames come as listed, not as numbered"
-        ]
+    others = {(*part[:column], *part[column:][1:]) for part in parts}
+    if len(others) > 1 or not (steps > 0).all():
+        listed = f"{name}: the frames come as listed, not as numbered"
+        return Numbered(list(images), [] if (steps > 0).all() else [listed])
     step = int(np.gcd.reduce(steps))
     missing = int((steps // step - 1).sum())
     if missing > MOST_MISSING * len(images):
-        return list(images), [
-            f"{name}: the numbers from {numbers[0]} to {numbers[-1]} do not count frames"
-        ]
-    places = dict(zip(numbers, images, strict=True))
-    guesses = [f"{name}: every {step}th number is a frame"] if step > 1 else []
+        uncounted = f"{name}: the numbers from {numbers[0]} to {numbers[-1]} do not count frames"
+        return Numbered(list(images), [uncounted])
+    counted = range(numbers[0], numbers[-1] + 1, step)
+    return _spread(dict(zip(numbers, images, strict=True)), counted, name)
+
+
+def _changing(parts: Sequence[Sequence[str]]) -> int:
+    """Return which part of names, texts and numbers in turn, counts: the only number that changes, or the last one."""
+    if len({tuple(part[::2]) for part in parts}) > 1:
+        return -2
+    columns = zip(*parts, strict=True)
+    changing = [
+        column
+        for column, texts in enumerate(columns)
+        if len(set(map(_plain_number, texts))) > 1
+    ]
+    return changing[0] if len(changing) == 1 else -2
+
+
+def _plain_number(text: str) -> str:
+    return text.lstrip("0")
+
+
+def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:
+    """Return the images of these numbers, some of which may be missing."""
+    files = [places.get(number) for number in numbers]
+    missing = files.count(None)
+    guesses = []
+    if numbers.step > 1:
+        guesses.append(f"{name}: every {numbers.step}th number is a frame")
     if missing:
         guesses.append(
             f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are missing, and are held"
         )
-    return [
-        places.get(number) for number in range(numbers[0], numbers[-1] + 1, step)
-    ], guesses
+    return Numbered(files, guesses, numbers)
+
+
+def numbered_together(
+    views: Sequence[tuple[Path, ...]], names: Sequence[str]
+) -> list[Numbered]:
+    """Return the images of several cameras, those with one number at one place; of a single camera as `numbered`.
+
+    The lowest number of all is frame 0, and a number that a camera does not have is missing. Images whose names do not
+    count frames are paired as they come, and that is guessed. Raises InputError where no number is in the names of all
+    cameras.
+    """
+    listed = [numbered(*view) for view in zip(views, names, strict=True)]
+    if len(listed) < 2:
+        return listed
+    known = [view.numbers for view in listed if view.numbers is not None]
+    if len(known) < len(listed):
+        several = [view for view in listed if len(view.files) > 1]
+        if several:
+            several[0].guesses.append(
+                f"images of {' and '.join(names)} are of one moment in the order in which they come, "
+                "as not all of their names count frames"
+            )
+        return listed
+    shared = set.intersection(*(_own_numbers(view) for view in listed))
+    if not shared:
+        came = " and ".join(
+            f"{numbers[0]} to {numbers[-1]} of {name}"
+            for numbers, name in zip(known, names, strict=True)
+        )
+        raise InputError(
+            f"images of one moment must have one number in the names of all cameras, got {came}"
+        )
+    lowest = min(numbers[0] for numbers in known)
+    highest = max(numbers[-1] for numbers in known)
+    step = math.gcd(
+        *(numbers.step for numbers in known),
+        *(numbers[0] - lowest for numbers in known),
+    )
+    every = []
+    for view, numbers, name in zip(listed, known, names, strict=True):
+        places = {
+            number: file
+            for number, file in zip(numbers, view.files, strict=True)
+            if file is not None
+        }
+        every.append(_spread(places, range(lowest, highest + 1, step), name))
+    return every
+
+
+def _own_numbers(view: Numbered) -> set[int]:
+    """Return the numbers that a camera's images have."""
+    assert view.numbers is not None
+    numbers = zip(view.numbers, view.files, strict=True)
+    return {number for number, file in numbers if file is not None}
 
 
 def read_images(
-    images: Sequence[Path], name: str, frames: Range, label: int | None = None
+    images: Numbered, name: str, frames: Range, label: int | None = None
 ) -> PackedMasks:
     """Return the masks of images of one size. Raises InputError naming the file where one is none."""
-    files, guesses = numbered(images, name)
     every = [
         (file, page)
-        for file in files
+        for file in images.files
         for page in range(1 if file is None else page_count(existing(file)))
     ]
-    chosen = every[slice(*span(frames, len(every)))]
+    start, stop = span(frames, len(every))
+    chosen = every[start:stop]
     known = np.array([file is not None for file, _ in chosen])
+    if not known.any():
+        raise InputError(
+            f"{name}: frames must choose some of the images that are there, got none from {start} to {stop}"
+        )
     size, is_person, kind = _decided(_marks(chosen, name, label), label, name)
     masks = _pack(_marks(chosen, name, label), int(known.sum()), size, is_person)
     valid = None
@@ -207,7 +340,15 @@ def read_images(
         f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing"
         for file, page in chosen
     ]
-    return PackedMasks(names, size, masks, valid, known, guesses=[*guesses, *kind])
+    return PackedMasks(
+        names,
+        size,
+        masks,
+        valid,
+        known,
+        first=start,
+        guesses=[*images.guesses, *kind],
+    )
 
 
 def _marks(
@@ -256,7 +397,12 @@ def _packed(
     fps = float(np.asarray(arrays["fps"])) if "fps" in arrays else None
     if fps is not None and not 0.0 < fps <= MAX_FPS:
         raise InputError(f"{name}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
-    start, stop = span(frames, count)
+    first = int(np.asarray(arrays["first"])) if "first" in arrays else 0
+    if not 0 <= first <= LAST:
+        raise InputError(
+            f"{name}: first must be the number of a frame up to {LAST:,}, got {first}"
+        )
+    start, stop = span(frames, count, first)
     if not usable[start:stop].any():
         raise InputError(
             f"{name}: expected a frame that is usable, got none from {start} to {stop}"
@@ -292,7 +438,8 @@ def _packed(
         usable[start:stop],
         fps=fps,
         landmarks=landmarks,
-        first=start,
+        first=first + start,
+        counted="first" in arrays,
         guesses=guesses,
     )
 
@@ -331,6 +478,7 @@ def _checked_stack(
             f"be of shape {shape[0], len(JOINTS), 3}",
         ),
         "fps": ((), "iuf", f"be a number up to {MAX_FPS:g}"),
+        "first": ((), "iu", "be a whole number, of the first frame"),
     }
     for key, (wanted, kinds, expected) in others.items():
         stored = arrays.get(key)
@@ -365,7 +513,7 @@ def _decided(
     counts = ValueCounts()
     size = (0, 0)
     for marks in frames:
-        counts.add(marks.values, marks.soft)
+        counts.add(marks)
         size = marks.values.shape[1], marks.values.shape[0]
     return size, *counts.classifier(label, name)
 
@@ -386,6 +534,10 @@ class ValueCounts:
 
     # whether a value is a degree: in lossy images, in fractions, in an alpha channel
     soft: bool = False
+    alpha: bool = False  # whether all are of alpha channels
+    # masks with several values, and those of them whose areas are flat, as of labels
+    several: int = 0
+    flat: int = 0
     fractions: bool = False
     lowest: float = np.inf
     highest: float = 0.0
@@ -394,18 +546,19 @@ class ValueCounts:
     # masks in which a value is more than an edge between others
     solid: Counter[int | float] = field(default_factory=Counter)
 
-    def add(self, values: Values, soft: bool) -> None:
+    def add(self, marks: Marks) -> None:
         """Count the next mask."""
+        values = marks.values
         low = values.min()
         high = values.max()
-        self.lowest, self.highest = (
-            min(self.lowest, float(low)),
-            max(self.highest, float(high)),
-        )
+        first = self.lowest == np.inf
+        self.alpha = marks.alpha and (self.alpha or first)
+        self.lowest = min(self.lowest, float(low))
+        self.highest = max(self.highest, float(high))
         self.fractions |= values.dtype.kind == "f" and bool(
             (values != np.floor(values)).any()
         )
-        self.soft |= soft
+        self.soft |= marks.soft
         if self.soft:
             return
         top = int(np.count_nonzero(values == high))
@@ -420,6 +573,8 @@ class ValueCounts:
         self.soft = len(self.pixels) > (2 if self.fractions else COUNTED_VALUES)
         if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
+            self.several += len(unique) > 2
+            self.flat += len(unique) > 2 and flat_share(values) >= FLAT
 
     def classifier(
         self, label: int | None, name: object
@@ -441,10 +596,14 @@ class ValueCounts:
                 )
             return lambda values: np.asarray(values == label), []
         values = sorted(self.pixels)
-        if self.highest > SCALES[-1] and (self.soft or len(values) > FEW_VALUES):
+        many = len(values) > FEW_VALUES
+        if many and not self.soft and 2 * self.flat > self.several:
+            most = [value for value, _ in self.pixels.most_common() if value]
+            raise self._several(name, most)
+        if self.highest > SCALES[-1] and (self.soft or many):
             raise _many_colours(name)
         ends = f"{name}: masks of values from {self.lowest:.4g} to {self.highest:.4g}"
-        if self.soft or len(values) > FEW_VALUES:
+        if self.soft or many:
             half, kind = self._half
             return _above(half), [f"{ends} are {kind}: the person is above {half:g}"]
         if len(values) <= 2:  # whichever two they are
@@ -461,22 +620,38 @@ class ValueCounts:
             ]
         labels = [value for value, _ in self.solid.most_common() if value]
         if len(labels) > 1:
-            raise InputError(
-                f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
-            )
+            raise self._several(name, labels)
         threshold = float(labels[0] // 2) if labels else self._half[0]
+        # what is far above the only label is no edge of it, as the 255 around the objects of PASCAL VOC
+        most = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
+        if self.highest > most:
+            return _between(threshold, most), [
+                f"{ends}: the person is above {threshold:g}, and what is above {most:g} is not"
+            ]
         return _above(threshold), [
             f"{ends}: the person is above {threshold:g}, what is between is an edge"
         ]
+
+    def _several(self, name: object, labels: Sequence[float]) -> InputError:
+        """Return the error of masks with several labels, none of which is known to be the person's."""
+        return InputError(
+            f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
+        )
 
     @property
     def _half(self) -> tuple[float, str]:
         """The value half way to a whole person, 127 of 255, as whole numbers have no middle; and what the values are.
 
-        Signed ones are a network's logits, of which 0 is the middle.
+        Signed ones are a network's logits, of which 0 is the middle. Degrees that were resampled go a little below 0,
+        and reach about a whole person. An alpha channel that is nowhere half opaque is a translucent colour.
         """
-        if self.lowest < -SIGNED * self.highest:
+        usual = any(
+            0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
+        )
+        if self.lowest < -SIGNED * self.highest or (self.lowest < 0.0 and not usual):
             return 0.0, "logits"
+        if self.alpha and self.highest <= SCALES[1] // 2:
+            return float(self.highest // 2), "translucent"
         # of no usual scale
         if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:
             return self.highest / 2.0, "degrees"
@@ -498,6 +673,10 @@ class ValueCounts:
 
 def _above(threshold: float) -> Classifier:
     return lambda values: np.asarray(values > threshold)
+
+
+def _between(threshold: float, most: float) -> Classifier:
+    return lambda values: np.asarray((values > threshold) & (values <= most))
 
 
 def _many_colours(name: object) -> InputError:

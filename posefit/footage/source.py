@@ -24,7 +24,15 @@ from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.masks import ARRAYS, Range
 from posefit.footage.people import Choice
 from posefit.footage.quality import Verdict
-from posefit.footage.readers import Masks, images_in, name_of, read_masks
+from posefit.footage.readers import (
+    Masks,
+    images_in,
+    images_of,
+    name_of,
+    numbered,
+    numbered_together,
+    read_views,
+)
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
@@ -37,9 +45,29 @@ from posefit.motion.asf import Acclaim, parse_asf
 from posefit.motion.clips import FPS, MOTIONS, FileOptions, Source, load_motion
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
-from posefit.reading import quoted
+from posefit.reading import cut, existing, quoted
 
-NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf", ".json", ".csv", ".txt")
+NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf")
+# files that a user may well name, what they hold, and what is read of that
+UNREAD = (
+    (
+        (
+            *(".trc", ".c3d", ".fbx", ".glb", ".gltf", ".mvnx", ".mot", ".sto"),
+            *(".osim", ".htr", ".v3d", ".vmd", ".usd", ".usda", ".usdc", ".usdz"),
+            *(".bip", ".dae", ".blend", ".tsv"),
+        ),
+        "motions",
+        " and ".join(MOTIONS),
+    ),
+    (
+        (
+            *(".json", ".xml", ".csv", ".txt", ".yaml", ".yml", ".toml", ".zip"),
+            *(".mat", ".h5", ".hdf5", ".pkl", ".pickle", ".pt", ".pth"),
+        ),
+        "masks and motions",
+        f"masks as images or {' and '.join(ARRAYS)}, and motions as {' and '.join(MOTIONS)}",
+    ),
+)
 SIZE = (320, 240)  # pixels of a rendered picture
 Kind = Literal["motion", "masks", "video", "pictures"]
 _KINDS: dict[Kind, str] = {
@@ -146,27 +174,30 @@ def scene_of(
         )
 
     if kind in ("video", "pictures"):
-        videos = [
-            film_of(source, fps)
-            for source in cast(Sequence[str | Path | tuple[Path, ...]], sources)
-        ]
+        videos = films_of(cast(Sequence[str | Path | tuple[Path, ...]], sources), fps)
         rates = {round(video.fps, 3) for video in videos}
         if len(rates) > 1:
             raise InputError(
                 f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}"
             )
-        known = calibrated(camera, [video.size for video in videos])
+        known = calibrated(
+            camera,
+            [video.size for video in videos],
+            [str(video.path) for video in videos],
+        )
         how = replace(extraction or Extraction(), person=person)
         result = _filmed(videos, known, how, frames, progress, scene)
     else:
-        known = calibrated(camera, [None] * len(sources))
         places = [
             source if isinstance(source, np.ndarray | tuple) else Path(str(source))
             for source in sources
         ]
+        known = calibrated(
+            camera, [None] * len(places), [name_of(place) for place in places]
+        )
         views = list[CameraView]()
-        for place in places:
-            masks = read_masks(place, frames, label)
+        read = read_views(places, frames, label)
+        for place, masks in zip(places, read, strict=True):
             choice = (
                 partial(
                     same_person, [known[0], known[len(views)]], views[0], masks.size
@@ -212,16 +243,35 @@ def logged(scene: Scene, progress: Progress) -> Scene:
     return scene
 
 
-def film_of(source: str | Path | tuple[Path, ...], fps: float | None) -> Video:
-    """Return the film of a video file, or of pictures, a folder of them or their files, taken at a rate."""
-    if isinstance(source, tuple):
-        return Video.of_pictures(source, Path(name_of(source)), fps)
-    path = Path(source)
-    return (
-        Video.of_pictures(images_in(path), path, fps)
-        if path.is_dir()
-        else Video.of(path)
-    )
+def films_of(
+    sources: Sequence[str | Path | tuple[Path, ...]], fps: float | None
+) -> list[Video]:
+    """Return the films that cameras took: video files, or folders and lists of pictures, taken at a rate.
+
+    Pictures of one moment are those of one number. Raises InputError where a film cannot be read, or pictures have no
+    number in common.
+    """
+    places = [
+        source if isinstance(source, tuple) else Path(source) for source in sources
+    ]
+    pictures = [view for place in places if (view := images_of(place)) is not None]
+    if len(pictures) < len(places):
+        return [_film(place, fps) for place in places]
+    names = [name_of(place) for place in places]
+    views = numbered_together(pictures, names)
+    return [
+        Video.of_pictures(view, Path(name), fps)
+        for view, name in zip(views, names, strict=True)
+    ]
+
+
+def _film(place: Path | tuple[Path, ...], fps: float | None) -> Video:
+    pictures = images_of(place)
+    if pictures is None:
+        assert isinstance(place, Path)
+        return Video.of(place)
+    name = name_of(place)
+    return Video.of_pictures(numbered(pictures, name), Path(name), fps)
 
 
 def body_of(
@@ -312,11 +362,96 @@ def _taken_out(
         return None, Verdict(str(error), True)
 
 
+def sources_of(source: Any) -> list[Footage]:
+    """Return one source a camera of what a user names: a source, or a sequence of them.
+
+    Images and masks (H, W) in a sequence are the frames of one camera; sequences of these in a sequence, and anything
+    else in one, are of a camera each. Raises InputError where it is anything else.
+    """
+    if isinstance(source, os.PathLike):
+        source = Path(source)
+    if _is_named(source):
+        return [_images(source) if _is_image(source) else source]
+    if _is_array(source):
+        array = _array(source)
+        # an array of texts is a list of them
+        if array.dtype.kind in "OU":
+            return sources_of(array.tolist())
+        return [array[None] if array.ndim == 2 else array]
+    if not isinstance(source, Sequence) or isinstance(source, bytes):
+        raise InputError(
+            f"source must be a motion, masks, a video or a list of these, got {quoted(source)}"
+        )
+    if not source:
+        raise InputError("source must name something, got an empty list")
+    frames = _frames(source)
+    return [_view(each) for each in source] if frames is None else [frames]
+
+
+def _view(source: Any) -> Footage:
+    """Return what one of several cameras took."""
+    if not isinstance(source, Sequence) or isinstance(source, str | Motion):
+        (view,) = sources_of(source)
+        return view
+    frames = _frames(source) if source else None
+    if frames is None:
+        raise InputError(
+            f"source must have image files or masks in the list of each camera, got {quoted(source)}"
+        )
+    return frames
+
+
+def _frames(sources: Sequence[Any]) -> Masks | None:
+    """Return the frames of one camera, image files or masks (H, W); None where these are anything else."""
+    if all(_is_image(each) for each in sources):
+        return _images(*sources)
+    if not all(_is_array(each) for each in sources):
+        return None
+    masks = [_array(each) for each in sources]
+    if any(mask.ndim != 2 for mask in masks):
+        return None
+    shapes = sorted({str(mask.shape) for mask in masks})
+    if len(shapes) > 1:
+        raise InputError(f"masks must have one shape, got {', '.join(shapes)}")
+    return np.stack(masks)
+
+
+def _is_named(source: Any) -> bool:
+    return isinstance(source, str | os.PathLike | Motion)
+
+
+def _is_image(source: Any) -> bool:
+    return (
+        isinstance(source, str | os.PathLike)
+        and Path(source).suffix.lower() in IMAGES
+        and not Path(source).is_dir()
+    )
+
+
+def _images(*files: str | os.PathLike[str]) -> tuple[Path, ...]:
+    return tuple(Path(file) for file in files)
+
+
+def _is_array(source: Any) -> bool:
+    return not _is_named(source) and hasattr(source, "__array__")
+
+
+def _array(source: Any) -> Any:
+    """Return a NumPy array of another library's. Raises InputError where that has none, as on a GPU."""
+    try:
+        return np.asarray(source)
+    except Exception as error:
+        raise InputError(
+            f"masks must be arrays that NumPy can read, got {type(source).__name__}: {cut(str(error))}"
+        ) from None
+
+
 def kind_of(source: Footage) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video.
 
     A name with folders in it and no suffix is a folder's, even where there is none. Images are a film where there are
-    several, or pages, and the first is a picture in many colours; else they are masks.
+    several, or pages, and the first is a picture in many colours; else they are masks. Raises InputError for a file
+    that is no source by its name.
     """
     if isinstance(source, np.ndarray):
         return "masks"
@@ -333,7 +468,8 @@ def kind_of(source: Footage) -> Kind:
     ):
         return "motion"
     path = Path(source)
-    if path.suffix.lower() in IMAGES and not path.is_dir():
+    suffix = path.suffix.lower()
+    if suffix in IMAGES and not path.is_dir():
         return kind_of((path,))
     if path.is_dir():
         if (path / "poses.npz").is_file() and (path / "summary.json").is_file():
@@ -341,6 +477,15 @@ def kind_of(source: Footage) -> Kind:
                 f"{path}: expected a source, got a track's folder: give the source that it was made from"
             )
         return kind_of(tuple(images)) if (images := images_in(path)) else "masks"
-    if path.suffix.lower() in ARRAYS or (not path.suffix and os.sep in str(source)):
+    if not suffix and path.is_file():
+        raise InputError(
+            f"{path}: expected a name that ends in what the file is, such as .mp4, .npz or .bvh, got no suffix"
+        )
+    for suffixes, what, instead in UNREAD:
+        if suffix in suffixes:
+            raise InputError(
+                f"{existing(path)}: {what} of {suffix} are not read; {instead} are"
+            )
+    if suffix in ARRAYS or (not suffix and os.sep in str(source)):
         return "masks"
-    return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
+    return "video" if suffix and suffix not in NO_VIDEO else "motion"

@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS, page_count, read_image
-from posefit.footage.readers import numbered
+from posefit.footage.readers import Numbered
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 
@@ -25,6 +25,10 @@ HEAD = 2_000  # bytes at the beginning of a file by which a text is recognised
 SQUARE = 0.02  # by how much the sides of a pixel may differ
 Order = NDArray[np.int64]  # (T,) numbers of frames
 CODE = "mp4v"
+# MPEG-4 counts time in at most so many parts of a second, and OpenCV gives it a rate as
+# a decimal fraction of at most three places
+MAX_TICKS = 65_535
+WRITTEN_RATES = 0.01, 60_000.0  # frames a second of a file that OpenCV writes
 # of the distance between frames: one that comes so much too early or too late is not in
 # its place
 UNEVEN = 0.75
@@ -133,17 +137,17 @@ class Video:
         return cls(name, fps, size, pictures=images, _order=order, _filmed=order >= 0)
 
     @classmethod
-    def of_pictures(
-        cls, files: Sequence[Path], name: Path, fps: float | None
-    ) -> "Video":
+    def of_pictures(cls, images: Numbered, name: Path, fps: float | None) -> "Video":
         """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
-        frames, guesses = numbered(files, str(name))
+        files = [file for file in images.files if file is not None]
+        guesses = list(images.guesses)
         pictures: list[tuple[Path, int] | Image] = [
             (file, page) for file in files for page in range(page_count(file))
         ]
         image = _picture(pictures[0])
-        filmed = np.array([file is not None for file in frames])
-        order = np.cumsum(filmed) - 1
+        filmed = np.array([file is not None for file in images.files])
+        # a film that begins with missing pictures holds the first one
+        order = np.maximum(np.cumsum(filmed) - 1, 0)
         if len(pictures) > len(files):
             order = np.arange(len(pictures))
             filmed = np.ones(len(pictures), dtype=bool)
@@ -298,18 +302,31 @@ def _even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
     return order, off == least[order], 1.0 / usual
 
 
+def video_rate(fps: float) -> float:
+    """Return the rate that an .mp4 file has for `fps`: 119.88 for 119.8765.
+
+    It is rounded to three decimals up to 65 frames a second, to two up to 655, and to one above.
+    """
+    rate = float(np.clip(fps, *WRITTEN_RATES))
+    digits = next(digits for digits in (3, 2, 1, 0) if rate * 10**digits <= MAX_TICKS)
+    return round(rate, digits)
+
+
 class VideoWriter:
-    """Writes an .mp4 whose number of frames is checked at the end: OpenCV says nothing when the disk is full."""
+    """Writes an .mp4 whose number of frames is checked at the end: OpenCV says nothing when the disk is full.
+
+    Its rate is `video_rate`, which is rounded.
+    """
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
         self._path = path
         self._count = 0
         self._writer = cv2.VideoWriter(
-            opencv_name(path), cv2.VideoWriter.fourcc(*CODE), fps, size
+            opencv_name(path), cv2.VideoWriter.fourcc(*CODE), video_rate(fps), size
         )
         if not self._writer.isOpened():
             raise InputError(
-                f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot"
+                f"expected OpenCV to write {CODE} video, got a build or a disk that cannot"
             )
 
     def write(self, image: Image) -> None:

@@ -44,6 +44,8 @@ BLOCK = 16  # pixels: codecs fill pictures up to a multiple of it
 _ROUNDED = {"f": np.float32, "h": np.float16}
 _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
 SUBPIXELS = 64.0  # Qualisys counts lengths on the sensor in 64ths of a pixel
+# Kalibr's key: the matrix (4, 4) to a camera from the one before it in the file
+CHAINED = "T_cn_cnm1"
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 # The rotation of the world that turns an axis to +y.
 TURNS = {
@@ -75,7 +77,7 @@ LENS = (
         "distcoefficients",
         "distcoeffs",
     ),
-    *("distcoefs", "distcoeff", "dist", "d", "kc"),
+    *("distcoefs", "distcoef", "distcoeff", "dist", "d", "kc"),
 )
 MODEL = (
     "distortionmodel",
@@ -129,10 +131,25 @@ _POLYNOMIALS = (
 _OTHERS = re.compile(
     "omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular"
 )
-# keys that seem to describe a lens, such as radial_distortion, kappa1, k7 or xi; not distance, lens_mm or lens_serial
+# keys that seem to describe a lens, such as radial_distortion, kappa1, k7, p3, s1, skew or xi; not distance, lens_mm or
+# lens_serial
 _OF_LENS = re.compile(
-    r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|(k|kappa)[0-9]*|xi"
+    r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni|prism|skew|shear).*"
+    r"|(k|kappa|p|b)[0-9]+|k|kappa|s[1-9]|tau[0-9xy]*|alphac?|xi"
 )
+# keys that seem to say where a camera stands, in a way that is not read: axes and directions differ between programs
+_OF_PLACE = re.compile(
+    r"(camera|cam|c|world|w)(to|2|from)(camera|cam|c|world|w)(matrix)?|matrixworld|tcw|twc"
+    r"|(camera)?(transform|extrinsics?|pose)(matrix)?|rt|q|qvec|quat|quaternion"
+    r"|(camera)?(position|location|orientation|euler|eulerangles)"
+)
+FULL_TURN = 2.0 * math.pi  # radians, and no rotation vector is longer
+SKEWED = 2e-3  # of the focal length: pixels whose sides lean by less change nothing
+# of a picture's sides: a principal point is in the middle half
+MIDDLE = 0.25, 0.75
+# by how much of a picture's sides it may be off the centre by equal shares of both, as a picture that was scaled has it
+SCALED = 0.1
+EQUAL = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +159,7 @@ class Calibration:
     name: str
     # width, height; None where the file does not state it: that of its pictures
     size: tuple[int, int] | None
-    # (3, 3) of the pinhole, skew ignored; pixel centres at 0, as OpenCV counts them
+    # (3, 3) of the pinhole, a skew of next to nothing ignored; pixel centres at 0, as OpenCV counts them
     matrix: Array = field(repr=False)
     # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; none is all 0
     distortion: Array = field(repr=False)
@@ -190,8 +207,7 @@ class Calibration:
         half of the picture.
         """
         if self.size is None:
-            middle = self.matrix[:2, 2] / size
-            fits = ((middle > 0.25) & (middle < 0.75)).all() and is_focal(
+            fits = _is_central(self.matrix, size) and is_focal(
                 np.diag(self.matrix)[:2], size
             )
             return replace(self, size=size) if fits else None
@@ -231,6 +247,18 @@ class Calibration:
         return np.concatenate(
             [straight.reshape(*points.shape[:-1], 2), points[..., 2:]], axis=-1
         )
+
+
+def _is_central(matrix: Array, size: Sequence[float]) -> bool:
+    """Return whether a principal point may be that of pictures of a size, and not of larger or smaller ones."""
+    across, down = matrix[:2, 2] / size
+    low, high = MIDDLE
+    if not (low < across < high and low < down < high):
+        return False
+    scaled = (
+        abs(across - down) < EQUAL and min(abs(across - 0.5), abs(down - 0.5)) > SCALED
+    )
+    return not scaled
 
 
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
@@ -333,11 +361,42 @@ def _cameras(path: Path, text: str) -> list[Calibration]:
     if start.startswith("{") and "camera_from_world" in text:
         return _own(path)
     values = _stored_values(path, start, text)
+    if any(_has_transforms(value) for value in values.values()):
+        raise InputError(
+            "transforms of NeRF's programs, whose key 'transform_matrix' is not read"
+        )
+    if any(isinstance(value, dict) and CHAINED in value for value in values.values()):
+        return _chained(path.stem, values)
     if "names" in values and any(
         key.startswith("K_") or key.startswith("Rot_") for key in values
     ):
         return _easymocap(path, values)
     return _described(path.stem, values)
+
+
+def _has_transforms(value: Any) -> bool:
+    return isinstance(value, list) and any(
+        isinstance(entry, dict) and "transform_matrix" in entry for entry in value
+    )
+
+
+def _chained(name: str, values: Mapping[str, Any]) -> list[Calibration]:
+    """Return the cameras of Kalibr's chain, each of which states its place from the camera before it.
+
+    The world is the first camera's.
+    """
+    place = np.eye(4)
+    cameras = list[Calibration]()
+    for camera in _described(name, values):
+        table = values[camera.name]
+        if CHAINED in table:
+            place = _numbers(_matrix_of(table[CHAINED]), (4, 4)) @ place
+        elif cameras:
+            raise InputError(f"{quoted(camera.name)} without {CHAINED}")
+        cameras.append(
+            replace(camera, rotation=place[:3, :3], translation=place[:3, 3])
+        )
+    return cameras
 
 
 def _own(path: Path) -> list[Calibration]:
@@ -364,7 +423,12 @@ def _described(name: str, values: Mapping[str, Any]) -> list[Calibration]:
     for _ in range(3):
         inner: list[tuple[str, Mapping[str, Any]]] = []
         for name, table in tables:
-            known = {_plain(key): value for key, value in table.items()}
+            # a camera may be called K or D
+            known = {
+                _plain(key): value
+                for key, value in table.items()
+                if not _is_camera(key, value)
+            }
             # a camera that Caliscope left out
             if str(known.get("ignore")).lower() == "true":
                 continue
@@ -386,6 +450,16 @@ def _described(name: str, values: Mapping[str, Any]) -> list[Calibration]:
             raise InputError(f"a file of more than {MOST_TABLES:,} tables")
         tables = inner
     return cameras
+
+
+def _is_camera(key: str, value: Any) -> bool:
+    """Return whether a value is a table that describes a camera, whatever this is called."""
+    if not isinstance(value, dict):
+        return False
+    names = {_plain(name) for name in value}
+    # a table of focal lengths may also be the `intrinsics` of the camera around it
+    stated = {"fx", "fy"} <= names and (_plain(key) not in MATRIX or len(key) == 1)
+    return stated or not names.isdisjoint(MATRIX)
 
 
 def _tables(values: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -412,10 +486,12 @@ def _camera(
     # in OpenCV's order
     numbered = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")
     lens = _first(known, LENS)
+    stated = dict(values)
     if lens is None or (isinstance(lens, dict) and "k1" in lens):
+        stated |= lens or {}
         lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
     others = *LENS, *MODEL, *numbered, next(key for key in MATRIX if key in known)
-    for key, value in values.items():
+    for key, value in stated.items():
         if (
             _OF_LENS.fullmatch(plain := _plain(key))
             and plain not in others
@@ -425,22 +501,87 @@ def _camera(
                 f"the lens key {quoted(key)} of {quoted(name)}, which is not known"
             )
     size = _first(known, SIZE) or [_first(known, names) for names in SIDES]
-    rotation = _first(known, ROTATION)
-    translation = _first(known, TRANSLATION)
-    # a message of ROS, whose R rectifies and does not place
-    if "distortionmodel" in known and "p" in known:
-        rotation = translation = None
-    if (rotation is None) != (translation is None):
-        raise InputError("one with a rotation or a translation, but not both")
+    sides = None if None in size else [_number_of(side) for side in size]
+    matrix = _numbers(
+        np.reshape(matrix, (3, 3)) if np.shape(matrix) == (9,) else matrix, (3, 3)
+    )
+    matrix, part = _region(known, matrix, sides)
+    rotation, translation = _place(name, values, known)
     return _stated(
         name,
-        None if None in size else [_number_of(side) for side in size],
+        part,
         matrix,
         _matrix_of(lens),
-        None if rotation is None else _matrix_of(rotation),
-        None if translation is None else _matrix_of(translation).reshape(-1),
+        rotation,
+        translation,
         fisheye,
+        cropped=part != sides,
     )
+
+
+def _place(
+    name: str, values: Mapping[str, Any], known: Mapping[str, Any]
+) -> tuple[Array | None, Array | None]:
+    """Return the rotation and the translation that values state, None of a camera that they do not place.
+
+    Raises InputError where they seem to place it in a way that is not read.
+    """
+    # a message of ROS, whose R rectifies and does not place
+    if "distortionmodel" in known and "p" in known:
+        return None, None
+    rotation = _first(known, ROTATION)
+    translation = _first(known, TRANSLATION)
+    if rotation is None and translation is None:
+        # of a chessboard there are many; a single one is the camera's place
+        single = [_matrix_of(known[key]) for key in ("rvecs", "tvecs") if key in known]
+        if len(single) == 2 and all(numbers.size == 3 for numbers in single):
+            return single[0].reshape(-1), single[1].reshape(-1)
+        for key, value in values.items():
+            if _OF_PLACE.fullmatch(_plain(key)) and (
+                isinstance(value, dict) or _counts(value)
+            ):
+                raise InputError(
+                    f"the key {quoted(key)} of {quoted(name)}, which is not read: where a camera stands is its "
+                    "rotation and translation, from the world to the camera"
+                )
+        return None, None
+    if rotation is None or translation is None:
+        raise InputError("one with a rotation or a translation, but not both")
+    return _matrix_of(rotation), _matrix_of(translation).reshape(-1)
+
+
+def _region(
+    known: Mapping[str, Any], matrix: Array, size: list[float] | None
+) -> tuple[Array, list[float] | None]:
+    """Return the matrix and the size of the pictures that a camera sends, which may be a part of the sensor's, binned.
+
+    They are `roi` and `binning_x` and `binning_y` of ROS' CameraInfo, whose K and size are those of the whole sensor.
+    """
+    region = known.get("roi")
+    part = {}
+    if isinstance(region, dict):
+        part = {_plain(key): value for key, value in region.items()}
+    elif region is not None and _counts(region):
+        raise InputError(
+            "the key 'roi', which is not read: x_offset, y_offset, width and height are"
+        )
+    offset = np.array([_number_of(part.get(f"{axis}offset", 0)) for axis in "xy"])
+    sides = [_number_of(part.get(side, 0)) for side in ("width", "height")]
+    # 0 stands for 1, and for the whole sensor
+    bins = np.array(
+        [_number_of(known.get(f"binning{axis}", 0)) or 1.0 for axis in "xy"]
+    )
+    if all(sides):
+        size = sides
+    elif offset.any() or any(sides):
+        raise InputError(f"a region of interest without a size, {quoted(region)}")
+    if (bins == 1.0).all() and not offset.any():
+        return matrix, size
+    focal = np.diag(matrix)[:2] / bins
+    centre = (matrix[:2, 2] + HALF - offset) / bins - HALF
+    if size is not None:
+        size = [float(side // by) for side, by in zip(size, bins, strict=True)]
+    return pinhole_matrix(focal, centre), size
 
 
 def _plain(key: object) -> str:
@@ -505,8 +646,13 @@ def _easymocap(path: Path, values: dict[str, Any]) -> list[Calibration]:
 
 
 def _qualisys(text: str) -> list[Calibration]:
+    root = _xml_of(text)
+    if root.find(".//fov_video") is None:
+        raise InputError(
+            f"{_XML_OF.get(root.tag, 'XML of ' + quoted(root.tag))}, which is not read: XML of OpenCV and Qualisys is"
+        )
     calibrations: list[Calibration] = []
-    for number, camera in enumerate(_xml_of(text).iter("camera")):
+    for number, camera in enumerate(root.iter("camera")):
         view, lens, place = (
             _tag(camera, name) for name in ("fov_video", "intrinsic", "transform")
         )
@@ -545,7 +691,16 @@ def _qualisys(text: str) -> list[Calibration]:
         matrix = pinhole_matrix(focal, centre - (left, top))
         name = camera.get("serial", f"camera {number}")
         calibrations.append(
-            _stated(name, size, matrix, distortion, rotation, -rotation @ position)
+            _stated(
+                name,
+                size,
+                matrix,
+                distortion,
+                rotation,
+                -rotation @ position,
+                # the field of view may be any part of the sensor
+                cropped=True,
+            )
         )
     return calibrations
 
@@ -565,11 +720,13 @@ def _stated(
     rotation: Any,
     translation: Any,
     fisheye: bool = False,
+    *,
+    cropped: bool = False,
 ) -> Calibration:
-    """Return what a file states, checked; a rotation of three numbers is its axis, as long as its angle."""
-    matrix = _numbers(
-        np.reshape(matrix, (3, 3)) if np.shape(matrix) == (9,) else matrix, (3, 3)
-    )
+    """Return what a file states, checked; a rotation of three numbers is its axis, as long as its angle.
+
+    The centre of `cropped` pictures may be anywhere in them.
+    """
     if size is not None:
         width, height = size
         if not (
@@ -585,6 +742,15 @@ def _stated(
             f"a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: {quoted(matrix.tolist())}"
         )
     check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
+    if abs(matrix[0, 1]) > SKEWED * matrix[0, 0]:
+        raise InputError(
+            f"a skew of {matrix[0, 1]:g} pixels, which is not read: pictures must have upright pixels"
+        )
+    if size is not None and not cropped and not _is_central(matrix, size):
+        centre = " and ".join(f"{value:g}" for value in matrix[:2, 2])
+        raise InputError(
+            f"a centre of {centre} in pictures of {size[0]}x{size[1]}: it is of pictures of another size"
+        )
     lens = np.array(distortion, dtype=np.float64).reshape(-1)
     if not np.isfinite(lens).all():
         raise InputError("a distortion that is not finite")
@@ -595,7 +761,14 @@ def _stated(
             f"a distortion of {lens.size} numbers{' of a fisheye' if fisheye else ''}"
         )
     if rotation is not None and np.size(rotation) == 3:
-        rotation = cv2.Rodrigues(_numbers(np.reshape(rotation, 3), (3,)))[0]
+        vector = _numbers(np.reshape(rotation, 3), (3,))
+        angle = float(np.linalg.norm(vector))
+        if angle > FULL_TURN:
+            raise InputError(
+                f"a rotation of {angle:g} radians about an axis, more than a full turn: are {quoted(vector.tolist())} "
+                "degrees, or angles about three axes?"
+            )
+        rotation = cv2.Rodrigues(vector)[0]
     elif np.shape(rotation) == (9,):
         rotation = np.reshape(rotation, (3, 3))
     return Calibration(
@@ -607,6 +780,10 @@ def _stated(
         None if translation is None else _numbers(translation, (3,)),
         fisheye,
     )
+
+
+# programs whose XML is well known, by its root
+_XML_OF = {"document": "Metashape's XML", "Cameras": "Vicon's XML"}
 
 
 def pinhole_matrix(
@@ -641,7 +818,8 @@ def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
     if path.suffix.lower() == ".toml":
         return parsed_toml(text)
     if not (
-        start.startswith(("<", "{", "%")) or path.suffix.lower() in (".yml", ".yaml")
+        start.startswith(("<", "{", "[", "%"))
+        or path.suffix.lower() in (".yml", ".yaml")
     ):
         raise InputError(
             f"a file that is none of them, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml"
@@ -650,9 +828,11 @@ def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
         _xml(text)
         if start.startswith("<")
         else parsed_json(text)
-        if start.startswith("{")
+        if start.startswith(("{", "["))
         else _yaml(text)
     )
+    if isinstance(values, list):  # of cameras, as those of the AIST database
+        values = {"camera": values}
     if not isinstance(values, dict):
         raise InputError(f"a file without names, {quoted(values)}")
     return values

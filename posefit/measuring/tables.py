@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.measuring.angles import clinical_angles
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait, Step
@@ -27,18 +28,22 @@ def import_pandas() -> Any:
         ) from error
 
 
+def angle_columns(motion: Motion, blank: Collection[int] = ()) -> dict[str, Array]:
+    """Return the clinical angles (T,) in degrees by name; NaN in the frames numbered in `blank`."""
+    unknown = np.isin(motion.first + np.arange(len(motion)), list(blank))
+    angles = clinical_angles(motion.skeleton, motion.poses)
+    return {name: np.where(unknown, np.nan, values) for name, values in angles.items()}
+
+
 def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
     """Write one row a frame of the clinical angles in degrees; of those numbered in `blank` only the time."""
-    angles = clinical_angles(motion.skeleton, motion.poses)
+    angles = angle_columns(motion, blank)
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["frame", "seconds", *angles])
         for k, row in enumerate(np.column_stack(list(angles.values()))):
             number = motion.first + k
-            cells = [
-                "" if number in blank or np.isnan(value) else f"{value:.3f}"
-                for value in row
-            ]
+            cells = ["" if np.isnan(value) else f"{value:.3f}" for value in row]
             writer.writerow([number, f"{number / motion.fps:.6f}", *cells])
 
 
@@ -57,46 +62,42 @@ def write_gait(path: str | Path, gait: Gait) -> None:
 
 
 def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
-    """Write the 27 joints of every frame as markers, in metres and y up; of those numbered in `blank` only the time.
+    """Write the 27 joints of every frame as markers, in metres and y up; frames numbered in `blank` have no row.
 
-    Markers are named by `PLACES`. OpenSim and similar programs take an empty field for an unobserved marker.
+    Markers are named by `PLACES`. OpenSim's inverse kinematics stops at a row without markers, and takes the others by
+    their times. It needs at least one row: where every frame is blank, each has a row of empty cells.
     """
     path = Path(path)
     count = len(motion)
-    fps = f"{motion.fps:g}"
-    head = (
-        "DataRate",
-        "CameraRate",
-        "NumFrames",
-        "NumMarkers",
-        "Units",
-        "OrigDataRate",
-        "OrigDataStartFrame",
-    )
+    numbers = motion.first + np.arange(count)
+    unknown = np.isin(numbers, list(blank))
+    rows = np.arange(count) if unknown.all() else np.flatnonzero(~unknown)
+    fps = f"{motion.fps:.10g}"
+    head = {
+        "DataRate": fps,
+        "CameraRate": fps,
+        "NumFrames": len(rows),
+        "NumMarkers": len(PLACES),
+        "Units": "m",
+        "OrigDataRate": fps,
+        "OrigDataStartFrame": motion.first + 1,
+        "OrigNumFrames": count,
+    }
+    axes = [f"{axis}{marker}" for marker in range(1, len(PLACES) + 1) for axis in "XYZ"]
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
-        "\t".join([*head, "OrigNumFrames"]),
-        "\t".join(
-            [
-                fps,
-                fps,
-                str(count),
-                str(len(PLACES)),
-                "m",
-                fps,
-                str(motion.first + 1),
-                str(count),
-            ]
-        ),
+        "\t".join(head),
+        "\t".join(map(str, head.values())),
         "Frame#\tTime\t" + "\t".join(f"{place}\t\t" for place in PLACES),
-        "\t\t"
-        + "\t".join(f"{axis}{k}" for k in range(1, len(PLACES) + 1) for axis in "XYZ"),
+        "\t\t" + "\t".join(axes),
         "",
     ]
-    for k, points in enumerate(motion.joints):
-        number = motion.first + k
-        values = "\t".join(
-            "" if number in blank else f"{value:.6f}" for value in points.reshape(-1)
-        )
-        lines.append(f"{number + 1}\t{number / motion.fps:.6f}\t{values}")
+    points = motion.joints.reshape(count, -1)
+    for k in rows:
+        cells = [f"{value:.6f}" for value in points[k]]
+        if unknown[k]:
+            # one cell more, as OpenSim does not count a last one that is empty
+            cells = [""] * (len(cells) + 1)
+        time = f"{numbers[k] / motion.fps:.6f}"
+        lines.append("\t".join([str(numbers[k] + 1), time, *cells]))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

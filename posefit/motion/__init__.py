@@ -6,7 +6,7 @@
 | a motion by what a user names, at any rate; what methods learn from | clips.py |
 | the built-in motions, which need no data | built_in.py |
 | recorded clips of ten people, with the package | recorded.py |
-| numbered variations of a motion, as in other benchmarks | instance.py |
+| what "instance 17" is: the one numbering, its random streams, variations of a motion | instances.py |
 | how joints accelerate, and how far feet slide while they stand | steadiness.py |
 | Acclaim skeletons, such as CMU's `02.asf` | asf.py |
 | Acclaim motions, such as CMU's `02_01.amc`; `read_clip` reads both files at once | amc.py |

@@ -21,7 +21,7 @@ from posefit.geometry.rotation import angles_about, rotation_about, steady_angle
 from posefit.geometry.skeleton import ENDS, JOINTS, PARENTS
 from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit, metres_of, unit_of
 from posefit.motion.amc import SIZE_LIMIT, VALUES
-from posefit.motion.joint_names import joints_of
+from posefit.motion.joint_names import joints_of, part_of
 from posefit.motion.lines import LARGEST, Line, lines_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.motion.rig import STANDING, Rig, retargeted, upward
@@ -84,6 +84,7 @@ def read_bvh(
     nodes, values, fps = _parsed(path)
     try:
         rig = _rig(nodes, values)
+        others = _others(rig)
         axis, turn = _upright(rig, up)
         result = retargeted(rig, turn)
     except InputError as error:
@@ -98,6 +99,11 @@ def read_bvh(
         result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres
     )
     notes = []
+    if others:
+        followed = quoted(rig.names[rig.joints.hips])
+        notes.append(
+            f"{path}: the person of {followed} is read; {', '.join(map(quoted, others))} left out"
+        )
     if unit is None and chosen != "m":
         stands = f"as the person stands {stature:.4g} of them"
         notes.append(
@@ -322,6 +328,28 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
             )
     at_rest = np.tile(np.eye(3), (len(nodes), 1, 1))
     return Rig(names, parents, joints, (at_rest, rest), (turns, places))
+
+
+def _others(rig: Rig) -> list[str]:
+    """Return the names of what a file holds beside the person: other roots, and other people below the same root."""
+    above = [rig.joints.hips]
+    while rig.parents[above[-1]] >= 0:
+        above.append(rig.parents[above[-1]])
+    thigh = part_of(rig.names[rig.joints.limbs["left", "thigh"]])
+    others = list[int]()
+    for number, name in enumerate(rig.names):
+        part = part_of(name)
+        is_thigh = (part.side, part.part) == (thigh.side, thigh.part)
+        if rig.parents[number] >= 0 and not is_thigh:
+            continue
+        # the first node on the way down that is no longer above the person
+        top = number
+        while rig.parents[top] >= 0 and rig.parents[top] not in above:
+            top = rig.parents[top]
+        of_the_person = top in above or rig.parents[top] == rig.joints.hips
+        if not of_the_person and top not in others:
+            others.append(top)
+    return [rig.names[other] for other in others]
 
 
 def _movement(node: _Node, values: Array) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -69,8 +70,16 @@ def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
 def recorded_clip(clip: recorded.RecordedClip) -> SourceClip:
     """Return what gives a recorded clip's motion at any rate, which is made only then."""
     return SourceClip(
-        lambda fps: clip.motion().resampled(fps), int(clip.times[-1]) + 1, recorded.FPS
+        lambda fps: _resampled(clip, float(fps)),
+        int(clip.times[-1]) + 1,
+        recorded.FPS,
     )
+
+
+# those of the whole library at one rate, or at two: 40 MB
+@lru_cache(maxsize=512)
+def _resampled(clip: recorded.RecordedClip, fps: float) -> Motion:
+    return clip.motion().resampled(fps)
 
 
 def _motion_in(source: str | Path, stated: FileOptions) -> Motion:

@@ -14,6 +14,7 @@ from posefit.evaluation.trust import Trust
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
 from posefit.uncertainty.calibration import LEVELS, Recalibration
@@ -104,6 +105,18 @@ class Content:
     def blank(self) -> set[int]:
         """The frames of which nothing is known: their numbers as filmed."""
         return unseen(self.table)
+
+    @cached_property
+    def columns(self) -> dict[str, Sequence[Any]]:
+        """The columns (T,) of frames.csv: figures, activity, and joints, unknown ones as NaN."""
+        points = self.motion.joints.reshape(len(self.frames), -1).T.copy()  # (81, T)
+        points[:, np.isin(self.table["frame"], list(self.blank))] = np.nan
+        names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
+        return {
+            **self.table,
+            "activity": [frame.activity for frame in self.frames],
+            **dict(zip(names, points, strict=True)),
+        }
 
     @cached_property
     def intervals(self) -> dict[str, Array]:

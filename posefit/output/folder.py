@@ -12,10 +12,12 @@ from typing import Any, Self
 from posefit.errors import InputError
 from posefit.files import MARK, Unfinished, opencv_name, other_entries
 from posefit.fitting.tracker import Frame
+from posefit.footage.scene import Scene
 from posefit.output.content import Content
-from posefit.output.files import FILES, write_files
+from posefit.output.files import FILES, video_warning, write_files
 from posefit.output.identity import Digest, difference
 from posefit.output.record import append_frame, read_frames
+from posefit.progress import WARNING
 from posefit.reading import cut, parsed_json, read_text
 
 RECORD = "frames.jsonl"
@@ -41,6 +43,9 @@ class Recorder:
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
+
+    def begin(self, scene: Scene) -> None:
+        """Say before the work what of a scene's track cannot be written."""
 
     def finish(self, content: Content) -> None:
         """Write everything."""
@@ -73,10 +78,16 @@ class OutputFolder(Recorder):
                     earlier.remove(_WRITTEN)
                 self._unfinished = Unfinished.begin(self.path, self._spec)
             self.building = self._unfinished.path
+            # now, so that they are kept whatever fails before the first new frame
+            frames, state, damage = read_frames(self.building / RECORD)
         except OSError as error:
             raise InputError(
                 f"{self.path}: expected a place to write to, got {error.strerror}"
             ) from None
+        if damage:
+            self._log(f"{WARNING}{damage}; tracked again from there")
+        self._earlier = (frames, state)
+        self._recorded = len(frames)
         return self
 
     def __exit__(
@@ -114,20 +125,23 @@ class OutputFolder(Recorder):
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames that were recorded before, and the state of the random generator after them."""
-        frames, state, damage = read_frames(self.building / RECORD)
-        if damage:
-            self._log(f"warning: {damage}; tracked again from there")
-        self._recorded = len(frames)
-        return frames, state
+        frames, state = self._earlier
+        return list(frames), state
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
         append_frame(self.building / RECORD, frame, state)
         self._recorded += 1
 
+    def begin(self, scene: Scene) -> None:
+        """Say before the work what of a scene's track cannot be written."""
+        if warning := video_warning(self.building, scene):
+            self._log(f"{WARNING}{warning}")
+
     def finish(self, content: Content) -> None:
-        """Write everything."""
-        write_files(self.building, content)
+        """Write everything, but for pictures that cannot be made: the poses do not depend on them."""
+        for warning in write_files(self.building, content):
+            self._log(f"{WARNING}{warning}")
 
 
 def _check_target(path: Path, force: bool) -> None:

@@ -4,6 +4,7 @@ Where a method reports its uncertainty, uncertain limbs are faint, another mode 
 frames have a border.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -14,7 +15,7 @@ from posefit.arrays import Array
 from posefit.evaluation.errors import LOST, Table
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
-from posefit.geometry.camera import Camera
+from posefit.geometry.camera import FOCALS, Camera
 from posefit.motion.steadiness import runs
 from posefit.output.drawing import (
     BACKGROUND,
@@ -40,6 +41,10 @@ from posefit.uncertainty.modes import Mode, other_mode, other_modes
 
 Row = Mapping[str, float]  # of a table
 PANEL = 480  # pixels high
+# times the panels' height that a picture is wide at most, as MPEG-4 has no frames of
+# more than 8,191 pixels; wider ones are lower
+MAX_ASPECT = 4
+MIN_OVERLAY = 240  # pixels of its width, so that there is room for the words
 # of neither, the mask, the body, and both
 OVERLAP = np.array([BACKGROUND, MISSED, SPILLED, BOTH], dtype=np.uint8)
 SUMMARY_STILLS = 6  # frames on the summary
@@ -63,12 +68,26 @@ class Painter:
 
     def __init__(self, scene: Scene, usable: Sequence[bool] = ()) -> None:
         self._scene = scene
+        # as many columns of cameras as rows, or one more
+        self._columns = math.ceil(math.sqrt(len(scene.cameras)))
+        self._panel = PANEL // math.ceil(len(scene.cameras) / self._columns)
+        widths = [
+            panel_size(camera.width, camera.height, self._panel)[0]
+            for camera in scene.cameras
+        ]
+        # even, as a video's width has to be
+        self._widest = max(*widths, MIN_OVERLAY // self._columns // 2 * 2)
         shown = np.flatnonzero(usable) if any(usable) else np.arange(scene.count)
         self._wanted = np.unique(
             shown[np.linspace(0, len(shown) - 1, SUMMARY_STILLS).round().astype(int)]
         ).tolist()
         self._stills: list[Image] = []
         self._count = 0
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The width and the height in pixels of every frame's picture."""
+        return self._columns * self._widest + PANEL, PANEL
 
     def add(
         self,
@@ -182,8 +201,7 @@ class Painter:
         body = self._scene.body
         pose = frame.pose
         place = frame.translation
-        columns = min(2, len(self._scene.cameras))
-        height = PANEL // -(-len(self._scene.cameras) // columns)
+        height = self._panel
         panels = []
         for number, camera in enumerate(self._scene.cameras):
             if filmed is not None and number == 0:
@@ -219,12 +237,10 @@ class Painter:
             if other is not None:
                 draw_bones(panel, body, zoomed, other.pose, other.translation, OTHER)
             panels.append(panel)
-        widest = max(panel.shape[1] for panel in panels)
-        panels = [
-            np.pad(panel, ((0, 0), (0, widest - panel.shape[1]), (0, 0)))
-            for panel in panels
-        ]
-        return _grid(panels, columns, 0)
+        panels = [_padded(panel, self._widest, height) for panel in panels]
+        grid = _grid(panels, self._columns, 0)
+        # the rows of seven or more do not fill the height
+        return _padded(grid, grid.shape[1], PANEL)
 
     def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:
         """Return notes and stills, above a curve of a track's error, or of its cost where truth is unknown."""
@@ -283,32 +299,48 @@ def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:
         at += width_of(name, scale) + 24
 
 
+def panel_size(width: int, height: int, panel: int) -> tuple[int, int]:
+    """Return the size, of an even width, at which a picture of some size fits into panels of some height."""
+    even = 2 * round(width * panel / height / 2)
+    widest = MAX_ASPECT * panel
+    if even > widest:
+        return widest, max(round(height * widest / width), 1)
+    return max(even, 2), panel
+
+
 def panel_of(image: Image, height: int, sharp: bool = False) -> Image:
-    """Return a picture in another height, and an even width; a sharp one has no values between its own."""
-    width = 2 * round(image.shape[1] * height / image.shape[0] / 2)
+    """Return a picture in a `panel_size`; a sharp one has no values between its own."""
+    size = panel_size(image.shape[1], image.shape[0], height)
     how = (
         cv2.INTER_NEAREST
         if sharp
         else cv2.INTER_AREA
-        if height < image.shape[0]
+        if size[1] < image.shape[0]
         else cv2.INTER_LINEAR
     )
-    return np.asarray(
-        cv2.resize(image, (width, height), interpolation=how), dtype=np.uint8
-    )
+    return np.asarray(cv2.resize(image, size, interpolation=how), dtype=np.uint8)
 
 
 def _zoomed(camera: Camera, panel: Image) -> Camera:
     """Return a camera that sees the same in a panel."""
     height, width = panel.shape[:2]
     zoom = np.array([width / camera.width, height / camera.height])
+    # whole pixels may take a camera beyond the longest or the shortest lens
+    shortest, longest = np.multiply(FOCALS, max(width, height))
     return replace(
         camera,
         width=width,
         height=height,
-        focal=zoom * camera.focal,
+        focal=np.clip(zoom * camera.focal, shortest, longest),
         centre=zoom * camera.centre,
     )
+
+
+def _padded(image: Image, width: int, height: int) -> Image:
+    """Return a picture with black to its right and below it, of some size."""
+    right = width - image.shape[1]
+    below = height - image.shape[0]
+    return np.pad(image, ((0, below), (0, right), (0, 0)))
 
 
 def _grid(panels: list[Image], columns: int, background: int) -> Image:

@@ -7,7 +7,8 @@ r"""The report of a ledger: a page that any browser opens, figures for papers, r
 
     report = write_report("results", "report.html")  # what `posefit report` does
     print("\n".join(leaderboard_lines(report)))
-    best = leaderboard(contest_of(runs_of(Ledger("results"))))[0]  # the same numbers, without the page
+    with Ledger("results") as ledger:  # the same numbers, without the page
+        best = leaderboard(contest_of(runs_of(ledger)))[0]
 
 | looking for | file |
 |---|---|

@@ -3,9 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from hashlib import sha256
-from inspect import getsource
 from pathlib import Path
+from secrets import token_hex
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
@@ -17,32 +16,58 @@ from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.drive import Tally
 from posefit.sweep.engine import Limits
-from posefit.sweep.ledger import Ledger
+from posefit.sweep.ledger import FILE, Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool, cores
 
 if TYPE_CHECKING:
     import pandas as pd
 
+TEMPORARY = "posefit-"  # how the names of temporary folders begin
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The results of a small sweep. Without a folder of its own, its ledger lasts as long as this object."""
+    """The results of a small sweep, in the ledger of a folder.
 
-    ledger: Ledger = field(repr=False)
+    A comparison without `out` has a temporary folder, which lasts as long as this object. Pickled it holds the ledger,
+    and has another temporary folder where it is read.
+    """
+
+    folder: Path
     tally: Tally
     _temporary: TemporaryDirectory[str] | None = field(repr=False)
 
+    def rows(self) -> list[dict[str, Any]]:
+        """Return every finished row, as `Ledger.rows` yields them."""
+        with Ledger(self.folder) as ledger:
+            return list(ledger.rows())
+
     def to_pandas(self) -> "pd.DataFrame":
         """Return a table of one row a cell. Raises ImportError where pandas is not installed."""
-        return self.ledger.frame()
+        with Ledger(self.folder) as ledger:
+            return ledger.frame()
 
     def report(self, path: str | Path) -> dict[str, Any]:
         """Write the report, one page, and return what it says as a mapping."""
-        return write_report(str(self.ledger.path), str(path))
+        return write_report(str(self.folder), str(path))
 
     def __str__(self) -> str:
-        return "\n".join(leaderboard_lines(write_report(str(self.ledger.path), None)))
+        return "\n".join(leaderboard_lines(write_report(str(self.folder), None)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._temporary is None:
+            return Comparison, (self.folder, self.tally, None)
+        return _unpickled, (self.tally, (self.folder / FILE).read_bytes())
+
+
+def _unpickled(tally: Tally, ledger: bytes) -> Comparison:
+    """Return a comparison whose temporary folder holds a ledger."""
+    temporary = TemporaryDirectory(prefix=TEMPORARY)
+    folder = Path(temporary.name) / "results"
+    folder.mkdir()
+    (folder / FILE).write_bytes(ledger)
+    return Comparison(folder, tally, temporary)
 
 
 def compare(
@@ -58,12 +83,18 @@ def compare(
 
     A method is named as it is registered, or an optimiser's factory, which is named by its `__name__` and searches the
     prior `pca`; or a table of a `method`, the `name` that reports call it, and `settings`. `lists` are the other fields
-    of a plan: `views`, `corruptions`, `instances` and `grid`, and the defaults `frames`, `evaluations` and so on. With
-    `out` the ledger is kept in that folder, and a comparison with the same goes on there. Raises InputError for every
-    mistake.
+    of a plan: `views`, `corruptions`, `instances` and `grid`, and the defaults `frames`, `evaluations` and so on.
+
+    With `out` the ledger is kept in that folder, and a comparison with the same goes on there: rows of registered
+    methods are not run again. Those of a factory always are, since what it does may follow from a closure, a helper or
+    a file, which no key can hold.
+
+    Raises InputError for every mistake.
     """
     factories: dict[str, tuple[Callable[..., Any], str]] = {}
-    entries = [_named(entry, factories) for entry in methods]
+    # of this call alone, so that no earlier row counts as one of the same factory
+    call = token_hex(4)
+    entries = [_named(entry, call, factories) for entry in methods]
     register(factories)
     crossed = {"methods": entries, "motions": list(motions), "seeds": seeds}
     crossed |= {
@@ -73,30 +104,34 @@ def compare(
     }
     grid = {"grid": lists.pop("grid")} if "grid" in lists else {}
     plan = Plan.of({"product": crossed, "defaults": lists, **grid})
-    temporary = TemporaryDirectory(prefix="posefit-") if out is None else None
+    temporary = TemporaryDirectory(prefix=TEMPORARY) if out is None else None
     folder = Path(temporary.name) / "results" if temporary else Path(str(out))
+    say = interactive().log
+    if factories and folder.exists():
+        names = ", ".join(factories)
+        say(
+            f"cells of {names} run again, whatever {folder} holds: "
+            "only rows of registered methods are reused"
+        )
     pool = Pool(
         cores() if workers is None else workers,
         Limits(),
         run_cell,
         partial(register, factories),
     )
-    tally = swept(plan, folder, pool, interactive().log)
-    return Comparison(Ledger(folder), tally, temporary)
+    return Comparison(folder, swept(plan, folder, pool, say), temporary)
 
 
-def _named(entry: Any, factories: dict[str, tuple[Callable[..., Any], str]]) -> Any:
-    """Return an entry of methods by names, and add its factory, if it is one, to others."""
+def _named(
+    entry: Any, call: str, factories: dict[str, tuple[Callable[..., Any], str]]
+) -> Any:
+    """Return an entry of methods by names, and add its factory, if it is one, to others, with a word for this call."""
     if isinstance(entry, Mapping):
-        return {**entry, "method": _named(entry.get("method"), factories)}
+        return {**entry, "method": _named(entry.get("method"), call, factories)}
     if not callable(entry):
         return entry
     name = getattr(entry, "__name__", type(entry).__name__)
-    try:
-        digest = sha256(getsource(entry).encode()).hexdigest()[:8]
-    except (OSError, TypeError):  # typed in, or built
-        digest = ""
     if name in factories and factories[name][0] is not entry:
         raise InputError(f"factories must have names of their own, got {name} twice")
-    factories[name] = entry, digest
+    factories[name] = entry, call
     return name

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping
-from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -48,7 +47,7 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
         start = engine(Limits(), workers=1)
         swept(plan, folder, start(), interactive().log, quiet=True)
         (cell,) = plan
-        with closing(Ledger(folder)) as results:
+        with Ledger(folder) as results:
             now = next(row for row in results.all_rows() if row["key"] == cell.key)
     return _differences(earlier, now)
 
@@ -57,7 +56,7 @@ def _row_of(ledger: str | Path, key: str) -> dict[str, Any]:
     """Return the row of a ledger whose key begins with some digits."""
     if not key:
         raise InputError("KEY must be the first digits of a row's key, got none")
-    with closing(Ledger(ledger)) as results:
+    with Ledger(ledger) as results:
         rows = [row for row in results.all_rows() if row["key"].startswith(key)]
     if not rows:
         raise InputError(

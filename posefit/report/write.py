@@ -1,7 +1,6 @@
 """What `posefit report` does: a page, and on request figures, tables and files for other tools."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +60,7 @@ def write_report(
 
         check_folder(figures)
         library("figure")
-    with closing(Ledger(*paths)) as ledger:
+    with Ledger(*paths) as ledger:
         runs = runs_of(ledger, methods, latest=latest)
         if runs.kind.name == "search" and figures is not None:
             raise InputError(

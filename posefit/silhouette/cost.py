@@ -121,7 +121,10 @@ def pose_costs(
 
 def mean_over_views(costs: Sequence[Array]) -> Array:
     """Return the mean (n,) of costs (n,), one array a view."""
-    return costs[0] if len(costs) == 1 else np.mean(costs, axis=0)
+    if len(costs) == 1:
+        return costs[0]
+    # sums of three or more depend on their order in the last digit, and views have none
+    return np.asarray(np.mean(np.sort(costs, axis=0), axis=0))
 
 
 def known_views(views: Sequence[T], silhouettes: Sequence[Silhouette]) -> Sequence[T]:

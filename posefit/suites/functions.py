@@ -2,15 +2,11 @@
 
 from dataclasses import dataclass
 
-from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
-from posefit.reading import quoted
+from posefit.motion.instances import instance_number
 
 SUITE = "posefit-2026.3"
 SUITES = (SUITE,)
-TRAINING = range(10_000)  # instances to learn from and to tune on
-HELD_OUT = range(10_000, 20_000)  # instances of other people
-INSTANCES = range(20_000)
 # dimensions of the functions that search joint angles themselves
 ANGLES = (20, 24, 40, 66)
 DIMENSIONS = (9, 10, 16, 20, 24, 40, 66)
@@ -92,11 +88,7 @@ def checked_address(
     """Return function, instance and dimension as ints. Raises ValueError where a suite has no such problem."""
     one_of("suite", name, SUITES)
     chosen = suite_function(function)
-    number = whole("instance", instance, 0)
+    number = instance_number(instance)
     d = whole("dimension", dimension, 1)
-    if number not in INSTANCES:
-        raise InputError(
-            f"instance must be at most {INSTANCES[-1]}, got {quoted(number)}"
-        )
     one_of(f"dimension of function {chosen.number}", d, chosen.dimensions)
     return chosen.number, number, d

@@ -1,7 +1,7 @@
-"""Numbered instances: a person of the library, a pose, cameras, and their silhouettes.
+"""The instances of a suite's functions: a person of the library, a pose, cameras, and their silhouettes.
 
-A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose.
-Instances below 10,000 are of seven people, the others of three who are in no training data.
+A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose; see
+`posefit.motion.instances`. Training instances are of seven people, the others of three who are in no training data.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,15 +12,16 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Start
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
+from posefit.motion.instances import TRAINING, generator
 from posefit.silhouette.corruption import corrupted
-from posefit.silhouette.cost import mean_over_views, project
+from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.suites.boxes import (
     CONSTANT,
@@ -34,9 +35,7 @@ from posefit.suites.boxes import (
     is_upright,
     learned_without,
 )
-from posefit.suites.functions import TRAINING
 
-RNG_STREAM = 2026  # part of the seed of every instance
 SIZE = (120, 160)  # pixels
 PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and cameras aim
 # metres to a camera; radians it sees across the larger side
@@ -52,7 +51,7 @@ DAMAGES = ("blobs", "holes")
 STRENGTH = 0.6
 POOL = 32  # how many of these an instance has
 # they come in, again and again; a prime
-ORDER = np.random.default_rng(RNG_STREAM).integers(POOL, size=10_007)
+ORDER = generator("suite").integers(POOL, size=10_007)
 ANCHOR_OFF = 0.3  # metres along each axis that the anchor of an alignment is off
 DIGITS = 4  # of a truth in the box, so that every machine has the same one
 
@@ -65,13 +64,13 @@ class SuiteInstance:
     number: int
     subject: str
     # one, or those of a sequence: they have a box in common
-    frames: Sequence[PoseProblem] = field(repr=False)
+    frames: Sequence[SilhouetteCost] = field(repr=False)
     box: SuiteBox = field(repr=False)
     # (d,) the proposal of the true pose, for tests: a search that reads it cheats
     truth: Array = field(repr=False)
     truth_cost: float  # of that proposal; 0 where the function is exact
     # of function 4: each with a damaged silhouette
-    noisy: Sequence[PoseProblem] = field(default=(), repr=False)
+    noisy: Sequence[SilhouetteCost] = field(default=(), repr=False)
 
     @property
     def space(self) -> SearchSpace:
@@ -80,14 +79,15 @@ class SuiteInstance:
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) without noise: the means over the frames."""
-        return mean_over_views([frame.evaluate(proposals) for frame in self.frames])
+        costs = [frame(proposals) for frame in self.frames]
+        return np.asarray(np.mean(costs, axis=0))
 
     def evaluate_noisy(self, proposals: Array, first: int) -> Array:
         """Return the costs (n,) of feasible proposals (n, d) with noise: the evaluations from number `first` on."""
         costs = np.empty(len(proposals))
         drawn = ORDER[(first + np.arange(len(proposals))) % len(ORDER)]
         for k in np.unique(drawn):
-            costs[drawn == k] = self.noisy[k].evaluate(proposals[drawn == k])
+            costs[drawn == k] = self.noisy[k](proposals[drawn == k])
         return costs
 
     def repaired(self, proposals: Array) -> Array:
@@ -108,7 +108,7 @@ class SuiteInstance:
 @lru_cache(maxsize=256)
 def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     """Return an instance; the same for the same numbers everywhere, which `checked_address` has checked."""
-    rng = np.random.default_rng([RNG_STREAM, function, number])
+    rng = generator("suite", function, number)
     people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
     subject = people[int(rng.integers(len(people)))]
     # the root has three
@@ -119,9 +119,7 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
         box = SequenceBox(learned, count)
     elif function in (7, 9):
         rotated = (
-            np.random.default_rng([RNG_STREAM, function, number, dimension])
-            if function == 9
-            else None
+            generator("suite", function, number, dimension) if function == 9 else None
         )
         box = AngleBox(learned, count, rotated)
     else:
@@ -185,7 +183,7 @@ class _Draft:
     def silhouette(self, camera: Camera, pose: Array) -> Silhouette:
         return Silhouette.of(project(self.body, camera, pose, PLACE))
 
-    def made(self, truth: Array, *frames: PoseProblem) -> SuiteInstance:
+    def made(self, truth: Array, *frames: SilhouetteCost) -> SuiteInstance:
         truth = truth.copy()
         truth.setflags(write=False)
         made = SuiteInstance(
@@ -210,7 +208,7 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
     cameras = [draft.camera(azimuth + 0.5 * np.pi * k) for k in range(views)]
     pose = space.decode(truth[None])[0][0]
     silhouettes = [draft.silhouette(camera, pose) for camera in cameras]
-    return draft.made(truth, PoseProblem(draft.body, cameras, silhouettes, space))
+    return draft.made(truth, SilhouetteCost(draft.body, cameras, silhouettes, space))
 
 
 def _still(draft: _Draft, pose: Array) -> Array:
@@ -237,7 +235,7 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
     space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
     return draft.made(
         truth,
-        PoseProblem(draft.body, [camera], [draft.silhouette(camera, pose)], space),
+        SilhouetteCost(draft.body, [camera], [draft.silhouette(camera, pose)], space),
     )
 
 
@@ -270,11 +268,11 @@ def _sequence(draft: _Draft) -> SuiteInstance:
     silhouettes = [
         draft.silhouette(camera, frame.decode(truth)[0][0]) for frame in spaces
     ]
-    problems = [
-        PoseProblem(draft.body, [camera], [silhouette], frame)
+    costs = [
+        SilhouetteCost(draft.body, [camera], [silhouette], frame)
         for silhouette, frame in zip(silhouettes, spaces, strict=True)
     ]
-    return draft.made(truth[0], *problems)
+    return draft.made(truth[0], *costs)
 
 
 def _aligned(draft: _Draft) -> SuiteInstance:

@@ -1,30 +1,28 @@
-"""Problems of a suite, for any loop: call one with proposals, and it counts, keeps the best and the trace.
+"""Problems of a suite, by their numbers: `suite` returns one, `Suite` goes through many.
 
-`suite` returns one by its numbers, `Suite` goes through many. A problem's attributes have the names of COCO's, so that
-loops written for those run on it as they are.
+Each is a `posefit.Problem`, whose cost function is a `SuiteCost`. Its attributes have the names of COCO's problems, so
+that loops written for those run on it as they are.
 
 Problems may be added to a suite; nothing else of one ever changes.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
-from pickle import PicklingError
 from typing import Any, Literal, final
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.box import Space, draw_population
-from posefit.fitting.check import one_of, whole
-from posefit.fitting.dlpack import as_numpy
+from posefit.fitting.check import one_of
+from posefit.fitting.problem import Problem
 from posefit.geometry.camera import Camera
+from posefit.motion.instances import HELD_OUT
 from posefit.reading import quoted
 from posefit.silhouette.mask import Mask
 from posefit.suites.functions import (
     DIMENSIONS,
     FUNCTIONS,
-    HELD_OUT,
     SUITE,
     SUITES,
     SuiteFunction,
@@ -43,96 +41,60 @@ PENALTY = 100.0
 EVALUATIONS = 100  # of the usual budget, for each dimension
 
 
-class BudgetSpentError(Exception):
-    """A call goes beyond the evaluations of a problem's budget."""
-
-
 @final
-class Problem:
-    """A numbered problem: proposals in [-1, 1]^d have costs of 0 to 100.
-
-    Call it with one proposal (d,) for a float, or with some (n, d) for an array (n,). Every proposal counts as one
-    evaluation, whether it is feasible or not.
+class SuiteCost:
+    """The cost function of a numbered problem, and what is known of it: `problem.targets`, `problem.look()`.
 
     A proposal is infeasible outside the box, and outside the ellipsoid of `posefit.suites.boxes`, which holds the poses
     that people take. With `infeasible="repair"` it costs as much as the proposal that `repaired` returns for it; with
     "reject" its cost is infinite; with "penalise" it is the cost of the repaired one, and 100 for each half-side of the
     box between the two.
-
-    Where the function is noisy, calls return costs with noise: the same at the k-th evaluation of every run. As in COCO
-    the best cost, the trace and the targets reached are without it.
-
-    `budget` is the largest number of evaluations, without one infinite: what goes beyond raises BudgetSpentError and is
-    not evaluated.
     """
-
-    number_of_objectives = 1
-    number_of_constraints = 0
-    evaluations_constraints = 0
 
     def __init__(
         self,
         suite: str,
         function: SuiteFunction,
         made: SuiteInstance,
-        *,
         infeasible: Infeasible = "repair",
-        budget: int | None = None,
     ) -> None:
-        one_of("infeasible", infeasible, INFEASIBLE)
-        if budget is not None:
-            whole("budget", budget, 1)
         self.suite = suite
         self.function = function
         self.made = made
         self.infeasible = infeasible
-        self.budget = budget
-        self.index = 0  # in a `Suite`
         self.id_function = function.number
-        self.instance = self.id_instance = made.number
-        self.dimension = d = len(made.truth)
-        self.lower_bounds, self.upper_bounds = np.full(d, -1.0), np.ones(d)
-        # without blanks, as in posefit-2026.3_f001_i00017_d09; and in words
-        self.id = f"{suite}_f{function.number:03d}_i{made.number:05d}_d{d:02d}"
+        self.instance = made.number
+        self.id_instance = made.number
+        d = len(made.truth)
         self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"
-        # as posefit's own optimisers take it: `factory(problem.space, rng)`
-        self.space: Space = made.space
         # the predicted start of the search, with its spread; None without a prediction
-        self.start = self.space.start
+        self.start = made.space.start
         # the lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown
         self.optimum = 0.0 if function.exact else None
         # of the true pose, which is in the box and feasible
         self.truth_cost = made.truth_cost
         # whether `look` was called: then a run is one of a method that looks
         self.looked = False
-        self.reset()
 
-    def reset(self) -> None:
-        """Forget all evaluations: the count, the best and the trace."""
-        self.evaluations = 0
-        self.best_observed_fvalue1 = np.inf
-        # evaluations, cost and point of each improvement
-        self._steps: list[tuple[int, float, Array]] = []
+    def __call__(self, proposals: Array) -> Array:
+        """Return the costs (n,) of proposals (n, d), without noise."""
+        return self.made.evaluate(self.repaired(proposals)) + self._penalties(proposals)
 
-    def __call__(self, proposals: object) -> Any:
-        """Return the cost of a proposal (d,), or the costs (n,) of proposals (n, d).
+    def noisy(self, proposals: Array, first: int) -> Array:
+        """Return the costs (n,) of proposals (n, d) with noise: the evaluations from number `first` on."""
+        costs = self.made.evaluate_noisy(self.repaired(proposals), first)
+        return costs + self._penalties(proposals)
 
-        Arrays may be of any library that has DLPack; the costs come as an array of the same one. Raises ValueError
-        where the shape is another or a number is not finite, and BudgetSpentError.
-        """
-        values, back = as_numpy("proposals", proposals)
-        checked = self._checked(values)
-        costs = self._counted(checked.reshape(-1, self.dimension))
-        return float(costs[0]) if checked.ndim == 1 else back(costs)
-
-    def evaluate(self, proposals: Any) -> Any:
-        """Return the costs (n,) of proposals (n, d), as `posefit.minimise` asks for them."""
-        values, back = as_numpy("proposals", proposals)
-        return back(self._counted(self._checked(values).reshape(-1, self.dimension)))
-
-    def noise_free(self, proposals: object) -> Array:
+    def noise_free(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), without noise and uncounted: a search that calls this cheats."""
-        return self._noise_free(self._checked(proposals).reshape(-1, self.dimension))[0]
+        return self(np.asarray(proposals, dtype=np.float64).reshape(-1, self._d))
+
+    def repaired(self, proposals: Array) -> Array:
+        """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""
+        rows = np.asarray(proposals, dtype=np.float64).reshape(-1, self._d)
+        return (
+            rows if self.made.space.feasible(rows).all() else self.made.repaired(rows)
+        )
 
     def look(self) -> list[list[tuple[Camera, Mask]]]:
         """Return each frame's cameras with what they show, for a method that does not search blind.
@@ -140,6 +102,7 @@ class Problem:
         A run is marked from then on. Where silhouettes are noisy, it is the first of them.
         """
         self.looked = True
+        frames = self.made.noisy[:1] or self.made.frames
         return [
             [
                 (camera, silhouette.mask)
@@ -147,147 +110,25 @@ class Problem:
                     frame.cameras, frame.silhouettes, strict=True
                 )
             ]
-            for frame in self.made.noisy[:1] or self.made.frames
+            for frame in frames
         ]
 
-    def repaired(self, proposals: Array) -> Array:
-        """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""
-        return self.made.repaired(self._checked(proposals).reshape(-1, self.dimension))
-
     @property
-    def initial_solution(self) -> Array:
-        """The proposal (d,) to start from: the prediction, or the middle of the box."""
-        return (
-            np.zeros(self.dimension) if self.start is None else self.start.mean.copy()
-        )
+    def _d(self) -> int:
+        return len(self.made.truth)
 
-    def initial_solution_proposal(self, restart: int = 0) -> Array:
-        """Return the proposal (d,) to start from first, and a random one for each restart."""
-        if not restart:
-            return self.initial_solution
-        drawn: Array = draw_population(
-            self.space, np.random.default_rng([self.instance, restart]), 1
-        )[0]
-        return drawn
-
-    @property
-    def targets(self) -> Array:
-        """The costs to be reached (29,), falling from 32 to 0.25 above the true pose's."""
-        return np.asarray(self.truth_cost + TARGETS)
-
-    @property
-    def final_target_hit(self) -> bool:
-        """Whether the last target was reached."""
-        return bool(self.best_observed_fvalue1 <= self.targets[-1])
-
-    @property
-    def remaining_evaluations(self) -> float:
-        """How many evaluations the budget has left; infinite without one."""
-        return np.inf if self.budget is None else self.budget - self.evaluations
-
-    @property
-    def best(self) -> Array:
-        """The best proposal (d,) so far, repaired where it was not feasible. Raises ValueError before there is one."""
-        if not self._steps:
-            raise InputError(
-                f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost"
-            )
-        best: Array = self.repaired(self._steps[-1][2])[0]
-        return best
-
-    @property
-    def points(self) -> Array:
-        """The proposals (k, d) at which the cost fell; a problem with the same `infeasible` evaluates them to the same.
-
-        With "repair" they are those that were evaluated: in the box and feasible. With "penalise" they are as proposed,
-        since the penalty is of the distance. With "reject" only feasible ones have a cost.
-        """
-        return np.array([point for *_, point in self._steps]).reshape(
-            -1, self.dimension
-        )
-
-    @property
-    def trace(self) -> tuple[Array, Array]:
-        """The evaluations (k,) at which the cost fell, and the last one, with the best cost (k,) at each.
-
-        It begins where a cost was measured: with "reject" that may be after some that were infinite.
-        """
-        steps = [(used, cost) for used, cost, _ in self._steps]
-        if steps and steps[-1][0] < self.evaluations:
-            steps.append((self.evaluations, steps[-1][1]))
-        return np.array([used for used, _ in steps], dtype=np.float64), np.array(
-            [cost for _, cost in steps]
-        )
-
-    def __deepcopy__(self, memo: object) -> "Problem":
-        """Return a problem with the same count, best and trace, which are its own from now on."""
-        copy: Problem = object.__new__(Problem)
-        copy.__dict__.update(self.__dict__, _steps=self._steps.copy())
-        return copy
-
-    def __getstate__(self) -> Any:
-        raise PicklingError(
-            f"{self.id} counts evaluations in its own process and cannot be sent to another: make it there with "
-            "posefit.suite, or give it whole populations, in one process"
-        )
-
-    def __repr__(self) -> str:
-        return f"<{self.id}: {self.evaluations} evaluations, best {self.best_observed_fvalue1:.4g}>"
-
-    def _checked(self, proposals: object) -> Array:
-        try:
-            checked = np.asarray(proposals, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(
-                f"proposals must be numbers, got {quoted(proposals)}"
-            ) from None
-        if checked.ndim not in (1, 2) or checked.shape[-1] != self.dimension:
-            d = self.dimension
-            raise InputError(
-                f"proposals must have shape ({d},) or (n, {d}), got {checked.shape}"
-            )
-        if not np.isfinite(checked).all():
-            raise InputError("proposals must be finite, got nan or infinity")
-        return checked
-
-    def _counted(self, checked: Array) -> Array:
-        """Return the costs (n,) of checked proposals (n, d), and count them."""
-        if len(checked) > self.remaining_evaluations:
-            raise BudgetSpentError(
-                f"{self.id}: {self.remaining_evaluations:g} of {self.budget} evaluations are left, got {len(checked)}"
-            )
-        costs, repaired, penalties = self._noise_free(checked)
-        measured = (
-            self.made.evaluate_noisy(repaired, self.evaluations) + penalties
-            if self.function.noisy
-            else costs
-        )
-        points = checked if self.infeasible == "penalise" else repaired
-        for k in np.flatnonzero(costs < self.best_observed_fvalue1):
-            if costs[k] < self.best_observed_fvalue1:
-                self.best_observed_fvalue1 = float(costs[k])
-                self._steps.append(
-                    (
-                        self.evaluations + int(k) + 1,
-                        self.best_observed_fvalue1,
-                        points[k].copy(),
-                    )
-                )
-        self.evaluations += len(checked)
-        return measured
-
-    def _noise_free(self, checked: Array) -> tuple[Array, Array, Array]:
-        """Return the costs (n,) of checked proposals (n, d), their repaired ones (n, d), and the penalties (n,)."""
-        allowed = self.space.feasible(checked)
-        repaired = checked if allowed.all() else self.made.repaired(checked)
-        penalties = np.zeros(len(checked))
+    def _penalties(self, proposals: Array) -> Array:
+        """Return what is added to the costs (n,) of proposals (n, d) that are not feasible."""
+        penalties = np.zeros(len(proposals))
+        if self.infeasible == "repair":
+            return penalties
+        forbidden = ~self.made.space.feasible(proposals)
         if self.infeasible == "reject":
-            penalties[~allowed] = np.inf
-        elif self.infeasible == "penalise":
-            penalties[~allowed] = (
-                PENALTY * np.linalg.norm(checked - repaired, axis=1)[~allowed]
-            )
-        return self.made.evaluate(repaired) + penalties, repaired, penalties
+            penalties[forbidden] = np.inf
+        else:
+            moved = np.linalg.norm(proposals - self.repaired(proposals), axis=1)
+            penalties[forbidden] = PENALTY * moved[forbidden]
+        return penalties
 
 
 def suite(
@@ -302,12 +143,24 @@ def suite(
     """Return a problem of a suite: the same for the same numbers on every machine, with nothing evaluated yet.
 
     Instances below 10,000 are for training, those up to 19,999 are held out. `posefit.Suite` lists the functions and
-    their dimensions; `Problem` documents the other arguments. Raises ValueError where there is no such problem.
+    their dimensions; `SuiteCost` documents `infeasible`; `budget` is the problem's.
+
+    Raises ValueError where there is no such problem.
     """
     number, instance, dimension = checked_address(name, function, instance, dimension)
+    one_of("infeasible", infeasible, INFEASIBLE)
     made = suite_instance(number, instance, dimension)
+    chosen = suite_function(number)
+    cost = SuiteCost(name, chosen, made, infeasible)
     return Problem(
-        name, suite_function(number), made, infeasible=infeasible, budget=budget
+        cost,
+        made.space,
+        budget,
+        repair=cost.repaired if infeasible == "repair" else None,
+        noisy=cost.noisy if chosen.noisy else None,
+        targets=made.truth_cost + TARGETS,
+        # without blanks, as in posefit-2026.3_f001_i00017_d09
+        id=f"{name}_f{number:03d}_i{instance:05d}_d{dimension:02d}",
     )
 
 
@@ -374,6 +227,11 @@ class Suite:
         return len(self._addresses)
 
     def __getitem__(self, index: int) -> Problem:
+        if isinstance(index, slice):
+            raise InputError(
+                f"index must be the number of one problem, got {quoted(index)}: "
+                "problems are made in their turn, as itertools.islice takes them"
+            )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)
         return problem

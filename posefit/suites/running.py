@@ -15,12 +15,12 @@ import numpy as np
 from posefit import settings
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.optimiser import BudgetError, minimise
+from posefit.fitting.problem import BudgetError, Problem, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry
 from posefit.statistics.profiles import expected_running_time, hits
 from posefit.suites.functions import suite_function
-from posefit.suites.problem import EVALUATIONS, TARGETS, Problem
+from posefit.suites.problem import EVALUATIONS, TARGETS
 
 RNG_STREAM = 2027  # part of the seed of every search
 
@@ -37,7 +37,7 @@ class SuiteRun:
     instance: int
     seed: int
     budget: int  # of evaluations
-    infeasible: str  # the way with infeasible proposals: see `Problem`
+    infeasible: str  # the way with infeasible proposals: see `SuiteCost`
     truth_cost: float
     targets: Array = field(repr=False)  # (t,) costs, falling
     # (k,) of the trace, the last of the run at its end
@@ -61,12 +61,14 @@ def run_on(
 ) -> SuiteRun:
     """Return the run of an optimiser, by its name, on a problem within a budget; the same for the same seed.
 
+    `evaluations` becomes the problem's budget; by default it keeps its own, or has 100 for each dimension.
+
     Raises ValueError where there is no such optimiser or setting, where the budget does not hold one population, and
     where the plugin breaks a rule of optimisers; ImportError where a library it needs is not installed.
     """
-    evaluations = (
-        EVALUATIONS * problem.dimension if evaluations is None else evaluations
-    )
+    if evaluations is None:
+        evaluations = problem.budget or EVALUATIONS * problem.dimension
+    problem.budget = evaluations
     space = problem.space
     rng = np.random.default_rng(
         [RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension]
@@ -80,7 +82,7 @@ def run_on(
             space, rng, **settings.planned(factory, chosen, evaluations)
         )
     guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", evaluations)
-    minimise(problem.evaluate, guarded, evaluations, budget_known=True)
+    minimise(problem, guarded, budget_known=True)
     return run_of(problem, method, chosen, seed=seed, budget=evaluations)
 
 
@@ -142,7 +144,7 @@ class SuiteScore:
     name: str
     dimension: int
     budget: int  # evaluations that a run could have had
-    # the way with infeasible proposals: see `posefit.suites.problem.Problem`
+    # the way with infeasible proposals: see `posefit.suites.problem.SuiteCost`
     infeasible: str
     looked: bool  # whether the method read silhouettes, where the others search blind
     runs: int

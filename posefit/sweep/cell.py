@@ -85,7 +85,7 @@ class TrackCell(Cell):
     """A motion that is tracked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
-    numbers what the cameras see of the motion, see `posefit.motion.instance`. `corruption` gives kinds of
+    numbers what the cameras see of the motion, see `posefit.motion.instances`. `corruption` gives kinds of
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames without masks; the damage
     follows from the instance, so that it is the same for every method and seed. `hypotheses` is how many times the
     motion is tracked, see `posefit.tracking.restarts`. `files` holds the SHA-256 of every capture file that is read.
@@ -277,14 +277,15 @@ def run_cell(cell: Cell) -> CellResult:
 def other_version(origin: str) -> str | None:
     """Return what is installed instead of one origin of a version; None where it is this one, or is unknown here."""
     name = origin.partition(" ")[0]
-    installed = _installed()
-    if origin in installed:
+    origins = installed()
+    if origin in origins:
         return None
-    return next((other for other in installed if other.partition(" ")[0] == name), None)
+    return next((other for other in origins if other.partition(" ")[0] == name), None)
 
 
 @lru_cache(maxsize=1)
-def _installed() -> frozenset[str]:
+def installed() -> frozenset[str]:
+    """Return the origins of everything that is installed: see `posefit.registry.Offer.origin`."""
     from posefit.registry import registry
 
     offers = (offer for named in registry().offers.values() for offer in named.values())
@@ -294,7 +295,7 @@ def _installed() -> frozenset[str]:
 def cell_scene(cell: TrackCell) -> "Scene":
     """Return the observations of a cell; the same for all methods and seeds."""
     from posefit.footage.scene import synthetic, with_corruption
-    from posefit.motion.instance import motion_of_instance, variation
+    from posefit.motion.instances import motion_of_instance, variation
 
     motion = motion_of_instance(
         cell.motion, cell.instance, frames=cell.frames, fps=cell.fps

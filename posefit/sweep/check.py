@@ -10,10 +10,11 @@ from dataclasses import fields
 from functools import lru_cache, partial
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 from posefit import settings
 from posefit.errors import InputError
+from posefit.evaluation.measures import Measures, Spread
 from posefit.fitting.check import between, one_of, whole
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in, recorded
@@ -30,10 +31,12 @@ from posefit.sweep.cell import (
     SearchCell,
     TrackCell,
     digest_of,
+    installed,
     json_of,
 )
 from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import Check, TrackOptions, choice, declared, within
+from posefit.version import source_digest
 
 FIELDS = tuple(
     field.name for field in fields(TrackCell) if field.name not in ("files", "version")
@@ -44,6 +47,12 @@ MAX_FRAMES = 100_000
 MAX_BODY_OFF = 50.0  # percent that a body may be off
 # of a figure in a row: its square is finite, and so is itself in 32 bits
 LARGEST = 1e30
+# the measures that are a table of numbers: a spread over frames, or one for each baseline or level
+SEVERAL = {
+    name
+    for name, hint in get_type_hints(Measures).items()
+    if any(kind is Spread or get_origin(kind) is Mapping for kind in get_args(hint))
+}
 
 
 def cell_of(spec: Mapping[str, Any]) -> TrackCell:
@@ -121,6 +130,25 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
         **entry,
         "settings": settings.check(method, registry().optimiser(method), chosen),
     }
+
+
+def forget() -> None:
+    """Forget what is kept of methods and files between the cells of a plan, for the next plan to find it again.
+
+    In between a file may have changed, or a comparison registered another factory under the same name.
+    """
+    for kept in (
+        _offers,
+        _of_method,
+        _of_search,
+        _population,
+        _other_styles,
+        _files,
+        _length,
+        installed,
+        source_digest,
+    ):
+        kept.cache_clear()
 
 
 def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
@@ -382,7 +410,13 @@ def _number(field: str, value: Any) -> float:
 
 
 def _figure(field: str, value: Any) -> None:
-    for part in value.values() if isinstance(value, dict) else [value]:
+    """Check a figure: a number, or a table of numbers if the measure has several; or None, as any part may be."""
+    if value is None:
+        return
+    parts = [value]
+    if field in SEVERAL:
+        parts = list(_plain(dict, int, float, type(None))(field, value).values())
+    for part in parts:
         if part is not None:
             _number(field, part)
 

@@ -101,10 +101,13 @@ def previewed(
     plan: str, out: str | None, shard: str | None
 ) -> Iterator[tuple[Cell, bool]]:
     """Yield the cells of a plan or of a shard, and whether each is done."""
-    path = None if out is None else Path(out) / file_of(shard)
-    ledger = Ledger(path) if path is not None and path.exists() else None
-    for cell in cells_of(Plan.read(plan), shard):
-        yield cell, ledger is not None and cell.key in ledger
+    name = file_of(shard)
+    cells = cells_of(Plan.read(plan), shard)
+    if out is None or not (path := Path(out) / name).exists():
+        yield from ((cell, False) for cell in cells)
+        return
+    with Ledger(path) as ledger:
+        yield from ((cell, cell.key in ledger) for cell in cells)
 
 
 def preview_lines(cells: Iterable[tuple[Cell, bool]]) -> list[str]:

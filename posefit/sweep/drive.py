@@ -9,7 +9,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from posefit.errors import InputError
 from posefit.sweep.engine import POLL_SECONDS, Engine, Outcome
@@ -56,11 +56,14 @@ def drive(
                     engine.submit(cell)
                 if not (outcomes := engine.wait(POLL_SECONDS)):
                     continue
+                # a row counts once it is on the disk
+                written = replace(tally)
                 with ledger.transaction():
                     for outcome in outcomes:
                         place = running.pop(outcome.job.key)
-                        if not _record(ledger, tally, outcome):
+                        if not _record(ledger, written, outcome):
                             waiting.append(place)
+                tally = written
                 watch(tally)
             tally.stopped = bool(waiting or running)
     except InputError as error:

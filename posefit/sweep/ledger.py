@@ -1,6 +1,7 @@
 """The ledger: one SQLite file in which every cell has a row, whatever happens to the process that writes it.
 
-    ledger = Ledger("results")            # every .sqlite file of a folder, or files and folders, while they grow, too
+    with Ledger("results") as ledger:  # the .sqlite files of a folder, also while they grow
+        rows = list(ledger.rows())
 
 Cells are in the table `cells`: key, kind ("track" or "search"), spec (JSON: what was run), status ("planned", "done" or
 "quarantined"), faults (JSON: the reasons of failed attempts), losses (times that something outside ended it), row
@@ -15,10 +16,12 @@ import json
 import os
 import socket
 import sqlite3
+import stat
 import zipfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -36,11 +39,16 @@ if TYPE_CHECKING:
 
 FILE = "ledger.sqlite"
 SUFFIX = ".sqlite"
+WAL = "-wal"  # of SQLite's log beside a file that is written
 DRIVER = ".driver"
+DRIVEN_BY = "process "  # how the content of a lock file begins
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # not on every operating system
 FORMAT = 1  # the file's user_version
 ATTEMPTS = 3  # that fail by a cell's own fault
 LOSSES = 50  # attempts that something outside ended
-BUSY_SECONDS = 60.0  # to wait for a reader that is in the way
+# to wait for another program that locks a file: where it is opened, and in the middle of a sweep
+OPEN_SECONDS = 5.0
+BUSY_SECONDS = 60.0
 MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
 MAX_VALUE_BYTES = 200_000_000  # of a value in a file
 MIN_FILE_BYTES = 512  # a page of SQLite, at least
@@ -66,24 +74,40 @@ COMMIT;
 
 
 class Ledger:
-    """Reads ledgers, also while drivers write to them. Raises InputError where there is none, or a damaged one."""
+    """Reads ledgers, also while drivers write to them. A context, which closes its files at the end.
+
+    Raises InputError if there is no ledger, if it is damaged, or if it cannot be read here.
+    """
 
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
         self.files = list(
             dict.fromkeys(file for path in paths for file in _files(Path(path)))
         )
-        self._open = [(file, _reader(file)) for file in self.files]
-        # of cells in several files the first finished one counts, or the first
+        self._open: list[tuple[Path, sqlite3.Connection]] = []
+        # the file of each cell that ended, and whether it is done
         self._places: dict[str, tuple[int, bool]] = {}
-        for k in range(len(self._open)):
-            for key, status in self._query(
-                k, "SELECT key, status FROM cells WHERE status != 'planned'"
-            ):
-                if key not in self._places or (
-                    status == "done" and not self._places[key][1]
-                ):
-                    self._places[key] = k, status == "done"
+        with ExitStack() as opened:
+            opened.callback(self.close)
+            for file in self.files:
+                self._open.append((file, _reader(file)))
+            for k in range(len(self._open)):
+                self._place(k)
+            opened.pop_all()
+
+    def _place(self, k: int) -> None:
+        """Note the cells of a file: of a cell in several files the first finished one counts, or the first."""
+        query = "SELECT key, status FROM cells WHERE status != 'planned'"
+        for key, status in self._query(k, query):
+            done = status == "done"
+            if key not in self._places or (done and not self._places[key][1]):
+                self._places[key] = k, done
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def __len__(self) -> int:
         return sum(done for _, done in self._places.values())
@@ -94,11 +118,8 @@ class Ledger:
     @property
     def changed(self) -> float:
         """When its latest file was written, in seconds since 1970."""
-        return max(
-            path.stat().st_mtime
-            for file in self.files
-            for path in file.parent.glob(f"{file.name}*")
-        )
+        parts = [Path(f"{file}{suffix}") for file in self.files for suffix in ("", WAL)]
+        return max(path.stat().st_mtime for path in parts if path.exists())
 
     @property
     def version(self) -> str:
@@ -131,9 +152,18 @@ class Ledger:
         """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
         import numpy as np
 
-        k, _ = self._places[key]
+        k, done = self._places.get(key, (0, False))
+        if not done:
+            raise InputError(
+                f"{self.path}: expected the key of a finished cell, got {quoted(key)}"
+            )
+        query = "SELECT kind, arrays FROM cells WHERE key = ?"
+        ((kind, data),) = self._query(k, query, key)
+        if kind != "track":
+            raise InputError(
+                f"{self._open[k][0]}: cell {key[:8]} is a search, which has no joints"
+            )
         try:
-            ((data,),) = self._query(k, "SELECT arrays FROM cells WHERE key = ?", key)
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
                 if (
                     sum(member.file_size for member in archive.infolist())
@@ -184,7 +214,7 @@ class Ledger:
         try:
             yield from database.execute(query, values)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            raise _damaged(file, error) from None
+            raise _unreadable(file, error) from None
 
 
 SELECT = "SELECT key, spec, status, faults, row FROM cells"
@@ -193,38 +223,43 @@ SELECT = "SELECT key, spec, status, faults, row FROM cells"
 class Writer:
     """Opens one file of a ledger for writing, as its one driver, and creates it where there is none. A context.
 
-    Raises InputError where another process drives it, where it is damaged, or where it cannot be written to.
+    Raises InputError if another process drives it, if it is damaged, or if it cannot be written to. Then nothing is
+    left of a ledger that was not there before.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         _check_place(self.path)
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(
-                self.path, timeout=BUSY_SECONDS, isolation_level=None
-            )
-            self._lock = _locked(self.path)
-        except (OSError, sqlite3.Error) as error:
-            raise _unwritable(self.path, error) from None
-        try:
-            whole = (
-                _check_format(self.path, self._db)
-                and self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
-            )
-            if whole and whole != "ok":
+        with ExitStack() as opened:
+            try:
+                opened.enter_context(_undone_folders(self.path.parent))
+                # the lock is the last to be released
+                opened.enter_context(_locked(self.path))
+                if not self.path.exists():
+                    opened.push(partial(_undo_files, self.path))
+                self._db = opened.enter_context(
+                    closing(
+                        sqlite3.connect(
+                            self.path, timeout=OPEN_SECONDS, isolation_level=None
+                        )
+                    )
+                )
+                self._prepare()
+            except (OSError, sqlite3.Error) as error:
+                raise _unwritable(self.path, error) from None
+            self._opened = opened.pop_all()
+
+    def _prepare(self) -> None:
+        """Check the file, bring its tables to today's form, and have each write reach the disk."""
+        if _check_format(self.path, self._db):
+            (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
+            if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
-            self._db.executescript(SCHEMA)
-            # what is written survives the loss of power
-            self._db.execute("PRAGMA synchronous = FULL")
-            self._db.execute("CREATE TEMP TABLE planned (key TEXT PRIMARY KEY)")
-        except sqlite3.Error as error:
-            self.close()
-            damaged = not isinstance(error, sqlite3.OperationalError)
-            raise (_damaged if damaged else _unwritable)(self.path, error) from None
-        except BaseException:
-            self.close()
-            raise
+        self._db.executescript(SCHEMA)
+        # what is written survives the loss of power
+        self._db.execute("PRAGMA synchronous = FULL")
+        self._db.execute(f"PRAGMA busy_timeout = {1000 * BUSY_SECONDS:.0f}")
+        self._db.execute("CREATE TEMP TABLE planned (key TEXT PRIMARY KEY)")
 
     def __enter__(self) -> Self:
         return self
@@ -234,8 +269,7 @@ class Writer:
 
     def close(self) -> None:
         """Let others drive it."""
-        self._db.close()
-        os.close(self._lock)
+        self._opened.close()
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -244,7 +278,7 @@ class Writer:
             self._db.execute("BEGIN IMMEDIATE")
             with self._db:  # which commits, or rolls back
                 yield
-        except sqlite3.OperationalError as error:
+        except sqlite3.Error as error:
             raise _unwritable(self.path, error) from None
 
     def plan(self, cells: Iterable[Cell]) -> None:
@@ -332,7 +366,7 @@ class Writer:
 
 
 def _files(path: Path) -> list[Path]:
-    """Return a ledger's files: itself, or those of a folder."""
+    """Return a ledger's files: itself, or the ledgers in a folder."""
     if path.is_file():
         return [path]
     if not (found := sorted(path.glob(f"*{SUFFIX}"))):
@@ -344,24 +378,32 @@ def _files(path: Path) -> list[Path]:
 
 
 def _reader(file: Path) -> sqlite3.Connection:
-    """Return what reads a file. Where it can be written, too, SQLite removes what it puts beside it."""
-    mode = (
-        "rw" if os.access(file.parent, os.W_OK) and os.access(file, os.W_OK) else "ro"
-    )
-    mode += "&immutable=1" if mode == "ro" and not Path(f"{file}-wal").exists() else ""
-    try:
-        database = sqlite3.connect(
-            f"{file.absolute().as_uri()}?mode={mode}", uri=True, timeout=BUSY_SECONDS
-        )
-        database.execute("PRAGMA query_only = ON")
-        if hasattr(database, "setlimit"):
-            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
-        if not _check_format(file, database):
-            raise InputError(
-                f"{file}: expected a ledger that posefit sweep wrote, got an empty file"
+    """Return a connection that reads a file.
+
+    SQLite removes what it puts beside the file, if it may write there.
+    """
+    writable = os.access(file.parent, os.W_OK) and os.access(file, os.W_OK)
+    if writable:
+        mode = "rw"
+    elif Path(f"{file}{WAL}").exists():
+        mode = "ro"
+    else:
+        mode = "ro&immutable=1"
+    address = f"{file.absolute().as_uri()}?mode={mode}"
+    with ExitStack() as opened:
+        try:
+            database = opened.enter_context(
+                closing(sqlite3.connect(address, uri=True, timeout=OPEN_SECONDS))
             )
-    except (sqlite3.Error, UnicodeDecodeError) as error:
-        raise _damaged(file, error) from None
+            database.execute("PRAGMA query_only = ON")
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
+            if not _check_format(file, database):
+                raise InputError(
+                    f"{file}: expected a ledger that posefit sweep wrote, got an empty file"
+                )
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            raise _unreadable(file, error) from None
+        opened.pop_all()
     return database
 
 
@@ -390,6 +432,8 @@ def _check_place(path: Path) -> None:
     folder = path.parent
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")
+    if path.is_symlink() and not path.exists():
+        raise InputError(f"{path}: expected a ledger, got a link that leads nowhere")
     names = (
         [name for name in sorted(os.listdir(folder)) if not name.startswith(".")]
         if folder.is_dir()
@@ -401,31 +445,119 @@ def _check_place(path: Path) -> None:
         )
 
 
-def _locked(path: Path) -> int:
-    """Return an open file that says, as long as it is locked, that this process drives another.
+@contextmanager
+def _undone_folders(folder: Path) -> Iterator[None]:
+    """Create a folder, and its parents; if the body fails, remove the new ones that are empty."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    except BaseException:
+        for one in missing:
+            with suppress(OSError):
+                one.rmdir()
+        raise
 
-    Raises InputError where another process does.
+
+def _undo_files(path: Path, error: object, *_: object) -> None:
+    """Remove a new ledger, if there was an error: the exit of a context."""
+    if error is not None:
+        for suffix in ("", WAL, "-shm", "-journal"):
+            Path(f"{path}{suffix}").unlink(missing_ok=True)
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Hold the lock that says that this process drives a ledger. If the body fails, a new lock file is removed.
+
+    In a folder that others may write to, its name may be a link's or another file's: nothing is written to those.
+    Raises InputError then, and if another process holds the lock.
     """
-    file = os.open(f"{path}{DRIVER}", os.O_RDWR | os.O_CREAT, 0o666)
-    if not lock(file):
-        driver = os.read(file, 1000).decode(errors="replace") or "another process"
-        os.close(file)
-        raise InputError(
-            f"{path}: expected a ledger that no other sweep writes to, got one that {cut(driver)} drives; "
-            "--shard I/N writes to a file of its own"
-        )
-    os.ftruncate(file, 0)
-    os.write(file, f"process {os.getpid()} of {socket.gethostname()}".encode())
-    return file
+    name = f"{path}{DRIVER}"
+    new = not os.path.lexists(name)
+    if os.path.islink(name):
+        raise _no_lock_file(name)
+    file = os.open(name, os.O_RDWR | os.O_CREAT | NO_LINK, 0o666)
+    with ExitStack() as opened:
+        opened.callback(os.close, file)
+        is_locked = lock(file)
+        state = os.fstat(file)
+        # a second name is a hard link; no name is that of a driver that removed it just now
+        if not stat.S_ISREG(state.st_mode) or state.st_nlink != 1:
+            raise _no_lock_file(name)
+        driver = os.read(file, 1000).decode(errors="replace")
+        if driver and not driver.startswith(DRIVEN_BY):
+            raise _no_lock_file(name)
+        if not is_locked:
+            raise InputError(
+                f"{path}: expected a ledger that no other sweep writes to, "
+                f"got one that {cut(driver or 'another process')} drives; "
+                "--shard I/N writes to a file of its own"
+            )
+        try:
+            os.ftruncate(file, 0)
+            os.lseek(file, 0, os.SEEK_SET)
+            driver = f"{DRIVEN_BY}{os.getpid()} of {socket.gethostname()}"
+            os.write(file, driver.encode())
+            yield
+        except BaseException:
+            if new:
+                with suppress(OSError):
+                    os.unlink(name)
+            raise
+
+
+def _no_lock_file(name: str) -> InputError:
+    return InputError(
+        f"{name}: expected the lock file of posefit sweep, got a link or another program's file"
+    )
+
+
+def _is_without_shared_memory(error: Exception) -> bool:
+    """Return whether a disk cannot hold the write-ahead log of a ledger, as many network disks cannot."""
+    name = getattr(error, "sqlite_errorname", "")
+    return "locking protocol" in str(error) or name.startswith("SQLITE_IOERR_SHM")
+
+
+def _is_damage(error: Exception) -> bool:
+    """Return whether an error says that a file is damaged; any other is about where it lies, or who uses it."""
+    return isinstance(error, UnicodeDecodeError) or (
+        isinstance(error, sqlite3.DatabaseError)
+        and not isinstance(error, sqlite3.OperationalError)
+    )
+
+
+def _unreadable(file: Path, error: Exception) -> InputError:
+    """Return the error of a ledger that cannot be read."""
+    if isinstance(error, sqlite3.ProgrammingError):
+        return InputError(f"{file}: expected an open ledger, got a closed one")
+    if _is_damage(error):
+        return _damaged(file, error)
+    reason = cut(str(error))
+    if "locked" in reason:
+        came = f"one in use ({reason}): try again when no other program locks it"
+    elif _is_without_shared_memory(error):
+        came = f"one on a disk that SQLite cannot share ({reason}): copy it to a local folder and read that"
+    else:
+        log = f"{file.name}{WAL}"
+        came = f"one that cannot be opened here ({reason}): copy it, with {log} if there is one, to a folder of yours"
+    return InputError(f"{file}: expected a ledger that can be read, got {came}")
+
+
+def _unwritable(path: Path, error: Exception) -> InputError:
+    """Return the error of a ledger that cannot be written to."""
+    if _is_damage(error):
+        return _damaged(path, error)
+    reason = cut(str(getattr(error, "strerror", None) or error))
+    if "locked" in reason:
+        came = f"one in use ({reason}): try again when no other program locks it"
+    elif _is_without_shared_memory(error):
+        came = f"a disk that SQLite cannot share ({reason}): write to a local folder, and copy it afterwards"
+    else:
+        came = reason
+    return InputError(f"{path}: expected a file that can be written to, got {came}")
 
 
 def _damaged(file: Path, error: Exception) -> InputError:
     what = f"got {cut(str(error))}: take it from a copy, or save what can be read by sqlite3 {file.name} .recover"
     return InputError(f"{file}: expected a whole SQLite file, {what}")
-
-
-def _unwritable(path: Path, error: Exception) -> InputError:
-    reason = getattr(error, "strerror", None) or error
-    return InputError(
-        f"{path}: expected a file that can be written to, got {cut(str(reason))}"
-    )

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from posefit.errors import InputError
+from posefit.motion.instances import HELD_OUT
 from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text, suggestion
-from posefit.suites.functions import FUNCTIONS, HELD_OUT
+from posefit.suites.functions import FUNCTIONS
 from posefit.suites.problem import EVALUATIONS
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import (
@@ -23,6 +24,7 @@ from posefit.sweep.check import (
     cell_of,
     families,
     flattened,
+    forget,
     search_method,
     search_of,
 )
@@ -58,6 +60,7 @@ class Plan:
 
     def __init__(self, cells: Callable[[], Iterator[Cell]]) -> None:
         self._cells = cells
+        forget()
         keys: set[bytes] = set()
         for cell in cells():
             if (key := bytes.fromhex(cell.key)) in keys:

@@ -35,6 +35,7 @@ ORDER = (
     "seed",
     "key",
 )
+FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 _TEXTS = (
     "key", "version", "status", "reason", "kind", "method", "name", "motion", "train", "settings", "view_degrees",
     "corruption",
@@ -93,8 +94,8 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
 def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
     """Write rows as a new CSV file, in UTF-8; columns are all that any row has, in the order of their first row.
 
-    Missing values are left empty. Raises ValueError where there is no row, and where the file exists or cannot be
-    written.
+    Missing values are left empty. A text that a spreadsheet would run as a formula begins with an apostrophe. Raises
+    ValueError if there is no row, or if the file exists or cannot be written.
     """
     table = list(rows)
     if not table:
@@ -107,7 +108,15 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
             file, list(dict.fromkeys(name for row in table for name in row)), restval=""
         )
         writer.writeheader()
-        writer.writerows(table)
+        for row in table:
+            writer.writerow({name: _inert(value) for name, value in row.items()})
+
+
+def _inert(value: Any) -> Any:
+    """Return a value of a CSV file; names in a ledger may come from anybody, and spreadsheets run formulas."""
+    if isinstance(value, str) and value.startswith(FORMULA_SIGNS):
+        return f"'{value}"
+    return value
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:

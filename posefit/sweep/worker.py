@@ -9,10 +9,12 @@ import pickle
 import signal
 import sys
 import threading
+import warnings
 from contextlib import suppress
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
+from posefit.errors import PluginWarning
 from posefit.limits import end_with_parent
 from posefit.sweep.engine import single_thread
 
@@ -52,6 +54,8 @@ def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
     with suppress(AttributeError):
         os.setpgid(0, 0)
     sys.path[:] = path
+    # the driver has warned of them
+    warnings.simplefilter("ignore", PluginWarning)
     leave = os._exit
     os._exit = lambda status: leave(status or EXIT_ZERO_STATUS)  # see above
     single_thread()

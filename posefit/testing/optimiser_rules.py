@@ -11,7 +11,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start, draw_population
-from posefit.fitting.optimiser import Filter, NextFrame, Optimiser, populations
+from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
+from posefit.fitting.problem import Problem, minimise
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
 from posefit.settings import planned
 from posefit.testing import common
@@ -109,10 +110,9 @@ class Case(PluginCase):
         for frame in range(10 if self.next_frame == "carry" else 1):
             if frame:
                 cast(Filter, optimiser).advance(space)
-            lowest = min(
-                float(costs.min())
-                for _, costs in populations(optimiser, evaluate, evaluations)
-            )
+            problem = Problem(evaluate, space, evaluations)
+            minimise(problem, optimiser, budget_known=True)
+            lowest = min(lowest, problem.best_cost)
         return lowest
 
     def valid(self, space: Space, evaluate: Evaluate, count: int = 6) -> str:
@@ -239,7 +239,7 @@ def evaluations(case: Case) -> None:
         case.build(problem.space), problem.space, "the optimiser"
     )
     try:
-        for _ in case.steps(checked, problem.space, problem.evaluate, 4):
+        for _ in case.steps(checked, problem.space, problem, 4):
             pass
     except BrokenRuleError as broken:
         raise BrokenError(str(broken)) from broken.__cause__
@@ -394,7 +394,7 @@ def sphere_problem(case: Case) -> str:
 def real_problem(case: Case) -> str:
     """A real pose problem is solved better than by chance."""
     problem = pose_problem()
-    return _beats_chance(case, problem.space, problem.evaluate)
+    return _beats_chance(case, problem.space, problem)
 
 
 def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:

@@ -5,7 +5,8 @@ from functools import lru_cache
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.cost import SilhouetteCost
+from posefit.fitting.problem import Problem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -24,9 +25,14 @@ def walking_angles() -> Array:
     )
 
 
-@lru_cache(maxsize=1)
-def pose_problem() -> PoseProblem:
+def pose_problem(budget: int | None = None) -> Problem:
     """Return the problem: known translation, prior `pca`, viewed from 45 degrees."""
+    cost = _pose_cost()
+    return Problem(cost, cost.space, budget)
+
+
+@lru_cache(maxsize=1)
+def _pose_cost() -> SilhouetteCost:
     motion = built_in.motion("walk", frames=1)
     body = Body.of(motion.skeleton)
     prior = registry().prior("pca")().fit(walking_angles())
@@ -37,4 +43,4 @@ def pose_problem() -> PoseProblem:
     silhouette = Silhouette.of(
         project(body, camera, motion.poses[0], motion.translations[0])
     )
-    return PoseProblem(body, [camera], [silhouette], space)
+    return SilhouetteCost(body, [camera], [silhouette], space)

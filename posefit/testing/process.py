@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from posefit.errors import InputError
+from posefit.errors import InputError, warn_in_one_line
 from posefit.fitting.check import one_of
 from posefit.limits import end_with_parent, memory
 from posefit.testing import checks_of, results
@@ -107,6 +107,7 @@ def _check() -> None:
         out.flush()
 
     sys.path[:] = task["path"]
+    warn_in_one_line()
     try:
         label, checks = _checks(
             task["kind"], task["name"], task["settings"], task["only"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from posefit.fitting.box import draw_population
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.start import modes_apart, start_in
 from posefit.fitting.tracker import Initialiser, Observation, Task
@@ -139,15 +139,15 @@ def gain(case: Case) -> str:
     costs = []
     for guess, observation in zip(case.first, observations, strict=True):
         if guess is not None:
-            problem = PoseProblem(
+            cost = SilhouetteCost(
                 task.body, task.cameras, observation.silhouettes, space
             )
-            start = start_in(problem, modes_apart(task.body.skeleton, guess))
+            start = start_in(cost, modes_apart(task.body.skeleton, guess))
             drawn = [
                 draw_population(each, np.random.default_rng(0), POPULATION)
                 for each in (replace(space, start=start), space)
             ]
-            costs.append([problem.evaluate(population).min() for population in drawn])
+            costs.append([cost(population).min() for population in drawn])
     if not costs:
         raise SkippedError("it knows no pose of the built-in walk")
     guided, blind = np.mean(costs, axis=0)

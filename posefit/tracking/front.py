@@ -6,15 +6,18 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
-from posefit.footage.images import IMAGES
 from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
-from posefit.footage.source import Footage, check_used, kind_of, scene_of
+from posefit.footage.source import (
+    Footage,
+    check_used,
+    kind_of,
+    scene_of,
+    sources_of,
+)
 from posefit.motion import built_in
 from posefit.motion.clips import Source, training_clips, training_motions
 from posefit.motion.motion import Motion
@@ -44,9 +47,9 @@ def track(
     """Return the motion tracked through a source's silhouettes, with its errors where the truth is known.
 
     `source` is masks, an array (T, H, W), a list of image files, a folder of them, or an .npz or .npy file; a video; a
-    list of any of these, that several cameras took at the same time; a built-in motion's name, a recorded one's, a
-    `Motion`, an .amc or .bvh file; or a `Scene` of a known motion, as it is. All other options are listed below, with
-    the defaults that depend on the source in `posefit.tracking.defaults.completed`.
+    list of any of these, that several cameras took at the same time, such as two lists of image files; a built-in
+    motion's name, a recorded one's, a `Motion`, an .amc or .bvh file; or a `Scene` of a known motion, as it is.
+    Other options are listed below; `posefit.tracking.defaults.completed` has the defaults that depend on the source.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
@@ -95,6 +98,7 @@ def track(
             if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
                 scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
+        recorder.begin(scene)
         training = training_motions(clips, scene.fps)
         track = track_scene(
             scene, training, chosen, recorder=recorder, progress=progress
@@ -102,7 +106,8 @@ def track(
         names = [
             each.name if isinstance(each, Motion) else name_of(each) for each in sources
         ]
-        view_degrees = options.get("view_degrees")
+        # numbers of Python, whatever kind they were given as
+        view_degrees = list(chosen.view_degrees) or None  # type: ignore[arg-type]
         setup = replace(
             track.setup,
             source=names,
@@ -124,38 +129,14 @@ def fit(
 
 
 def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
-    """Return one source a camera: an image, a mask or a list of either is that of one."""
-    if isinstance(source, Scene):
-        if source.truth is None:
-            raise InputError(
-                f"a scene must be of a known motion, got {source.name}, whose truth is unknown"
-            )
-        return [source.truth]
-    if (
-        isinstance(source, Motion)
-        or not isinstance(source, Sequence)
-        or isinstance(source, str)
-    ):
-        source = [source]
-    sources: list[Any] = [
-        np.asarray(each) if hasattr(each, "__array__") else each for each in source
-    ]
-    if all(isinstance(each, np.ndarray) and each.ndim == 2 for each in sources):
-        if len({each.shape for each in sources}) > 1:
-            raise InputError(
-                f"masks must have one shape, got {', '.join(sorted({str(e.shape) for e in sources}))}"
-            )
-        return [np.stack(sources)]
-    images = [
-        isinstance(each, str | Path) and Path(each).suffix.lower() in IMAGES
-        for each in sources
-    ]
-    if all(images):
-        return [tuple(Path(each) for each in sources)]
-    return [
-        (Path(each),) if image else each
-        for each, image in zip(sources, images, strict=True)
-    ]
+    """Return one source a camera, or the motion of a scene."""
+    if not isinstance(source, Scene):
+        return sources_of(source)
+    if source.truth is None:
+        raise InputError(
+            f"a scene must be of a known motion, got {source.name}, whose truth is unknown"
+        )
+    return [source.truth]
 
 
 def _check_for_kind(

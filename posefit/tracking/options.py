@@ -126,7 +126,10 @@ def _range(name: str, value: Any) -> tuple[int | None, int | None]:
         raise InputError(
             f"{name} must be two whole numbers or None, got {quoted(value)}"
         )
-    return start, stop
+    return (
+        None if start is None else int(start),
+        None if stop is None else int(stop),
+    )
 
 
 def _person(name: str, value: Any) -> "Choice":
@@ -148,11 +151,49 @@ def _device(_name: str, value: Any) -> str:
 
 
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
-    several = hasattr(value, "__len__") and not isinstance(value, str)
-    return tuple(
-        within(-360.0, 360.0, " degrees")(name, degrees)
-        for degrees in (value if several else [value])
-    )
+    values = value.tolist() if hasattr(value, "tolist") else value  # an array
+    check = within(-360.0, 360.0, " degrees")
+    if not isinstance(values, Sequence) or isinstance(values, str):
+        return (check(name, values),)
+    return tuple(check(name, degrees) for degrees in values)
+
+
+def _flag(name: str, value: Any) -> bool:
+    # NumPy's booleans are not Python's
+    value = value.item() if hasattr(value, "item") else value
+    if not isinstance(value, bool):
+        raise InputError(f"{name} must be True or False, got {quoted(value)}")
+    return value
+
+
+def _path(name: str, value: Any) -> str | Path:
+    if not isinstance(value, str | Path):
+        raise InputError(f"{name} must be the name of a file, got {quoted(value)}")
+    return value
+
+
+def _cameras(name: str, value: Any) -> tuple[Any, ...]:
+    """Return cameras, their calibrations and names of files."""
+    from posefit.geometry.calibration import Calibration
+    from posefit.geometry.camera import Camera
+
+    values = tuple(value) if isinstance(value, list | tuple) else (value,)
+    for each in values:
+        if not isinstance(each, Camera | Calibration | str | Path):
+            raise InputError(
+                f"{name} must be cameras or files of calibrations, got {quoted(each)}"
+            )
+    return values
+
+
+def _extraction(name: str, value: Any) -> "Extraction":
+    from posefit.footage.segmentation import Extraction
+
+    if not isinstance(value, Extraction):
+        raise InputError(
+            f"{name} must be an Extraction, such as Extraction('mixture'), got {quoted(value)}"
+        )
+    return value
 
 
 def _method(name: str, value: Any) -> Any:
@@ -222,14 +263,14 @@ class TrackOptions:
     asf: str | Path | None = option(
         None,
         "Skeleton of SOURCE; by default the only .asf beside an .amc.",
-        None,
+        _path,
         "FILE",
         heading="What is seen",
     )
     camera: "Camera | str | Path | Sequence[Camera | str | Path]" = option(
         (),
         "Calibration, one a view; guessed where absent.",
-        lambda _, value: tuple(value) if isinstance(value, list | tuple) else (value,),
+        _cameras,
         "FILE",
         repeated=True,
     )
@@ -280,7 +321,7 @@ class TrackOptions:
         live=False,
     )
     extraction: "Extraction | None" = option(
-        None, "How the person is taken out of video.", flag=""
+        None, "How the person is taken out of video.", _extraction, flag=""
     )
     height: float | None = _float(
         "How tall the person in the footage stands.", HEIGHTS, "METRES", " metres"
@@ -372,6 +413,7 @@ class TrackOptions:
     smooth: bool | None = option(
         None,
         "The root moves smoothly, and feet do not slide; the default for footage.",
+        _flag,
         parse=bool,
         identifies=False,
         live=False,

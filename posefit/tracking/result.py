@@ -22,12 +22,13 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait
+from posefit.measuring.tables import angle_columns, import_pandas
 from posefit.motion.motion import Motion
 from posefit.output.content import Content, Setup, TrackingLog
 from posefit.output.files import page_of
 from posefit.output.folder import OutputFolder
 from posefit.output.text import table
-from posefit.progress import QUIET
+from posefit.progress import interactive
 from posefit.reading import quoted, suggestion
 from posefit.uncertainty.modes import TrackMode
 
@@ -117,25 +118,16 @@ class Track:
         return angles[name]
 
     def _angles(self) -> dict[str, Array]:
-        from posefit.measuring.angles import clinical_angles
-
-        angles = clinical_angles(self.motion.skeleton, self.motion.poses)
-        blank = np.isin(self.table["frame"], list(self.unseen))
-        return {
-            name: np.where(blank, np.nan, values) for name, values in angles.items()
-        }
+        return angle_columns(self.motion, self.unseen)
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Return a table of one row a frame: measures, angles in degrees, joints in metres.
+        """Return a table of one row a frame: measures, joints in metres, angles in degrees.
 
-        Columns are those of frames.csv and angles.csv. Raises ImportError where pandas is not installed.
+        Columns are those of frames.csv and angles.csv. Joints and angles are NaN where a frame was held or is called
+        lost; `joints` and `motion` have them there, too. Raises ImportError where pandas is not installed.
         """
-        from posefit.measuring.tables import import_pandas
-
-        axes = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
-        points = dict(zip(axes, self.joints.reshape(len(self), -1).T, strict=True))
         table: pd.DataFrame = import_pandas().DataFrame(
-            {**self.table, "activity": self.activity, **self._angles(), **points}
+            {**self.content.columns, **self._angles()}
         )
         return table
 
@@ -168,7 +160,7 @@ class Track:
 
     def save(self, folder: str | Path, force: bool = False) -> None:
         """Write every file of a track to a new folder, or with `force` over earlier ones."""
-        with OutputFolder(folder, force, False, {}, QUIET.log) as output:
+        with OutputFolder(folder, force, False, {}, interactive().log) as output:
             output.finish(self.content)
 
 

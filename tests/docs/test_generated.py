@@ -3,7 +3,6 @@
 import json
 import pkgutil
 import re
-from contextlib import closing
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -103,7 +102,7 @@ def test_every_column_of_a_sweeps_csv_is_described(tmp_path: Path) -> None:
 def test_every_column_of_a_leaderboard_is_described(tmp_path: Path) -> None:
     made = [result(replace(FIRST, method=m), 1.0) for m in "ab"]
     path = ledger(tmp_path / "results", made)
-    with closing(Ledger(path)) as opened:
+    with Ledger(path) as opened:
         runs = runs_of(opened)
     contest = contest_of(runs)
     assert contest is not None

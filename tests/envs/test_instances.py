@@ -128,7 +128,7 @@ def test_scenes_together_are_what_the_library_computes_of_each_alone(
     evaluation = stage.evaluate(proposals[:, 0], stage.all_rows)
     for row, episode in enumerate(episodes):
         problem = episode.problem
-        np.testing.assert_array_equal(costs[row], problem.evaluate(proposals[row]))
+        np.testing.assert_array_equal(costs[row], problem(proposals[row]))
         poses, places = problem.decode(proposals[row, :1])
         np.testing.assert_array_equal(evaluation.poses[row], poses[0])
         np.testing.assert_array_equal(evaluation.translations[row], places[0])

@@ -74,7 +74,7 @@ def test_a_search_is_its_optimiser_by_ask_and_tell(
     for _ in range(6):
         asked = expected.ask()
         assert asked.shape == (population_size, problem.space.dimensions)
-        costs = problem.evaluate(asked)
+        costs = problem(asked)
         expected.tell(asked, costs)
         best = min(best, costs.min())
         observation, _, _, _, info = env.step(race_action(1, 4))
@@ -106,7 +106,7 @@ def test_the_bests_of_all_particles_are_feasible_and_the_best_is_what_it_costs()
         assert env.problem.space.feasible(env._vector._bests.reshape(-1, 9)).all()
     assert ended
     problem = env._vector.episodes[0].problem
-    assert info["best_cost"] == problem.evaluate(info["proposal"][None])[0]
+    assert info["best_cost"] == problem(info["proposal"][None])[0]
     assert info["evaluations"] == 8 * (4 + 60)
     assert total == pytest.approx(math.log((1.0 + first) / (1.0 + info["best_cost"])))
     pose = problem.decode(info["proposal"][None])[0][0]

@@ -112,24 +112,47 @@ def test_a_pose_is_reported_lag_frames_later(walker: Walk, lag: int) -> None:
     assert late == [min(lag, count - reported) for reported in range(1, count + 1)]
 
 
-@each(("aligned", "most"), [(False, 90.0), (True, 130.0)])
+@each("aligned", [False, True])
 def test_frames_without_the_person_are_bridged(
-    walker: Walk, aligned: bool, most: float
+    walker: Walk, aligned: bool, seed: int
+) -> None:
+    walk = walker.aligned() if aligned else walker
+    gap = range(8, 14)
+    unusable = [
+        replace(shown, usable=k not in gap) for k, shown in enumerate(walk.observations)
+    ]
+    bridged = list[float]()
+    held = list[float]()
+    # a place that is aligned may be far off in one track, which of them differs between processors: three on average
+    for offset in range(3):
+        frames = replace(walk, observations=unusable).track(
+            evaluations=2440, seed=seed + offset
+        )
+        searched = [k for k, frame in enumerate(frames) if frame.evaluations > 1]
+        assert searched == [k for k in range(len(frames)) if k not in gap]
+        assert walk.errors_mm(frames)[14:].max() < 130.0
+        standing = [frames[7] if k in gap else frame for k, frame in enumerate(frames)]
+        bridged.append(walk.errors_mm(frames)[8:14].mean())
+        held.append(walk.errors_mm(standing)[8:14].mean())
+    # a person who is taken to stand still is 136 mm off, and one that walks on 30, or 80 if the place is aligned
+    assert np.mean(bridged) < np.mean(held)
+
+
+@each("aligned", [False, True])
+def test_frames_without_the_person_need_not_be_empty(
+    walker: Walk, aligned: bool
 ) -> None:
     walk = walker.aligned() if aligned else walker
     unusable = [
         replace(shown, usable=not 8 <= k < 14)
         for k, shown in enumerate(walk.observations)
     ]
-    frames = replace(walk, observations=unusable).track(evaluations=2440)
-    assert [k for k, frame in enumerate(frames) if frame.evaluations == 1] == list(
-        range(8, 14)
-    )
-    assert walk.errors_mm(frames)[8:].max() < most
-    empty = walk.hidden(8, 14).track(evaluations=2440)
-    np.testing.assert_array_equal(
-        [frame.pose for frame in empty], [frame.pose for frame in frames]
-    )
+    tracks = [
+        one.track(evaluations=MIN_EVALUATIONS)
+        for one in (replace(walk, observations=unusable), walk.hidden(8, 14))
+    ]
+    shown, empty = ([frame.pose for frame in frames] for frames in tracks)
+    np.testing.assert_array_equal(shown, empty)
 
 
 @each(("aligned", "usable"), itertools.product([False, True], [False, True]))

@@ -39,9 +39,8 @@ def test_costs_come_back_in_the_callers_library_and_type_with_numpys_bits(
     problem = posefit.suite()
     numpys = posefit.suite()
     for evaluate in (
-        lambda suite: suite.evaluate,
         lambda suite: suite,
-        lambda suite: suite.made.frames[0].evaluate,
+        lambda suite: posefit.Problem(suite.made.frames[0], suite.space),
     ):
         costs = evaluate(problem)(array)
         expected = evaluate(numpys)(DRAWN.astype(kind))

@@ -1,5 +1,6 @@
-"""The search space, the problem and the loop that drives an optimiser."""
+"""The search space, the cost of proposals, the problem that counts and the loop that minimises it."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,16 +9,18 @@ import pytest
 from posefit import (
     Body,
     Camera,
-    PoseProblem,
+    Problem,
     SearchSpace,
     Silhouette,
+    SilhouetteCost,
     minimise,
     project,
 )
-from posefit.fitting.optimiser import BudgetError
 from posefit.fitting.prior import Tilt
+from posefit.fitting.problem import BudgetError, BudgetSpentError
 from posefit.motion import built_in
 from posefit.plugin import Array, align, displacement, draw_population
+from posefit.testing.toy import Toy
 from posefit_priors.pca import PCA
 from tests.cases import each
 
@@ -26,8 +29,8 @@ BODY = Body.of(WALK.skeleton)
 
 
 @pytest.fixture(scope="module")
-def problem() -> PoseProblem:
-    """Return the problem of one pose in two views."""
+def cost() -> SilhouetteCost:
+    """Return the cost of proposals for one pose in two views."""
     angles = np.concatenate(
         [built_in.motion(style).poses[:, 3:] for style in ("walk-a", "walk-b")]
     )
@@ -45,11 +48,11 @@ def problem() -> PoseProblem:
         np.radians([45.0, 15.0, 15.0]),
         WALK.translations[0],
     )
-    return PoseProblem(BODY, cameras, silhouettes, space)
+    return SilhouetteCost(BODY, cameras, silhouettes, space)
 
 
-def drawn(problem: PoseProblem, count: int) -> Array:
-    return draw_population(problem.space, np.random.default_rng(0), count)
+def drawn(cost: SilhouetteCost, count: int) -> Array:
+    return draw_population(cost.space, np.random.default_rng(0), count)
 
 
 @each(
@@ -57,45 +60,43 @@ def drawn(problem: PoseProblem, count: int) -> Array:
     [("known", False), ("searched", True), ("aligned", False)],
 )
 def test_a_cost_has_the_same_bits_whatever_is_beside_it(
-    problem: PoseProblem, translation: str, tilted: bool
+    cost: SilhouetteCost, translation: str, tilted: bool
 ) -> None:
     tilt = (
-        Tilt.of(problem.space.prior, [built_in.motion("walk-a")], 0.99, 0.1)
+        Tilt.of(cost.space.prior, [built_in.motion("walk-a")], 0.99, 0.1)
         if tilted
         else None
     )
-    problem = replace(
-        problem, space=replace(problem.space, translation=translation, tilt=tilt)
-    )
-    proposals = drawn(problem, 1000)
-    costs = problem.evaluate(proposals)
+    cost = replace(cost, space=replace(cost.space, translation=translation, tilt=tilt))
+    proposals = drawn(cost, 1000)
+    costs = cost(proposals)
     for threads in (1, 3):
-        shared = replace(problem, threads=threads)
-        np.testing.assert_array_equal(shared.evaluate(proposals), costs)
-        np.testing.assert_array_equal(shared.evaluate(proposals[::-1])[::-1], costs)
-    parts = [problem.evaluate(proposals[k : k + 7]) for k in range(0, 1000, 7)]
+        shared = replace(cost, threads=threads)
+        np.testing.assert_array_equal(shared(proposals), costs)
+        np.testing.assert_array_equal(shared(proposals[::-1])[::-1], costs)
+    parts = [cost(proposals[k : k + 7]) for k in range(0, 1000, 7)]
     np.testing.assert_array_equal(np.concatenate(parts), costs)
     np.testing.assert_array_equal(
-        [problem.evaluate(proposal[None])[0] for proposal in proposals[:20]], costs[:20]
+        [cost(proposal[None])[0] for proposal in proposals[:20]], costs[:20]
     )
     np.testing.assert_array_equal(
-        problem.cost_and_areas(*problem.decode(proposals))[0], costs
+        cost.cost_and_areas(*cost.decode(proposals))[0], costs
     )
-    assert problem.evaluate(proposals[:0]).shape == (0,)
+    assert cost(proposals[:0]).shape == (0,)
 
 
 @each("threads", [1, 2])
 def test_a_search_gets_the_costs_of_areas_without_views_that_know_nothing(
-    problem: PoseProblem, threads: int
+    cost: SilhouetteCost, threads: int
 ) -> None:
-    whole = problem.silhouettes[0]
+    whole = cost.silhouettes[0]
     half = Silhouette.of(
         whole.mask, np.ones_like(whole.mask) & (np.arange(whole.size[0]) < 80)
     )
     blind = Silhouette.of(np.zeros_like(whole.mask), np.zeros_like(whole.mask))
-    cameras = [problem.cameras[0]] * 3
+    cameras = [cost.cameras[0]] * 3
     several = replace(
-        problem,
+        cost,
         cameras=cameras,
         silhouettes=[blind, whole, half],
         beta=0.3,
@@ -109,40 +110,38 @@ def test_a_search_gets_the_costs_of_areas_without_views_that_know_nothing(
             for r, b, y in np.concatenate(counts[1:])
         ]
     )
-    np.testing.assert_allclose(
-        several.evaluate(proposals), shares.reshape(2, -1).mean(axis=0)
-    )
+    np.testing.assert_allclose(several(proposals), shares.reshape(2, -1).mean(axis=0))
     nothing = replace(several, silhouettes=[blind] * 3, blank=True)
     # Interpretation S2
-    np.testing.assert_array_equal(nothing.evaluate(proposals), 100.0)
+    np.testing.assert_array_equal(nothing(proposals), 100.0)
 
 
 @each("translation", ["known", "searched", "aligned"])
 def test_a_proposal_means_the_same_pose_at_every_size(
-    problem: PoseProblem, translation: str
+    cost: SilhouetteCost, translation: str
 ) -> None:
-    problem = replace(problem, space=replace(problem.space, translation=translation))
-    half = problem.coarser(2)
-    quarter = problem.coarser(4)
-    assert problem.coarser(2) is half
+    cost = replace(cost, space=replace(cost.space, translation=translation))
+    half = cost.coarser(2)
+    quarter = cost.coarser(4)
+    assert cost.coarser(2) is half
     assert [camera.width for camera in (*half.cameras, *quarter.cameras)] == [
         80,
         80,
         40,
         40,
     ]
-    proposals = drawn(problem, 50)
+    proposals = drawn(cost, 50)
     for values, expected in zip(
-        half.decode(proposals), problem.decode(proposals), strict=True
+        half.decode(proposals), cost.decode(proposals), strict=True
     ):
         np.testing.assert_allclose(values, expected, atol=1e-9)
 
 
-def test_a_searched_translation_has_three_more_dimensions(problem: PoseProblem) -> None:
+def test_a_searched_translation_has_three_more_dimensions(cost: SilhouetteCost) -> None:
     space = replace(
-        problem.space, translation="searched", anchor=np.array([1.0, 2.0, 3.0])
+        cost.space, translation="searched", anchor=np.array([1.0, 2.0, 3.0])
     )
-    assert space.dimensions == problem.space.dimensions + 3 == 12
+    assert space.dimensions == cost.space.dimensions + 3 == 12
     poses, translations = space.decode(
         np.array([[0.0] * 3 + [1.0, 0.0, -0.5] + [0.0] * 6])
     )
@@ -150,16 +149,16 @@ def test_a_searched_translation_has_three_more_dimensions(problem: PoseProblem) 
     np.testing.assert_allclose(poses[0, :3], 0.0)
 
 
-def test_a_full_circle_of_yaw_wraps(problem: PoseProblem) -> None:
-    space = replace(problem.space, root_range=np.array([np.pi, 0.2, 0.2]))
+def test_a_full_circle_of_yaw_wraps(cost: SilhouetteCost) -> None:
+    space = replace(cost.space, root_range=np.array([np.pi, 0.2, 0.2]))
     assert space.periodic.tolist() == [True] + [False] * 8
     assert displacement(
         space, np.array([0.9] + [0.0] * 8), np.array([-0.9] + [0.0] * 8)
     )[0] == pytest.approx(0.2)
 
 
-def test_aligning_recovers_the_true_translation(problem: PoseProblem) -> None:
-    camera = problem.cameras[0]
+def test_aligning_recovers_the_true_translation(cost: SilhouetteCost) -> None:
+    camera = cost.cameras[0]
     for pose, translation in zip(WALK.poses, WALK.translations, strict=True):
         true = translation + [0.2, -0.1, 0.3]
         silhouette = Silhouette.of(project(BODY, camera, pose, true))
@@ -230,10 +229,10 @@ def test_aligning_near_a_camera_is_that_of_a_slow_twin(
         np.testing.assert_allclose(place, expected, atol=1e-5)
 
 
-def test_mistakes_are_named(problem: PoseProblem) -> None:
+def test_mistakes_are_named(cost: SilhouetteCost) -> None:
     holed = np.zeros((1000, 9))
     holed[900, 3] = np.nan
-    for shared in (problem, replace(problem, threads=2)):
+    for shared in (cost, replace(cost, threads=2)):
         for proposals, message in (
             (
                 np.zeros((1000, 8)),
@@ -243,22 +242,22 @@ def test_mistakes_are_named(problem: PoseProblem) -> None:
             (holed, "proposals must be finite"),
         ):
             with pytest.raises(ValueError, match=message):
-                shared.evaluate(proposals)
-    space = problem.space
+                shared(proposals)
+    space = cost.space
     nowhere = np.zeros(3)
     empty = Silhouette.of(np.zeros((120, 160)))
     lying = Silhouette.of(np.ones((160, 120)))
     for call, message in (
         (
-            lambda: replace(problem, silhouettes=[lying] * 2),
+            lambda: replace(cost, silhouettes=[lying] * 2),
             r"mask must have shape \(120, 160\), the camera's, got \(160, 120\)",
         ),
         (
-            lambda: replace(problem, silhouettes=[]),
+            lambda: replace(cost, silhouettes=[]),
             r"silhouettes must be one a camera \(2\), got 0",
         ),
         (
-            lambda: replace(problem, silhouettes=[empty] * 2),
+            lambda: replace(cost, silhouettes=[empty] * 2),
             "silhouettes must show a person, got an empty mask",
         ),
         (
@@ -281,14 +280,6 @@ def test_mistakes_are_named(problem: PoseProblem) -> None:
             lambda: Camera.around(nowhere, 0.0, 3.0, (64, 48), 4.0),
             "field_of_view must lie between 0 and pi radians",
         ),
-        (
-            lambda: minimise(lambda x: x[1:, 0], Walker(7), 40),
-            r"an array of costs of shape \(7,\), got shape \(6,\)",
-        ),
-        (
-            lambda: minimise(lambda x: x[:, 0].tolist(), Walker(7), 40),
-            r"an array of costs of shape \(7,\), got list",
-        ),
     ):
         with pytest.raises((ValueError, TypeError), match=message):
             call()
@@ -308,26 +299,95 @@ class Walker:
         self.evaluated.append((proposals, costs))
 
 
+LINE = Toy(1)
+
+
 def test_the_budget_is_used_in_whole_populations() -> None:
-    best = minimise(lambda x: -x[:, 0], Walker(7), 40)
-    assert (best.evaluations, best.cost) == (35, -4.0)
-    assert best.trace.tolist() == [
-        [7.0, 0.0],
-        [14.0, -1.0],
-        [21.0, -2.0],
-        [28.0, -3.0],
-        [35.0, -4.0],
-    ]
+    walker = Walker(7)
+    problem = Problem(lambda x: -x[:, 0], LINE, 40)
+    assert minimise(problem, walker) is problem
+    assert (problem.evaluations, problem.best_cost) == (35, -4.0)
+    assert (problem.budget, problem.remaining_evaluations) == (40, 5)
+    evaluations, costs = problem.trace
+    # the first of each population is lower than all before it
+    assert evaluations.tolist() == [1.0, 8.0, 15.0, 22.0, 29.0, 35.0]
+    assert costs.tolist() == [0.0, -1.0, -2.0, -3.0, -4.0, -4.0]
+    assert problem.points.tolist() == [[0.0], [1.0], [2.0], [3.0], [4.0]]
+    assert len(walker.evaluated) == 5
     with pytest.raises(
         BudgetError, match="evaluations must hold one population of 7, got 6"
     ):
-        minimise(lambda x: x[:, 0], Walker(7), 6)
+        minimise(Problem(lambda x: x[:, 0], LINE, 6), Walker(7))
+    with pytest.raises(ValueError, match="must have a budget to be minimised"):
+        minimise(Problem(lambda x: x[:, 0], LINE), Walker(7))
+
+
+def test_nothing_is_evaluated_beyond_the_budget_and_nothing_wrong_is_counted() -> None:
+    sizes = list[int]()
+
+    def cost(proposals: Array) -> Array:
+        sizes.append(len(proposals))
+        return proposals[:, 0]
+
+    problem = Problem(cost, LINE, 5, id="a line")
+    problem(np.zeros((3, 1)))
+    with pytest.raises(
+        BudgetSpentError, match="a line: 2 of 5 evaluations are left, got 3"
+    ):
+        problem(np.zeros((3, 1)))
+    with pytest.raises(ValueError, match="proposals must be finite"):
+        problem([np.nan])
+    assert problem([0.5]) == 0.5
+    assert sizes == [3, 1]
+    assert problem.evaluations == 4
+    problem.reset()
+    assert (problem.evaluations, problem.best_cost) == (0, np.inf)
+    with pytest.raises(ValueError, match="a line must have been evaluated"):
+        _ = problem.best
 
 
 def test_nan_is_never_the_best_cost() -> None:
-    best = minimise(lambda x: np.where(x[:, 0] == 1.0, 5.0, np.nan), Walker(3), 9)
-    assert best.cost == 5.0
+    problem = Problem(lambda x: np.where(x[:, 0] == 1.0, 5.0, np.nan), LINE, 9)
+    assert minimise(problem, Walker(3)).best_cost == 5.0
     with pytest.raises(
-        ValueError, match="costs must be numbers, got nan for all 9 proposals"
+        ValueError, match="costs must be numbers, got none in 9 evaluations"
     ):
-        minimise(lambda x: x[:, 0] * np.nan, Walker(3), 9)
+        minimise(Problem(lambda x: x[:, 0] * np.nan, LINE, 9), Walker(3))
+
+
+@each(
+    ("wrong", "came"),
+    [
+        (lambda x: x[1:, 0], r"got \(6,\)"),
+        (lambda x: x[:, 0].tolist(), "got list"),
+        (lambda x: x, r"got \(7, 1\)"),
+    ],
+)
+def test_a_cost_function_returns_a_cost_for_each_proposal(
+    wrong: Callable[[Array], Array], came: str
+) -> None:
+    with pytest.raises(
+        TypeError, match=r"cost must return an array of shape \(7,\), " + came
+    ):
+        minimise(Problem(wrong, LINE, 40), Walker(7))
+
+
+def test_a_repair_is_what_is_evaluated_and_noise_is_not_remembered() -> None:
+    problem = Problem(
+        lambda x: x[:, 0] ** 2,
+        LINE,
+        repair=lambda x: np.clip(x, -1.0, 0.5),
+        noisy=lambda x, first: 100.0 + first + np.arange(len(x)),
+    )
+    assert problem(np.array([[0.9], [0.7]])).tolist() == [100.0, 101.0]
+    assert problem([0.0]) == 102.0
+    assert problem.points.tolist() == [[0.5], [0.0]]
+    assert problem.trace[1].tolist() == [0.25, 0.0]
+
+
+def test_a_problem_knows_what_its_cost_function_knows(cost: SilhouetteCost) -> None:
+    problem = Problem(cost, cost.space)
+    assert problem.body is cost.body
+    with pytest.raises(AttributeError, match="Problem has no attribute 'colour'"):
+        _ = problem.colour
+    assert not hasattr(Problem(np.sum, LINE), "decode")

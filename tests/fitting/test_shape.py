@@ -7,7 +7,7 @@ import pytest
 
 from posefit import Camera, Frame, Observation, Silhouette, pose_costs, project
 from posefit.fitting import shape
-from posefit.fitting.problem import align
+from posefit.fitting.cost import align
 from posefit.fitting.shape import (
     COVARIANCE,
     GIRTHS,

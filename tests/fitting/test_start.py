@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import posefit
-from posefit import PoseProblem, SearchSpace
+from posefit import SearchSpace, SilhouetteCost
 from posefit.fitting.start import MODE_SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
@@ -43,13 +43,13 @@ def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
         np.testing.assert_allclose(drawn[rows].std(axis=0), spread, atol=error)
 
 
-def problem_of(row: int, turn: float) -> PoseProblem:
-    """Return the problem whose silhouette is of one of the walker's poses, turned."""
+def cost_of(row: int, turn: float) -> SilhouetteCost:
+    """Return the cost whose silhouette is of one of the walker's poses, turned."""
     body = posefit.Body.of(WALK.skeleton)
     place = WALK.translations[row]
     camera = posefit.Camera.around(place, 0.3, 5.0, (160, 120))
     mask = posefit.project(body, camera, WALK.poses[row] + turn * np.eye(66)[0], place)
-    return PoseProblem(
+    return SilhouetteCost(
         body, [camera], [posefit.Silhouette.of(mask)], replace(SPACE, anchor=place)
     )
 
@@ -58,7 +58,7 @@ def test_modes_are_projected_onto_the_latents_of_the_prior_and_weighed_by_their_
     None
 ):
     start = start_in(
-        problem_of(20, 2.5),
+        cost_of(20, 2.5),
         modes_apart(WALK.skeleton, weighted([5, 20], [0.0, 2.5], [3.0, 1.0])),
     )
     (other,) = start.others
@@ -80,7 +80,7 @@ def test_a_mode_is_around_its_pose_that_costs_least() -> None:
     ((_, mode),) = modes_apart(
         WALK.skeleton, weighted([5, 5, 5], [0.3, 0.2, 0.0], [5.0, 4.0, 1.0])
     )
-    start = start_in(problem_of(5, 0.0), [(1.0, mode)])
+    start = start_in(cost_of(5, 0.0), [(1.0, mode)])
     np.testing.assert_allclose(
         SPACE.decode(start.mean[None])[0][0, 0], WALK.poses[5, 0], atol=1e-9
     )

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit import minimise
+from posefit import Problem, minimise
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
 from posefit.silhouette.drawn import count_poses
 from posefit.testing.toy import Toy, sphere
@@ -78,7 +78,7 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
         with pytest.raises(
             BrokenRuleError, match=rf"^optimiser 'bad' of posefit-bad 1.0: {rule}$"
         ):
-            minimise(sphere, checked, 40)
+            minimise(Problem(sphere, Toy(9), 40), checked)
     with pytest.raises(
         BrokenRuleError, match="advance must not fail, got AttributeError"
     ):

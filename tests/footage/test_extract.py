@@ -106,7 +106,11 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
     assert not silhouette.valid[:, 70:80].any()
     assert not silhouette.mask[:, 70:80].any()
     result = posefit.track(
-        masks, method="@loose", frames=(5, 9), view_degrees=90, evaluations=400
+        masks,
+        method="@loose",
+        frames=(EMPTY + 10, EMPTY + 14),
+        view_degrees=90,
+        evaluations=400,
     )
     assert result.summary["iou"] > 0.4
 

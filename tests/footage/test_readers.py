@@ -136,7 +136,7 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
 def test_what_numbers_in_names_mean_is_reported(
     names: list[str], count: int, guess: str | None
 ) -> None:
-    frames, guesses = numbered([Path(name) for name in names], "masks")
+    frames, guesses, *_ = numbered([Path(name) for name in names], "masks")
     assert len(frames) == count
     assert sum(frame is not None for frame in frames) == len(names)
     assert bool(guesses) == (guess is not None)

@@ -11,7 +11,7 @@ from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
 from posefit.motion.clips import POSE_BYTES, training_clips, training_motions
-from posefit.motion.instance import SPEED, VIEW_DEGREES, motion_of_instance, variation
+from posefit.motion.instances import SPEED, VIEW_DEGREES, motion_of_instance, variation
 from tests.commands import error_of
 
 

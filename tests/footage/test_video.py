@@ -4,7 +4,9 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -70,8 +72,21 @@ def test_a_relative_name_with_a_colon_is_a_file(
     assert opencv_name("run-10:30") == str(tmp_path / "run-10:30")
 
 
+def guarded(name: str) -> Callable[..., Any]:
+    """Return OpenCV's function or class of a name, behind a check that each name is UTF-8."""
+    library = getattr(cv2, name)
+
+    def stub(first: Any, *others: Any) -> Any:
+        str(
+            first
+        ).encode()  # raises UnicodeEncodeError, where the library ends the process
+        return library(first, *others)
+
+    return stub
+
+
 def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     strange = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9")
     out = tmp_path / "out"
@@ -79,6 +94,9 @@ def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(
     _ = stack(Path(f"{strange}.npz"), truth()[:4])
     shutil.copy(path, f"{strange}.avi")
     before = sorted(tmp_path.iterdir())
+    # if posefit let such a name through, the library would still not get it
+    for name in ("VideoCapture", "VideoWriter", "imread", "imwrite"):
+        monkeypatch.setattr(cv2, name, guarded(name))
     for words in (
         ("track", path, "--out", strange),
         ("track", f"{strange}.avi", "--out", out),
@@ -96,7 +114,12 @@ def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(
     tmp_path: Path,
 ) -> None:
     film(tmp_path / "walk.avi", truth()[:4]).rename(tmp_path / "café.avi")
-    script = f"from posefit.footage.video import Video\nVideo.of(b'{tmp_path}/caf\\xc3\\xa9.avi'.decode('ascii', 'surrogateescape'))"
+    script = f"""
+import cv2
+from posefit.footage.video import Video
+cv2.VideoCapture = None  # if posefit let the name through, the library would not get it
+Video.of(b'{tmp_path}/caf\\xc3\\xa9.avi'.decode('ascii', 'surrogateescape'))
+"""
     plain = {
         "LC_ALL": "C",
         "PYTHONUTF8": "0",

@@ -82,7 +82,8 @@ def readers() -> dict[str, Callable[[Path], object]]:
     def reported(file: Path) -> object:
         out = file.parent / NAME
         summary = write_report(str(file), f"{out}.html", csv=f"{out}.csv")
-        Ledger(file).frame()
+        with Ledger(file) as ledger:
+            ledger.frame()
         return leaderboard_lines(summary)
 
     def whole(path: Path) -> object:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit import minimise
+from posefit import Problem, minimise
 from posefit.arrays import Array
 from posefit.registry import Registry, load, registry
 from posefit.testing.toy import Toy, ball, sphere
@@ -85,16 +85,15 @@ def test_no_thread_outlives_its_search_or_an_error_in_it() -> None:
 
     with pytest.raises(RuntimeError, match="the cost failed"):
         minimise(
-            Mock(side_effect=RuntimeError("the cost failed")),
+            Problem(Mock(side_effect=RuntimeError("the cost failed")), Toy(3), 100),
             bridge(climbs, Toy(3)),
-            100,
         )
     assert bridges() <= before
 
 
 def test_what_the_library_raises_is_raised_where_it_is_asked() -> None:
     with pytest.raises(RuntimeError, match="the library failed: OSError: out of paper"):
-        minimise(sphere, bridge(fails, Toy(3)), 100)
+        minimise(Problem(sphere, Toy(3), 100), bridge(fails, Toy(3)))
 
 
 @each("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])

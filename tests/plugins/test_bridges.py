@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.suites.problem import Problem
+from posefit import Problem
 
 ROOT = Path(__file__).parents[2]
 SENT = ROOT / "docs" / "contributions"

@@ -1,25 +1,31 @@
 """Settings are read from a plugin's signature, and a mistake is an error before anything runs."""
 
+import functools
 import inspect
-from typing import Literal
+import re
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
+from posefit.errors import InputError
+from posefit.fitting.check import choices
 from posefit.fitting.tracker import Prediction
 from posefit.hooks import PROJECT
 from posefit.registry import registry
 from posefit.settings import (
-    accepts,
     check,
+    check_hints,
     parse,
     planned,
+    setting_text,
     settings_in,
     settings_of,
     without_settings,
 )
 from posefit_filters.particle import Particle
 from posefit_swarm.sapso import SAPSO
+from tests.cases import each
 
 
 def factory(
@@ -132,13 +138,149 @@ def test_values_are_checked_as_texts_are() -> None:
         check("bare", lambda space, rng: None, {"x": 1})
 
 
-def test_an_unknown_annotation_accepts_everything() -> None:
-    assert accepts("SomeType", 3)
-    assert accepts(list[int], [1])
+TEXT = "from __future__ import annotations\n"
+MODULE = """
+from typing import TYPE_CHECKING, Annotated, Literal, Optional
+from collections.abc import Sequence
+if TYPE_CHECKING:
+    from nowhere import Space
 
+def function(space: Space, rng, *, value: {hint} = None): ...
+
+class Plugin:
+    def __init__(self, space: Space, *, value: {hint} = None): ...
+
+class Heir(Plugin): ...
+"""
+# hint, what fits it, what does not, and a text with the value that it means
+HINTS: list[tuple[str, list[object], list[object], str, object]] = [
+    ("int", [3, np.int64(3)], [3.0, True, "3", None], "3", 3),
+    ("float", [0.5, 3, np.float32(0.5)], ["0.5", True, None, (0.5,)], "0.5", 0.5),
+    ("bool", [True, np.True_], [1, 0, "true"], "true", True),
+    ("str", ["a"], [1, None], "7", "7"),
+    ("None", [None], [0, "none"], "none", None),
+    ("Literal['a', 'b']", ["a"], ["c", 1], "b", "b"),
+    ("Literal[1, 2]", [1, np.int8(2)], [True, 1.0, 3, "1"], "2", 2),
+    ("int | None", [3, None], [0.5, "a"], "none", None),
+    ("Optional[Literal['a']]", ["a", None], ["b"], "a", "a"),
+    ("Annotated[int, 'above 0']", [3], ["a", 0.5], "3", 3),
+    ("Annotated[float | None, 1, 2]", [0.5, None], ["a"], "1", 1),
+    ("tuple[float, ...]", [(0.1, 0.2, 3), (), [1.0]], [(0.1, "x"), 0.1], "1,2", (1, 2)),
+    ("tuple[float, ...]", [(np.float64(0.1),)], [("x",), None], "1", (1,)),
+    ("tuple[float, float]", [(1.0, 2), [1.0, 2.0]], [(1.0,), (1, 2, 3)], "1,2", (1, 2)),
+    ("tuple[int, str]", [(1, "a")], [("a", 1), (1, 1)], "7,7", (7, "7")),
+    (
+        "tuple[tuple[int, int], ...]",
+        [((1, 2), (3, 4))],
+        [((1,),)],
+        "[[1, 2]]",
+        ((1, 2),),
+    ),
+    ("list[int]", [[1, 2], (1, 2), []], [["a"], [1.5], 1, "12"], "1,2", [1, 2]),
+    ("list[str]", [["a"]], [[1]], "1,b", ["1", "b"]),
+    ("Sequence[float]", [(1.0, 2.0), [1]], [["a"], "12"], "1,2", (1, 2)),
+    ("list", [[1, "a"]], [1, "a"], "1,a", [1, "a"]),
+    (
+        "tuple[Annotated[int, 1] | None, ...]",
+        [(1, None)],
+        [(0.5,)],
+        "1,none",
+        (1, None),
+    ),
+    ("float | tuple[float, ...]", [0.5, (0.5, 1.0)], ["a", ("a",)], "1,2", (1, 2)),
+    ("list[Literal['a', 'b']]", [["a", "b"]], [["c"]], "a,b", ["a", "b"]),
+]
+
+
+def made_with(hint: str, postponed: bool) -> list[Any]:
+    """Return factories with a setting of this hint: two functions and two classes; one wraps another."""
+    names: dict[str, Any] = {"__name__": "nowhere_to_be_found"}
+    if postponed:
+        exec(TEXT + MODULE.format(hint=hint), names)
+    else:
+        exec(MODULE.format(hint=hint).replace(": Space", ""), names)
+
+    @functools.wraps(names["function"])
+    def wrapping(*given: Any, **more: Any) -> None: ...
+
+    return [
+        *(names[name] for name in ("function", "Plugin", "Heir")),
+        functools.partial(names["Plugin"], value=None),
+        wrapping,
+    ]
+
+
+@each("postponed", [False, True])
+@each("hint, fits, unfit, text, means", HINTS)
+def test_every_hint_that_is_offered_is_checked(
+    hint: str,
+    fits: list[object],
+    unfit: list[object],
+    text: str,
+    means: object,
+    postponed: bool,
+) -> None:
+    for made in made_with(hint, postponed):
+        check_hints("it", made)
+        for value in fits:
+            checked = check("it", made, {"value": value})
+            assert check("it", made, checked) == checked
+        for value in unfit:
+            with pytest.raises(ValueError, match=r"it\.value must be .+, got"):
+                check("it", made, {"value": value})
+        came = parse("it", made, {"value": text})["value"]
+        assert (came, type(came)) == (means, type(means))
+        again = setting_text(came)
+        assert parse("it", made, {"value": again})["value"] == came, again
+
+
+@each("postponed", [False, True])
+@each(
+    "hint, shown",
+    [
+        ("dict[str, int]", "dict[str, int]"),
+        ("set", "set"),
+        ("list[complex]", "list[complex]"),
+        ("tuple[dict, ...]", "tuple[dict, ...]"),
+        ("int | bytes", "int | bytes"),
+        ("Annotated[range, 1]", "range"),
+    ],
+)
+def test_a_hint_that_cannot_be_checked_is_refused(
+    hint: str, shown: str, postponed: bool
+) -> None:
+    for made in made_with(hint, postponed):
+        with pytest.raises(
+            InputError,
+            match=rf"^it: the type of the setting value must be int, .*, got {re.escape(shown)}$",
+        ):
+            check_hints("it", made)
+
+
+def test_a_hint_of_a_name_that_is_not_there_is_refused() -> None:
     def stringly(space, rng, *, a: "Missing" = 1): ...  # noqa: F821
 
     assert [one.name for one in settings_of(stringly)] == ["a"]
+    with pytest.raises(InputError, match="setting a must be int, .*, got Missing$"):
+        check_hints("it", stringly)
+    with pytest.raises(InputError, match="it.a must be Missing, got 1"):
+        check("it", stringly, {"a": 1})
+
+
+def test_choices_are_checked_in_a_module_with_postponed_annotations() -> None:
+    names: dict[str, Any] = {}
+    exec(
+        TEXT
+        + "from typing import Literal\n"
+        + "class Made:\n"
+        + "    kind: Literal['a', 'b'] = 'a'\n"
+        + "    def __init__(self, *, kind: Literal['a', 'b'] = 'a') -> None: ...\n",
+        names,
+    )
+    for settings in (names["Made"], names["Made"].__init__):
+        choices(settings, {"kind": "b"})
+        with pytest.raises(InputError, match="kind must be one of a, b, got 'c'"):
+            choices(settings, {"kind": "c"})
 
 
 def test_a_budget_becomes_iterations_or_evaluations_whichever_an_optimiser_plans_with() -> (

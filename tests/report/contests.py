@@ -1,7 +1,6 @@
 """Contests of runs that took no work."""
 
 from collections.abc import Iterable
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ Errors = dict[tuple[str, int, int], float]  # of method, instance and seed
 
 def runs_in(path: Path, *methods: str, latest: bool = False) -> Runs:
     """Return the runs of a ledger."""
-    with closing(Ledger(path)) as opened:
+    with Ledger(path) as opened:
         return runs_of(opened, methods, latest=latest)
 
 

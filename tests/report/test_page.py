@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import combinations, product
 from pathlib import Path
@@ -12,10 +12,9 @@ import pytest
 
 from posefit.errors import printable
 from posefit.report.repeat import repeat_command
-from posefit.sweep.ledger import Ledger
 from tests.report.browser import EVIL, ledger, opened, result, sure, written
 from tests.report.searched import cell, problems, search_result, searched
-from tests.sweep.fake import cells
+from tests.sweep.fake import cells, rows_in
 
 FIRST = replace(cells(1)[0], frames=4)
 METHODS = 9  # more than there are colours
@@ -83,12 +82,6 @@ def shown(chromium: Any, path: Path, width: int = 1280, **how: Any) -> Iterator[
         yield watched.page
         assert watched.complaints == []
         assert watched.requests == [path.as_uri()]
-
-
-def rows_of(made: Path) -> list[dict[str, Any]]:
-    """Return the finished rows of a ledger."""
-    with closing(Ledger(made)) as opened:
-        return list(opened.rows())
 
 
 def texts(page: Any, table: str, column: int) -> list[str]:
@@ -271,7 +264,7 @@ def test_hostile_names_are_text_and_commands_repeat_their_rows(
         assert page.locator("script").count() == 2
         assert page.locator("#certainty, #sections a[href='#certainty']").count() == 0
         commands = set()
-        finished = rows_of(made)
+        finished = rows_in(made)
         codes = page.locator("#all-rows code").all_inner_texts()
         assert sorted(codes) == sorted(
             f"posefit rerun results {row['key'][:8]}" for row in finished

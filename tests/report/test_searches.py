@@ -2,7 +2,6 @@
 
 import json
 import math
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +107,7 @@ def test_methods_differ_in_settings_budget_and_infeasible_proposals(
 def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> None:
     # 9 + 2 and 9; 9 and 9 + 1
     path = searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2))
-    with closing(Ledger(path)) as results:
+    with Ledger(path) as results:
         data = data_of(results, runs_of(results))
     assert [chart["title"] for chart in data["charts"]] == [
         "All functions",

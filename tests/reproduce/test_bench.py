@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from posefit import PoseProblem, Silhouette, project
+from posefit import Silhouette, SilhouetteCost, project
 from posefit.cli import main
 from posefit_reproduce.bench import kernel, loop
-from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
+from posefit_reproduce.bench.kernel import bench_cost, opencv_costs
 from tests.cases import each
 
 
@@ -18,16 +18,16 @@ from tests.cases import each
 def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(
     stretch: tuple[float, float],
 ) -> None:
-    usual = bench_problem()
+    usual = bench_cost()
     camera = replace(usual.cameras[0], focal=usual.cameras[0].focal * stretch)
     proposals = np.random.default_rng(0).uniform(
         -0.3, 0.3, (50, usual.space.dimensions)
     )
     poses, translations = usual.decode(proposals[:1])
     seen = Silhouette.of(project(usual.body, camera, poses[0], translations[0]))
-    problem = PoseProblem(usual.body, [camera], [seen], usual.space)
-    ours = problem.evaluate(proposals)
-    theirs = opencv_costs(problem, proposals)
+    cost = SilhouetteCost(usual.body, [camera], [seen], usual.space)
+    ours = cost(proposals)
+    theirs = opencv_costs(cost, proposals)
     # OpenCV also sets the pixels that a border merely touches, a ring of half a pixel around limbs 10 pixels wide
     assert ours[0] == 0.0
     assert theirs[0] < 4.0

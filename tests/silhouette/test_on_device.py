@@ -93,21 +93,19 @@ def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:
     one = pose_problem().coarser(4)
     seen = one.silhouettes[0]
     around = Camera.around(one.space.anchor, 2.0, 3.5, (33, 20))
-    problem = replace(
+    on_cpu = replace(
         one,
         cameras=[*one.cameras, around],
         silhouettes=[seen, Silhouette.of(np.eye(20, 33))],
     )
     on_device = replace(
-        problem, silhouettes=[moved_to(view, "cuda") for view in problem.silhouettes]
+        on_cpu, silhouettes=[moved_to(view, "cuda") for view in on_cpu.silhouettes]
     )
-    proposals = draw_population(problem.space, np.random.default_rng(7), 6)
+    proposals = draw_population(on_cpu.space, np.random.default_rng(7), 6)
     count = PoseCount()
     with count.counting():
-        np.testing.assert_array_equal(
-            on_device.evaluate(proposals), problem.evaluate(proposals)
-        )
+        np.testing.assert_array_equal(on_device(proposals), on_cpu(proposals))
     # of each view on the device and on the CPU, in one a quarter as large
     assert count.poses == 2 * (6 + 6 / 16)
-    half = on_device.coarser(2), problem.coarser(2)
-    np.testing.assert_array_equal(*(size.evaluate(proposals) for size in half))
+    half = on_device.coarser(2), on_cpu.coarser(2)
+    np.testing.assert_array_equal(*(size(proposals) for size in half))

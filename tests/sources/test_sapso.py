@@ -12,6 +12,7 @@ from scipy.stats import ks_2samp
 from posefit import (
     Body,
     Camera,
+    Problem,
     SearchSpace,
     Silhouette,
     Start,
@@ -377,21 +378,20 @@ def test_a1_2a_every_particle_is_evaluated_once_in_each_iteration() -> None:
         sizes.append(len(proposals))
         return bowl(proposals)
 
-    optimiser = SAPSO(
-        line_space(), np.random.default_rng(0), population_size=7, iterations=5
-    )
-    minimise(evaluate, optimiser, 7 * 6, budget_known=True)
+    space = line_space()
+    optimiser = SAPSO(space, np.random.default_rng(0), population_size=7, iterations=5)
+    problem = Problem(evaluate, space, 7 * 6)
+    minimise(problem, optimiser, budget_known=True)
     assert sizes == [7] * 6
 
 
 def test_a1_3_the_output_is_the_swarms_best() -> None:  # SAPSO A1.3
-    optimiser = SAPSO(
-        line_space(), np.random.default_rng(0), population_size=7, iterations=5
-    )
-    best = minimise(bowl, optimiser, 7 * 6, budget_known=True)
+    space = line_space()
+    optimiser = SAPSO(space, np.random.default_rng(0), population_size=7, iterations=5)
+    problem = minimise(Problem(bowl, space, 7 * 6), optimiser, budget_known=True)
     leader = optimiser.pbest_cost.argmin()
-    assert best.cost == optimiser.pbest_cost[leader]
-    np.testing.assert_array_equal(best.proposal, optimiser.pbest[leader])
+    assert problem.best_cost == optimiser.pbest_cost[leader]
+    np.testing.assert_array_equal(problem.best, optimiser.pbest[leader])
 
 
 def test_a1_2b_a_personal_best_changes_only_for_a_lower_cost() -> None:  # SAPSO A1.2b
@@ -542,19 +542,20 @@ def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> Non
 
 
 def test_eq_5_the_search_returns_the_least_cost_it_saw() -> None:  # SAPSO (5)
-    problem = pose_problem()
+    cost = pose_problem().cost
     seen = list[float]()
 
     def evaluate(proposals: Array) -> Array:
-        costs = problem.evaluate(proposals)
+        costs = cost(proposals)
         seen.extend(costs)
         return costs
 
-    best = minimise(evaluate, SAPSO(problem.space, np.random.default_rng(0)), 2440)
-    assert best.evaluations == len(seen) == 40 * 61
-    assert best.cost == min(seen) == problem.evaluate(best.proposal[None])[0]
+    problem = Problem(evaluate, cost.space, 2440)
+    minimise(problem, SAPSO(problem.space, np.random.default_rng(0)))
+    assert problem.evaluations == len(seen) == 40 * 61
+    assert problem.best_cost == min(seen) == cost(problem.best[None])[0]
     # the mean pose seen from where it stands
-    assert best.cost < 0.6 * problem.evaluate(np.zeros((1, 9)))[0]
+    assert problem.best_cost < 0.6 * cost(np.zeros((1, 9)))[0]
 
 
 # SAPSO (6)

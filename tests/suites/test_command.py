@@ -18,6 +18,7 @@ from posefit.sweep.plan import Plan
 from posefit.sweep.table import search_run
 from tests.cases import each
 from tests.commands import error_of, printed, run
+from tests.sweep.fake import rows_in
 
 PLAN = """
 suite = "posefit-2026.3"
@@ -209,7 +210,7 @@ def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken
 
 
 def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> None:
-    runs = [search_run(row) for row in Ledger(results).rows()]
+    runs = [search_run(row) for row in rows_in(results)]
     assert (
         len({(run.method, run.function, run.dimension, run.instance) for run in runs})
         == len(runs)
@@ -244,7 +245,8 @@ def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> Non
 
 
 def test_the_ledger_is_a_table(results: Path) -> None:
-    table = Ledger(results).frame()
+    with Ledger(results) as ledger:
+        table = ledger.frame()
     assert (len(table), set(table["function"]), set(table["settings"])) == (
         12,
         {1, 7},

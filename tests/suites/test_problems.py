@@ -12,10 +12,11 @@ from scipy.optimize import differential_evolution
 
 import posefit
 from posefit.fitting.box import draw_population
+from posefit.fitting.problem import BudgetSpentError, Problem
+from posefit.motion.instances import HELD_OUT, TRAINING
 from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, learned_without
-from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
+from posefit.suites.functions import FUNCTIONS, SUITE
 from posefit.suites.instances import suite_instance
-from posefit.suites.problem import BudgetSpentError, Problem
 from posefit.suites.running import run_on
 from posefit_bridges.problems import ioh_problem
 from tests.cases import each
@@ -123,7 +124,7 @@ def test_a_sequence_is_a_motion_along_a_few_components() -> None:
         assert box.transform(angles)[0] == pytest.approx(latent, abs=0.02)
     drawn = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 40))
     assert posed(drawn) == pytest.approx(
-        np.mean([frame.evaluate(drawn) for frame in frames], axis=0)
+        np.mean([frame(drawn) for frame in frames], axis=0)
     )
 
 
@@ -155,9 +156,8 @@ def test_a_proposal_has_a_float_and_several_have_an_array_with_the_same_bits() -
     alone = [posed(proposal) for proposal in drawn]
     assert all(type(cost) is float for cost in alone)
     assert np.array_equal(posed(drawn), alone)
-    assert np.array_equal(posed.evaluate(drawn), alone)
     assert posed(drawn[0].tolist()) == alone[0]
-    assert posed.evaluations == 22
+    assert posed.evaluations == 15
 
 
 def test_what_is_not_feasible_costs_what_its_repair_costs() -> None:
@@ -257,16 +257,24 @@ def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_no
     posed = problem()
     with pytest.raises(
         PicklingError,
-        match="cannot be sent to another: make it there with posefit.suite",
+        match="cannot be sent to another: make it there",
     ):
         differential_evolution(
             posed, [(-1.0, 1.0)] * 9, workers=2, updating="deferred", maxiter=1
         )
-    with pytest.raises(PicklingError, match="counts evaluations in its own process"):
-        copy(posed)
+
+
+@each("copied", [copy, deepcopy])
+def test_a_copy_of_a_problem_counts_for_itself(
+    copied: Callable[[Problem], Problem],
+) -> None:
+    posed = problem()
     posed(np.zeros(9))
-    twin = deepcopy(posed)
+    twin = copied(posed)
     twin(np.full(9, 0.1))
+    assert not posed.looked
+    assert twin.look()
+    assert (twin.looked, posed.looked) == (True, False)
     assert (posed.evaluations, twin.evaluations) == (1, 2)
     assert len(posed.trace[0]) == 1
 
@@ -286,7 +294,7 @@ def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_no
             lambda: problem(np.array([1, 2])),
             r"function must be a whole number of at least 1, got array\(\[1, 2\]\)",
         ),  # type: ignore[arg-type]
-        (lambda: problem(1, 20_000), "instance must be at most 19999, got 20000"),
+        (lambda: problem(1, 20_000), "instance must lie in 0 to 19999, got 20000"),
         (
             lambda: problem(7, 0, 9),
             "dimension of function 7 must be one of 20, 24, 40, 66, got 9",
@@ -342,11 +350,12 @@ def swarm(space: posefit.Space) -> posefit.Optimiser:
 
 
 def test_iohexperimenter_has_the_trace_of_a_plain_loop_in_each_run() -> None:
-    pytest.importorskip("ioh", reason="it has no wheels for every Python")
+    pytest.importorskip("ioh", reason="it is in the extra test")
     for address in ADDRESSES:
         plain, posed = (posefit.suite(SUITE, *address) for _ in range(2))
-        result = posefit.minimise(plain.evaluate, swarm(plain.space), BUDGET)
-        assert result.cost == plain.best_observed_fvalue1 == plain.trace[1][-1]
+        plain.budget = BUDGET
+        posefit.minimise(plain, swarm(plain.space))
+        assert plain.best_cost == plain.best_observed_fvalue1 == plain.trace[1][-1]
         wrapped = ioh_problem(posed)
         meta = wrapped.meta_data
         assert (meta.problem_id, meta.instance, meta.n_variables) == (
@@ -382,7 +391,7 @@ def test_iohexperimenter_has_the_trace_of_a_plain_loop_in_each_run() -> None:
 
 
 def test_iohexperimenter_finds_the_optimum_and_keeps_a_budget() -> None:
-    pytest.importorskip("ioh", reason="it has no wheels for every Python")
+    pytest.importorskip("ioh", reason="it is in the extra test")
     wrapped = ioh_problem(problem(budget=1))
     wrapped(wrapped.optimum.x)
     assert wrapped.state.final_target_found

@@ -26,7 +26,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from posefit.sweep.ledger import Ledger
-from tests.sweep.fake import SLOW, SLOW_SECONDS, STARTS, bad, cells, result, starts
+from tests.sweep.fake import (
+    SLOW,
+    SLOW_SECONDS,
+    STARTS,
+    bad,
+    cells,
+    quarantined_in,
+    result,
+    rows_in,
+    starts,
+)
 
 ROOT = Path(__file__).parents[2]
 EVENTS = (
@@ -91,13 +101,12 @@ class Chaos:
             if self._driver is not None and self._driver.poll() is None:
                 os.killpg(self._driver.pid, signal.SIGKILL)
                 self._driver.wait()
-        ledger = Ledger(self._ledger)
-        rows = list(ledger.rows())
+        rows = rows_in(self._ledger)
         keys = Counter(row["key"] for row in rows)
         wanted = {
             cell.key: _figures(result(cell).row) for cell in cells(self.count, SLOW)
         }
-        quarantined = {row["key"] for row in ledger.quarantined()}
+        quarantined = {row["key"] for row in quarantined_in(self._ledger)}
         return {
             "seed": self.seed,
             "cells": self.count,
@@ -172,7 +181,8 @@ class Chaos:
             return
         folder = self.folder / "copy"
         try:
-            with_rows = len(Ledger(self._ledger))
+            with Ledger(self._ledger) as ledger:
+                with_rows = len(ledger)
             folder.mkdir()
             with suppress(ProcessLookupError):
                 os.kill(self._driver.pid, signal.SIGSTOP)
@@ -180,7 +190,7 @@ class Chaos:
                 shutil.copyfile(path, folder / path.name)
             with suppress(ProcessLookupError):
                 os.kill(self._driver.pid, signal.SIGCONT)
-            rows = list(Ledger(folder).rows())
+            rows = rows_in(folder)
             self.copies.append(len(rows))
             self.fewer += len(rows) < with_rows
         except (FileNotFoundError, ValueError) as error:

@@ -4,7 +4,6 @@
 does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
-import ctypes
 import os
 import signal
 import sys
@@ -12,7 +11,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -53,7 +52,7 @@ def behave(cell: TrackCell) -> CellResult:
             file.write(f"{cell.key} {os.getpid()}\n".encode())
     match cell.frames:
         case n if n == SEGFAULT:
-            ctypes.string_at(0)
+            os.kill(os.getpid(), signal.SIGSEGV)  # as if its memory were wrong
         case n if n == ENDLESS:
             while True:
                 pass
@@ -119,6 +118,22 @@ def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
     with Writer(out / FILE) as ledger:
         ledger.plan(chosen)
         return drive(ledger, engine, print)
+
+
+def rows_in(path: Path) -> list[dict[str, Any]]:
+    """Return the finished rows of a ledger."""
+    from posefit.sweep.ledger import Ledger
+
+    with Ledger(path) as ledger:
+        return list(ledger.rows())
+
+
+def quarantined_in(path: Path) -> list[dict[str, Any]]:
+    """Return the cells of a ledger that are in quarantine."""
+    from posefit.sweep.ledger import Ledger
+
+    with Ledger(path) as ledger:
+        return ledger.quarantined()
 
 
 class Instant:

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from posefit.sweep.ledger import Ledger
 from tests.sweep.chaos import LOST, Chaos
-from tests.sweep.fake import STARTS, starts
+from tests.sweep.fake import STARTS, rows_in, starts
 
 ROOT = Path(__file__).parents[2]
 
@@ -74,7 +73,7 @@ def test_ctrl_c_finishes_the_running_cells_and_twice_stops_them_at_once(
             os.killpg(process.pid, signal.SIGINT)
             time.sleep(0.05)
         assert process.wait(timeout=600) == 130
-    rows = {row["key"] for row in Ledger(tmp_path / "results").rows()}
+    rows = {row["key"] for row in rows_in(tmp_path / "results")}
     begun = [key for key, _ in starts(noted)]
     assert set(begun[: len(begun) - lost]) <= rows <= set(begun)
     assert len(rows) < 40

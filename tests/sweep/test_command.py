@@ -13,7 +13,7 @@ from posefit.sweep.plan import Plan
 from tests.cases import each
 from tests.commands import error_of, printed, run
 from tests.report.browser import ledger, result
-from tests.sweep.fake import cells
+from tests.sweep.fake import cells, rows_in
 
 PLAN = """
 [defaults]
@@ -55,7 +55,7 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(
     }  # fmt: skip
     assert again.stderr == "8 of 8 cells are done already\n"
     assert run("sweep", plan, "--out", out, "--quiet").stderr == ""
-    rows = list(Ledger(out).rows())
+    rows = rows_in(out)
     assert {row["spec"]["method"] for row in rows} == {"sapso@pca", "random@full"}
     sapso = next(row for row in rows if row["spec"]["method"] == "sapso@pca")
     assert sapso["spec"]["settings"] == {"sapso.cooling": 0.9}
@@ -65,7 +65,8 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(
     )
     assert set(sapso["skill"]) == {"mean_pose", "persistence", "nearest"}
     assert (sapso["evaluations_used"], sapso["dimensions"]) == (2 * 80, 9)
-    assert Ledger(out).joints(sapso["key"])["estimate"].shape == (2, 27, 3)
+    with Ledger(out) as ledger:
+        assert ledger.joints(sapso["key"])["estimate"].shape == (2, 27, 3)
 
 
 def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:

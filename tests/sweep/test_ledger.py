@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 
 from posefit.registry import registry
-from posefit.report.runs import runs_of
 from posefit.sweep.cell import other_version
 from posefit.sweep.command import swept
 from posefit.sweep.ledger import ATTEMPTS, FILE, LOSSES, Ledger, Writer
 from posefit.version import posefit_build
 from tests.cases import each
+from tests.report.contests import runs_in
 from tests.sweep import fake
-from tests.sweep.fake import Instant, cells, filled, result
+from tests.sweep.fake import Instant, cells, filled, quarantined_in, result, rows_in
 
 ROOT = Path(__file__).parents[2]
 
@@ -34,14 +34,16 @@ def changed(folder: Path, query: str, *values: Any) -> None:
 
 
 def test_rows_and_joints_come_back_as_they_were_written(tmp_path: Path) -> None:
-    ledger = Ledger(filled(tmp_path / "results"))
-    assert len(ledger) == 5
-    for row, cell in zip(ledger.rows(), cells(5), strict=True):
-        joints = ledger.joints(cell.key)
-        del row["seconds"]
-        assert row.items() <= result(cell).row.items()
-        assert joints["estimate"].dtype == np.float32
-        np.testing.assert_array_equal(joints["truth"], np.full((1, 27, 3), cell.seed))
+    with Ledger(filled(tmp_path / "results")) as ledger:
+        assert len(ledger) == 5
+        for row, cell in zip(ledger.rows(), cells(5), strict=True):
+            joints = ledger.joints(cell.key)
+            del row["seconds"]
+            assert row.items() <= result(cell).row.items()
+            assert joints["estimate"].dtype == np.float32
+            np.testing.assert_array_equal(
+                joints["truth"], np.full((1, 27, 3), cell.seed)
+            )
 
 
 def test_a_frame_has_a_row_a_cell_in_the_order_of_the_specs(
@@ -58,7 +60,8 @@ def test_a_frame_has_a_row_a_cell_in_the_order_of_the_specs(
             False,
             True,
         ]
-    table = Ledger(folder).frame()
+    with Ledger(folder) as opened:
+        table = opened.frame()
     assert table["seed"].tolist() == [0, 1, 2, 3, 4, 5]
     assert table["status"].tolist() == ["done"] * 5 + ["quarantined"]
     assert table["reason"].iloc[5] == "it had to; it had to; it had to"
@@ -76,8 +79,11 @@ def test_a_frame_has_a_row_a_cell_in_the_order_of_the_specs(
     assert table["joint_errors_mm.rhand"].iloc[4] == 4.0
     assert np.isnan(table["cost"].iloc[5])
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match=r"pip install 'posefit\[sweep\]'"):
-        Ledger(folder).frame()
+    with (
+        Ledger(folder) as opened,
+        pytest.raises(ImportError, match=r"pip install 'posefit\[sweep\]'"),
+    ):
+        opened.frame()
 
 
 ROW = {
@@ -125,24 +131,27 @@ def test_a_row_that_posefit_did_not_write_is_named_with_what_to_do(
     text = json.dumps({**(ROW if column == "row" else SPEC), **change})
     changed(folder, f"UPDATE cells SET {column} = ? WHERE key = ?", text, key)
     with pytest.raises(ValueError, match=reason) as caught:
-        runs_of(Ledger(folder))
+        runs_in(folder)
     assert f"{FILE}: the row of cell {key[:8]}" in str(caught.value)
     fix = str(caught.value).partition("to run it again: ")[2]
     changed(folder, fix.partition('"')[2].rstrip('"'))
     changed(folder, "UPDATE cells SET spec = ? WHERE key = ?", json.dumps(SPEC), key)
     filled(folder, 2)
-    assert len(list(Ledger(folder).rows())) == 2
+    assert len(rows_in(folder)) == 2
 
 
 @each("content", [b"", b"x" * 100, b"PK\x05\x06" + b"\0" * 18])
 def test_damaged_joints_are_named(content: bytes, tmp_path: Path) -> None:
     folder = filled(tmp_path / "results", 1)
     changed(folder, "UPDATE cells SET arrays = ?", content)
-    with pytest.raises(
-        ValueError,
-        match=r"\.sqlite: the joints of cell .* must be whole, got damaged ones",
+    with (
+        Ledger(folder) as ledger,
+        pytest.raises(
+            ValueError,
+            match=r"\.sqlite: the joints of cell .* must be whole, got damaged ones",
+        ),
     ):
-        Ledger(folder).joints(cells(1)[0].key)
+        ledger.joints(cells(1)[0].key)
 
 
 def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(
@@ -160,7 +169,7 @@ def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(
         (whole[: len(whole) // 2], "malformed|invalid page|not a database"),
     ):
         path.write_bytes(content)
-        for read in (lambda: list(Ledger(folder).rows()), lambda: Writer(path)):
+        for read in (lambda: rows_in(folder), lambda: Writer(path)):
             with pytest.raises(
                 ValueError, match="expected a whole SQLite file, got "
             ) as caught:
@@ -258,7 +267,7 @@ def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
             match=r"got database or disk is full; \d+ of 50 cells are done and safe",
         ):
             drive(ledger, Instant(), print)
-    assert 3 <= len(list(Ledger(folder).rows())) < 50
+    assert 3 <= len(rows_in(folder)) < 50
     filled(folder, 50)
 
 
@@ -279,8 +288,7 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_loss
         assert losses == [False] * (LOSSES - 1) + [True]
         assert ledger.counts() == {"quarantined": 2}
         reasons = {
-            row["key"]: row["reasons"]
-            for row in Ledger(tmp_path / "results").quarantined()
+            row["key"]: row["reasons"] for row in quarantined_in(tmp_path / "results")
         }
         assert reasons == {
             cell.key: ["its own"] * 3,
@@ -306,7 +314,7 @@ def test_what_ran_twice_is_written_once_and_a_cell_that_failed_is_run_last(
         assert [
             ledger.finish(chosen[1].key, done) for done in (result(chosen[1]), other)
         ] == [True, False]
-    assert [row["cost"] for row in Ledger(tmp_path / "results").rows()] == [
+    assert [row["cost"] for row in rows_in(tmp_path / "results")] == [
         result(chosen[1]).row["cost"]
     ]
 
@@ -321,12 +329,13 @@ def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(
             for cell in chosen[:count]:
                 ledger.finish(cell.key, result(cell))
             ledger.fail(chosen[5].key, "it had to")
-    one = Ledger(folder)
-    several = Ledger(folder / "ledger-1-of-2.sqlite", folder)
-    for merged in (one, several):
+    for paths in ([folder], [folder / "ledger-1-of-2.sqlite", folder]):
+        with Ledger(*paths) as merged:
+            seeds = sorted(row["spec"]["seed"] for row in merged.rows())
+            joints = merged.joints(cells(5)[4].key)
         assert len(merged) == 5
-        assert sorted(row["spec"]["seed"] for row in merged.rows()) == [0, 1, 2, 3, 4]
-        assert merged.joints(cells(5)[4].key)["truth"][0, 0, 0] == 4.0
+        assert seeds == [0, 1, 2, 3, 4]
+        assert joints["truth"][0, 0, 0] == 4.0
 
 
 def test_a_name_changes_no_key_and_the_latest_plans_name_counts(tmp_path: Path) -> None:
@@ -335,7 +344,7 @@ def test_a_name_changes_no_key_and_the_latest_plans_name_counts(tmp_path: Path) 
     with Writer(folder / FILE) as ledger:
         ledger.plan([replace(cell, name="cold")])
         assert ledger.counts() == {"done": 1}
-    assert [row["spec"]["name"] for row in Ledger(folder).rows()] == ["cold"]
+    assert [row["spec"]["name"] for row in rows_in(folder)] == ["cold"]
 
 
 def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(
@@ -347,15 +356,16 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(
         [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)],
         Instant(),
     )
-    assert Ledger(folder).version == "0.0.9 a1"
+    with Ledger(folder) as ledger:
+        assert ledger.version == "0.0.9 a1"
     messages: list[str] = []
     assert swept(cells(3), folder, Instant(), messages.append).ran == 3
     assert messages == [
         f"2 rows in {folder} are of another version, posefit 0.0.9 a1, and do not count here"
     ]
-    ledger = Ledger(folder)
-    assert len(ledger) == 5
-    assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
+    with Ledger(folder) as ledger:
+        assert len(ledger) == 5
+        assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
 
 
 def test_a_version_is_another_one_where_any_part_of_it_is_not_the_installed_one() -> (
@@ -380,7 +390,8 @@ def test_a_ledger_is_read_while_its_driver_writes(tmp_path: Path) -> None:
     with Writer(path) as ledger:
         ledger.plan(chosen)
         ledger.finish(chosen[0].key, result(chosen[0]))
-        open_one = Ledger(path)
-        ledger.finish(chosen[1].key, result(chosen[1]))
-        assert [len(list(one.rows())) for one in (open_one, Ledger(path))] == [1, 2]
-        assert open_one.changed <= time.time() + 1.0
+        with Ledger(path) as early:
+            ledger.finish(chosen[1].key, result(chosen[1]))
+            with Ledger(path) as late:
+                assert [len(list(one.rows())) for one in (early, late)] == [1, 2]
+            assert early.changed <= time.time() + 1.0

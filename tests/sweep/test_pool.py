@@ -24,7 +24,7 @@ from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
 from tests.sweep import fake
-from tests.sweep.fake import behave, cells, swept
+from tests.sweep.fake import behave, cells, quarantined_in, rows_in, swept
 
 # the figures that two runs of a cell differ by
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
@@ -168,8 +168,7 @@ def test_a_bad_cell_is_quarantined_after_three_attempts_and_tried_again_where_th
     tally = swept(folder, [*bad, *cells(3)], Pool(1, LIMITS, behave))
     assert (tally.done, tally.quarantined, tally.failed) == (3, 1, ATTEMPTS)
     assert (
-        Ledger(folder).quarantined()[0]["reasons"]
-        == ["ZeroDivisionError: one by none"] * 3
+        quarantined_in(folder)[0]["reasons"] == ["ZeroDivisionError: one by none"] * 3
     )
     assert swept(folder, bad, Pool(1, LIMITS, behave)).failed == 0
     again = sweep(bad, folder, Pool(1, LIMITS, behave), print, retry_quarantined=True)  # type: ignore[arg-type]
@@ -214,7 +213,7 @@ def test_a_script_may_compare_without_a_guard(tmp_path: Path) -> None:
         "    def tell(self, proposals, costs):\n        pass\n\n"
         "result = posefit.compare([Middle, {'method': Middle, 'name': 'again', 'settings': {'pca.components': 4}}],\n"
         "    seeds=1, frames=1, size=(80, 60), evaluations=2, workers=1)\n"
-        "print(result.tally.done, [row['spec']['method'] for row in result.ledger.rows()])\n"
+        "print(result.tally.done, [row['spec']['method'] for row in result.rows()])\n"
     )
     done = subprocess.run(
         [sys.executable, str(script)],
@@ -240,7 +239,7 @@ def test_a_pool_gives_the_rows_of_this_process_bit_for_bit(tmp_path: Path) -> No
         for seed in (0, 1)
     ]
     assert swept(tmp_path, searches, Pool(2, Limits(), run_cell)).done == len(searches)
-    rows = {row["key"]: row for row in Ledger(tmp_path).rows()}
+    rows = {row["key"]: row for row in rows_in(tmp_path)}
     # no two are the same search
     assert len({json.dumps(row["trace"]) for row in rows.values()}) == len(searches)
     for search in searches:
@@ -267,15 +266,19 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(
         }
     )
 
-    def rows_in(folder: Path) -> Any:
-        ledger = Ledger(folder)
-        rows = {
-            row["key"]: {name: row[name] for name in row if name not in TIMES}
-            for row in ledger.rows()
-        }
-        return rows, {
-            key: {k: v.tobytes() for k, v in ledger.joints(key).items()} for key in rows
-        }
+    def content(folder: Path) -> Any:
+        with Ledger(folder) as ledger:
+            rows = {
+                row["key"]: {name: row[name] for name in row if name not in TIMES}
+                for row in ledger.rows()
+            }
+            joints = {
+                key: {
+                    name: array.tobytes() for name, array in ledger.joints(key).items()
+                }
+                for key in rows
+            }
+        return rows, joints
 
     assert sweep(
         plan, tmp_path / "one", Pool(2, Limits(), run_cell), print
@@ -290,9 +293,9 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(
         assert swept(
             tmp_path / "dask", list(plan)[::-1], cluster(address, Limits(), run_cell)
         ).done == len(plan)
-    first = rows_in(tmp_path / "one")
+    first = content(tmp_path / "one")
     assert len(first[0]) == len(plan)
-    assert rows_in(tmp_path / "shards") == rows_in(tmp_path / "dask") == first
+    assert content(tmp_path / "shards") == content(tmp_path / "dask") == first
 
 
 def test_a_scheduler_that_is_not_there_is_named() -> None:

@@ -401,26 +401,32 @@ def test_limbs_become_as_thick_as_the_persons_and_the_height_stays() -> None:
 
 def test_cameras_that_are_turned_from_their_calibrations_come_back() -> None:
     scene, truth = footage(14, (0.0, 90.0, 200.0))
-    rng = np.random.default_rng(0)
     true = scene.cameras
-    off = [
-        turned_camera(camera, np.radians(0.2) * rng.standard_normal(3))
-        for camera in true
-    ]
-    off_by = {}
-    # those that are set up around a known motion are where they are said to be
-    for placing in ("placed", "given"):
-        calibrated = replace(scene, cameras=off, placing=placing)
-        result, motion, _ = fit_contours(
-            calibrated, estimate_of(truth), Visibility.of(calibrated), None
-        )
-        apart = [
-            np.abs(camera.project(motion.joints)[0] - other.project(truth.joints)[0])
-            for camera, other in zip(result.cameras, true, strict=True)
+    # of pixels and metres that joints are off, for each placing
+    off_by: dict[str, list[tuple[float, float]]] = {"placed": [], "given": []}
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        off = [
+            turned_camera(camera, np.radians(0.2) * rng.standard_normal(3))
+            for camera in true
         ]
-        off_by[placing] = float(np.mean(apart)), distance(motion, truth)
-    assert off_by["given"][0] < 0.6 * off_by["placed"][0]
-    assert off_by["given"][1] < 0.9 * off_by["placed"][1]
+        # those that are set up around a known motion are where they are said to be
+        for placing, off_by_placing in off_by.items():
+            calibrated = replace(scene, cameras=off, placing=placing)
+            result, motion, _ = fit_contours(
+                calibrated, estimate_of(truth), Visibility.of(calibrated), None
+            )
+            apart = [
+                np.abs(
+                    camera.project(motion.joints)[0] - other.project(truth.joints)[0]
+                )
+                for camera, other in zip(result.cameras, true, strict=True)
+            ]
+            off_by_placing.append((float(np.mean(apart)), distance(motion, truth)))
+    placed, given = (np.array(off_by[placing]) for placing in ("placed", "given"))
+    # 0.36 to 0.72 of them in six draws; joints are nearer on average, at 0.76
+    assert (given[:, 0] < placed[:, 0]).all()
+    assert (given.mean(axis=0) < 0.9 * placed.mean(axis=0)).all()
 
 
 def test_by_how_much_cameras_were_turned_is_said_and_nothing_where_they_were_not() -> (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit import minimise
+from posefit import Problem, minimise
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.scene import synthetic
 from posefit.footage.segmentation import Extraction
@@ -415,7 +415,7 @@ def test_a_search_that_ends_long_before_its_budget_says_so(name: str) -> None:
         UserWarning,
         match="ended its search after 24.. of 100000 evaluations: .* build it with it",
     ):
-        minimise(sphere, optimiser, 100_000)
+        minimise(Problem(sphere, Toy(9), 100_000), optimiser)
 
 
 def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(

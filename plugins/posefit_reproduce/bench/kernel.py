@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -60,14 +60,14 @@ def processor() -> dict[str, str]:
     }
 
 
-def bench_problem(
+def bench_cost(
     threads: int = 1,
     *,
     width: int = SIZE[0],
     views: int = 1,
     components: int = COMPONENTS,
-) -> PoseProblem:
-    """Return the benchmark's problem: one frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
+) -> SilhouetteCost:
+    """Return the benchmark's cost: a frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
     motion = built_in.motion("walk", frames=1, fps=30.0)
     body = Body.of(motion.skeleton)
     prior = PCA(components=components).fit(walking_angles())
@@ -87,21 +87,21 @@ def bench_problem(
         project(body, camera, motion.poses[0], motion.translations[0])
         for camera in cameras
     ]
-    return PoseProblem(
+    return SilhouetteCost(
         body, cameras, [Silhouette.of(mask) for mask in masks], space, threads=threads
     )
 
 
-def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
+def opencv_costs(cost: SilhouetteCost, proposals: Array) -> Array:
     """Return the costs (n,) of proposals the usual way: OpenCV draws every cone into a byte image and counts it.
 
     Kinematics, prior and outlines are computed for all n poses at once in NumPy; drawing is two circles and a
     quadrilateral a bone, at 1/16 pixel.
     """
-    body = problem.body
-    camera = problem.cameras[0]
-    silhouette = problem.silhouettes[0]
-    poses, translations = problem.decode(proposals)
+    body = cost.body
+    camera = cost.cameras[0]
+    silhouette = cost.silhouettes[0]
+    poses, translations = cost.decode(proposals)
     pixels, depths = camera.project(body.skeleton.joints(poses, translations))
     scale = np.sqrt(camera.focal.prod()) / depths
     parents = np.array(PARENTS[1:])

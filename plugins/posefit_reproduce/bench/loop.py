@@ -10,14 +10,15 @@ from threadpoolctl import threadpool_limits
 
 from posefit.arrays import Array
 from posefit.fitting.box import draw_population
-from posefit.fitting.optimiser import Filter, populations
+from posefit.fitting.optimiser import Filter
+from posefit.fitting.problem import Problem, minimise
 from posefit.fitting.space import SearchSpace
 from posefit.registry import Offer, registry
 from posefit.settings import planned
 from posefit.sweep.pool import cores
 from posefit_reproduce.bench.kernel import (
     SIZE,
-    bench_problem,
+    bench_cost,
     fastest,
     opencv_costs,
     processor,
@@ -38,14 +39,14 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
     kinematics and outlines computed for 200 poses at once, the fastest way that still draws with OpenCV.
     """
     many = threads or cores()
-    alone = bench_problem()
-    together = bench_problem(many)
+    alone = bench_cost()
+    together = bench_cost(many)
     proposals = draw_population(alone.space, np.random.default_rng(0), POSES)
     few = proposals[: POSES // 5]
     jobs: dict[str, Callable[[], object]] = {
-        "one": lambda: alone.evaluate(proposals),
-        "all": lambda: together.evaluate(proposals),
-        "population": lambda: alone.evaluate(proposals[:PARTICLES]),
+        "one": lambda: alone(proposals),
+        "all": lambda: together(proposals),
+        "population": lambda: alone(proposals[:PARTICLES]),
         "opencv": lambda: [
             opencv_costs(alone, few[i : i + 1]) for i in range(len(few))
         ],
@@ -103,10 +104,8 @@ def search_seconds(space: SearchSpace, offer: Offer, seed: int) -> float:
     count = 0
     began = time.perf_counter()
     for _ in range(10 if carries else 1):
-        count += sum(
-            len(proposals)
-            for proposals, _ in populations(optimiser, _cost, evaluations)
-        )
+        problem = minimise(Problem(_cost, space, evaluations), optimiser)
+        count += problem.evaluations
         if carries:
             cast(Filter, optimiser).advance(space)
     return (time.perf_counter() - began) / count

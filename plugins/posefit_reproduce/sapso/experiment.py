@@ -107,8 +107,10 @@ def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
     """Return what a run gives: poses (T, 66), and CPU seconds and evaluations a frame; costs of a first frame."""
     motion = loaded(clips, scale.frames)[run.subject]
     if run.kind == "first":
-        frames = [first_frame(motion, scale.iterations, count, run) for count in SWARMS]
-        return {"history": np.array([frame.trace[:, 1] for frame in frames])}
+        histories = [
+            first_history(motion, scale.iterations, count, run) for count in SWARMS
+        ]
+        return {"history": np.array(histories)}
     scene = paper_scene(motion, run.view)
     if run.method in BASELINES:
         return {"poses": baseline(motion, scene, run.method)}
@@ -208,14 +210,18 @@ def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
     )
 
 
-def first_frame(
+def first_history(
     motion: PaperMotion, iterations: int, particles: int, run: Run
-) -> Frame:
-    """Return what a method makes of the first frame with a swarm of some size."""
+) -> Array:
+    """Return the lowest cost so far (iterations + 1,) in the first frame, after each population of a swarm."""
     options = options_of(run.method, motion.training, iterations)
     options["settings"] = {
         **options["settings"],
         f"{run.method.partition('@')[0]}.population_size": particles,
     }
     options |= {"evaluations": particles * (iterations + 1), "seed": run.seed}
-    return track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]
+    frame = track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]
+    evaluations, costs = frame.trace.T
+    populations = particles * np.arange(1, iterations + 2)
+    history: Array = costs[np.searchsorted(evaluations, populations, "right") - 1]
+    return history

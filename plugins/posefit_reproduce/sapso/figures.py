@@ -8,8 +8,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from posefit.arrays import Array
-from posefit.fitting.optimiser import populations
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.cost import SilhouetteCost
+from posefit.fitting.problem import Problem, minimise
 from posefit.fitting.tracker import Prediction, Predictor
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
@@ -120,23 +120,34 @@ def watched_swarm(
     space = Predictor(task, PCA().fit(motion.angles), Prediction(tilt="box")).space(
         observation
     )
-    problem = PoseProblem(scene.body, scene.cameras, observation.silhouettes, space)
+    cost = SilhouetteCost(scene.body, scene.cameras, observation.silhouettes, space)
     search = SAPSO(
         space,
         np.random.default_rng(0),
         population_size=particles,
         iterations=iterations,
     )
-    steps = list(populations(search, problem.evaluate, particles * (iterations + 1)))
-    poses, translations = zip(
-        *(problem.decode(proposals) for proposals, _ in steps), strict=True
-    )
-    history = np.minimum.accumulate([costs.min() for _, costs in steps])
+    poses = list[Array]()
+    translations = list[Array]()
+    leaders = list[int]()
+    least = list[float]()
+
+    def watched(proposals: Array) -> Array:
+        costs = cost(proposals)
+        decoded = cost.decode(proposals)
+        poses.append(decoded[0])
+        translations.append(decoded[1])
+        leaders.append(int(costs.argmin()))
+        least.append(float(costs.min()))
+        return costs
+
+    minimise(Problem(watched, space, particles * (iterations + 1)), search)
+    history = np.minimum.accumulate(least)
     return WatchedSwarm(
         scene,
-        [*poses],
-        [*translations],
-        [int(costs.argmin()) for _, costs in steps],
+        poses,
+        translations,
+        leaders,
         history,
     )
 

@@ -237,7 +237,7 @@ def flaws_table(analysis: Analysis) -> Table:
             for cell, share in zip(
                 figures, (analysis.swapped(motion, name), worse), strict=False
             ):
-                cell.append(f"{100 * share.mean():.0f}")
+                cell.append(f"{100.0 * float(share.mean()):.0f}")
             if analysis.results.has("unknown", motion, name):
                 figures[2].append(
                     f"{analysis.errors(motion, name, 'unknown').mean():.2f}"
