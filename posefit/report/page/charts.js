@@ -43,7 +43,15 @@ function drawCharts() {
 
 // The end of an axis: where the last of some rising or falling lines has come to its end.
 function lastChange(lines) {
-  const ends = lines.map(({ x, y }) => x[Math.max(0, y.findLastIndex((value) => value !== y.at(-1))) + 1] ?? x.at(-1));
+  const ends = lines.map(
+    ({ x, y }) =>
+      x[
+        Math.max(
+          0,
+          y.findLastIndex((value) => value !== y.at(-1)),
+        ) + 1
+      ] ?? x.at(-1),
+  );
   return Math.max(...ends);
 }
 
@@ -119,7 +127,8 @@ function interval({ at, left, right }, y, low, high, about) {
     to > right + 0.5 ? `M${right - 5},${y - 4}L${right},${y}L${right - 5},${y + 4}` : "",
   ];
   const parts = [drawLine(ends[0], y, ends[1], y, about)];
-  if (arrows.some(Boolean)) parts.push(draw("path", { d: arrows.join(""), ...about, class: `${about.class ?? ""} beyond` }));
+  if (arrows.some(Boolean))
+    parts.push(draw("path", { d: arrows.join(""), ...about, class: `${about.class ?? ""} beyond` }));
   return parts;
 }
 

@@ -43,7 +43,9 @@ function forest(width, rows, bases) {
   const { name: of, digits, unit, down } = D.score;
   const [left, right, line] = [14, 12, 16];
   // a logarithmic scale where less is better and the worst is far from the best
-  const values = [...rows, ...bases].flatMap((row) => [row[of], row.low, row.high].filter((value) => given(value) && value > 0));
+  const values = [...rows, ...bases].flatMap((row) =>
+    [row[of], row.low, row.high].filter((value) => given(value) && value > 0),
+  );
   const [least, most] = [Math.min(...values), Math.max(...values)];
   const log = !down && most > 15 * least;
   const [from, to] = log ? [0.8 * least, 1.15 * most] : [0, 1.05 * most || 1];

@@ -107,7 +107,9 @@ function leaderboard() {
     ...first.filter(({ value }) => D.leaderboard.some((row) => given(value(row)))),
     ...Object.keys(D.columns).flatMap((one) => (one === score ? [] : [further(figure(one))])),
     further(column("runs", "runs", whole, { down: true })),
-    further(column("runs needed", "blocks_needed", neededRuns, { about: `Paired ${paired} that would show that difference` })),
+    further(
+      column("runs needed", "blocks_needed", neededRuns, { about: `Paired ${paired} that would show that difference` }),
+    ),
   ];
   const kind = (row) => (row.baseline ? "base" : null);
   table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
