@@ -75,8 +75,11 @@ class Searches:
     title = "Report of single searches"
     columns: Mapping[str, Column] = COLUMNS
     score = SCORE
-    named = ("function", "dimension", "instance")
-    data = ("runs", "hits")  # `SuiteRun`; evaluations (targets,), inf for never
+    named: tuple[str, ...] = ("function", "dimension", "instance")
+    data: tuple[str, ...] = (
+        "runs",
+        "hits",
+    )  # `SuiteRun`; evaluations (targets,), inf for never
     baselines: Mapping[str, str] = {RANDOM: "random search"}
 
     def read(self, row: Row, _: dict[bytes, Any], /) -> tuple[Array, tuple[Any, ...]]:

@@ -79,7 +79,8 @@ def _led(contest: Contest, worse: Sequence[Row], others: Sequence[Row]) -> str:
     if len(worse) == 1:
         return f"{nearest['name']} {effect}"
     if len(worse) == len(others):
-        return f"all {len(others)} others, the nearest of them, {nearest['name']}, {effect}"
+        count = "both" if len(others) == 2 else f"all {len(others)}"
+        return f"{count} others, the nearest of them, {nearest['name']}, {effect}"
     names = listed([row["name"] for row in rising[1:]])
     return f"{nearest['name']} {effect}, and {names} by more"
 

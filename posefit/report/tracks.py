@@ -137,9 +137,9 @@ class Tracks:
     title = "Report of a sweep"
     columns: Mapping[str, Column] = COLUMNS
     score = SCORE
-    named = ("motion", "view_degrees", "corruption", "instance")
+    named: tuple[str, ...] = ("motion", "view_degrees", "corruption", "instance")
     # (27,) mm; (bins, 3), see `_binned`; evaluations and best costs
-    data = ("joint_errors", "modes", "traces")
+    data: tuple[str, ...] = ("joint_errors", "modes", "traces")
     baselines: Mapping[str, str] = BASELINES
 
     def read(
