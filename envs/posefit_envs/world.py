@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from gymnasium import error, logger
 from numpy.typing import NDArray
-from posefit.motion.instance import motion_of_instance, variation
 
 from posefit import (
     Body,

@@ -41,20 +41,6 @@ def test_figures_have_the_units_of_the_csv_and_pages_multiply_them(row):
     assert (shown["title"], shown["factor"]) == ("80 % interval holds %", 100.0)
 
 
-def test_a_figure_is_shown_as_that_of_a_single_track_is(row):
-    renamed = {"evaluations_used": "evaluations"}
-    for name, column in COLUMNS.items():
-        raw = row
-        for part in column.path:
-            raw = raw[part]
-        if column.per_frame:
-            raw /= row["spec"]["frames"]
-        place = column.path[0]
-        measure = MEASURES[renamed.get(place, place)]
-        shown = column.measure.factor * column.value(row)
-        assert shown == pytest.approx(measure.factor * raw), name
-
-
 def test_a_row_has_how_often_the_likeliest_mode_was_right(row):
     counts, probabilities, right = zip(*row["mode_reliability"], strict=True)
     assert sum(counts) == 3
