@@ -43,8 +43,8 @@ from posefit.silhouette.cost import pose_costs as pose_costs
 from posefit.silhouette.cost import project as project
 from posefit.silhouette.cuda.device import moved_to as moved_to
 from posefit.silhouette.mask import Silhouette as Silhouette
-from posefit.statistics.intervals import iqm_intervals as iqm_intervals
-from posefit.statistics.ranks import wilcoxon as wilcoxon
+from posefit.statistics.means import run_means as run_means
+from posefit.statistics.paired import paired_tests as paired_tests
 from posefit.suites.problem import Suite as Suite
 from posefit.suites.problem import suite as suite
 from posefit.suites.running import run_of as run_of

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping
 from posefit.evaluation.errors import FRAME
 from posefit.evaluation.measures import BASELINES, MEASURES, Measure
 from posefit.measuring.centres import PLACES
+from posefit.report.charts import LEVEL_NAMES
+from posefit.report.tracks import LOSS
 
 # How a value stands in a file whose table shows it times a factor.
 RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}
@@ -35,24 +37,85 @@ REQUEST = {
     "settings": ("", "what was set, or follows from the budget"),
 }
 
-# What a sweep's row says beside the figures.
-ROW = {
-    "key": ("", "the cell's name: the SHA-256 of everything it depends on"),
+# What a sweep's row says beside the figures, in the order of the CSV: first what was run.
+CELL = {
+    "key": ("", "the row's name: the SHA-256 of everything it depends on"),
     "version": ("", "versions of posefit and of the plugins that are not its own"),
-    "status": ("", "`done` or `quarantined`, after three failed attempts"),
+    "status": ("", "`done`, or `quarantined` after three failed attempts"),
     "reason": ("", "why a quarantined cell failed"),
     "kind": ("", "`track` or `search`"),
-    "evaluations_used": (
-        "",
-        "`evaluations` of summary.json; here `evaluations` is the budget of a frame",
-    ),
-    "seconds": ("s", "wall time of the whole cell"),
+    "method": ("", "the optimiser and the prior, or the tracker"),
+    "motion": ("", "the motion that was tracked"),
+    "train": ("", "the motions learned from"),
+    "settings": ("", "what was set, `NAME.SETTING=VALUE`"),
+    "view_degrees": ("degrees", "directions of the cameras"),
+    "corruption": ("", "kinds of damage to the masks, with their strengths"),
+    "instance": ("", "number of the variation of the motion or the function"),
+    "frames": ("frames", "how many were followed"),
+    "fps": ("1/s", "frames a second"),
+    "size": ("pixels", "width x height of the masks"),
+    "evaluations": ("", "budget: of a frame, or of a search"),
+    "translation": ("", "the root's position: known, searched or aligned"),
+    "first_pose": ("", "searched, or given"),
+    "hypotheses": ("", "number of tracks from which one was chosen"),
+    "yaw_off_degrees": ("degrees", "largest error of the yaw given to the method"),
+    "body_off_percent": ("%", "largest error of the body given to the method"),
+    "seed": ("", "of everything random"),
+    "name": ("", "what reports call the method, if the plan says so"),
+}
+SEARCH_CELL = {
+    "suite": ("", "the numbered benchmark"),
+    "function": ("", "the function's number"),
+    "dimension": ("", "coordinates of the function"),
+    "infeasible": ("", "what becomes of a proposal outside the limits of a person"),
+}
+SPENT = {
+    "warnings": ("", "what to look at before the result is trusted"),
+    "evaluations_used": ("", MEASURES["evaluations"].meaning),
+    "dimensions": ("", "coordinates of a proposal"),
     "joint_errors_mm.JOINT": (
         "mm",
         "mean distance of one joint from the true one, both roots at one point",
     ),
+    "seconds": ("s", "wall time of the whole cell"),
+    LOSS: (
+        "degrees",
+        "`error_degrees.mean`, in which a lost frame counts as the mean training pose's at least: "
+        "e + s max(0, b - e) with the error e, `lost_rate` s and `baselines_degrees.mean_pose` b",
+    ),
 }
-SPENT = ("evaluations_used", "seconds", "joint_errors_mm.JOINT")
+SEARCHED = {
+    "cost": ("", "the lowest cost"),
+    "truth_cost": ("", "the cost of the true pose"),
+    "reached": ("%", "share of the targets that were reached"),
+    "above": ("", "`cost` less `truth_cost`"),
+}
+LEADERBOARD = {
+    "low": ("", "lower end of the 95 % interval of the first figure"),
+    "high": ("", "upper end"),
+    "behind": ("", "mean difference of paired runs from the method of the first row"),
+    "behind_low": ("", "lower end of its 95 % interval, adjusted as p is"),
+    "behind_high": ("", "upper end"),
+    "p": ("", "of that difference: a paired t test, after Holm over all pairs"),
+    "blocks_needed": (
+        "",
+        "paired runs that would show that difference with a probability of 80 %",
+    ),
+    "lost_tracks": ("", "tracks with lost frames"),
+    "runs": ("", "runs that are compared"),
+    "failed": ("", "cells in quarantine"),
+    "warned": ("", "runs with a warning"),
+}
+# figures of a row in which a method has a value for each of some names
+PARTS = {
+    "error_degrees": ("mean", "std", "max"),
+    "skill": tuple(BASELINES),
+    "baselines_degrees": tuple(BASELINES),
+    "baselines_mm": tuple(BASELINES),
+    "coverage": LEVEL_NAMES,
+    "interval_mm": LEVEL_NAMES,
+}
+NOT_IN_ROWS = ("evaluations", "evaluations_per_second")
 RESULT = {
     "hypotheses": (
         "",
@@ -120,21 +183,15 @@ def page() -> str:
             [*_measured(_frame_only()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())],
         ),
         "## Columns of a sweep's CSV",
-        "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
-        "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
-        "`baselines_degrees.mean_pose`.",
-        "What the cell is: the fields [of a plan](../howto/plan.md#the-fields-of-a-cell), and",
-        _table(
-            "column",
-            _described(
-                {
-                    name: ROW[name]
-                    for name in ("key", "version", "status", "reason", "kind")
-                }
-            ),
-        ),
-        "What it measured: the results of [`summary.json`](#keys-of-summary-json) but `evaluations_per_second`, and",
-        _table("column", _described({name: ROW[name] for name in SPENT})),
+        "`posefit report DIR --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same, but for the last "
+        "column, as a table of pandas. The report's page and its data have every figure under the same name.",
+        _table("column", [*_described(CELL), *_row_measures(), *_described(SPENT)]),
+        "A single search has, beside `key` to `settings`, `instance`, `evaluations`, `seed`, `name` and the last ones,",
+        _table("column", _described({**SEARCH_CELL, **SEARCHED})),
+        "## Columns of `leaderboard.csv`",
+        "`posefit report DIR --figures FOLDER` writes one row a method in the order of the leaderboard: `method`, "
+        "`settings`, the mean of each figure above that the page has, `error_with_losses_degrees` first, and",
+        _table("column", _described(LEADERBOARD)),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -144,6 +201,18 @@ def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:
         (one.name, one.unit if one.factor == 1.0 else RAW[one.unit], one.meaning)
         for one in measures
     ]
+
+
+def _row_measures() -> list[tuple[str, str, str]]:
+    """Return the figures of a track as columns, one for each part."""
+    columns = []
+    for name, unit, meaning in _measured(MEASURES.values()):
+        if name in NOT_IN_ROWS:
+            continue
+        parts = PARTS.get(name)
+        names = [f"{name}.{part}" for part in parts] if parts else [name]
+        columns += [("`, `".join(names), unit, meaning)]
+    return columns
 
 
 def _described(values: Descriptions) -> list[tuple[str, str, str]]:

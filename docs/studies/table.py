@@ -21,7 +21,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.cli.output import Command, progress, say
 from posefit.evaluation.measures import MEASURES
-from posefit.statistics.intervals import LEVEL, RESAMPLES
+from posefit.statistics.means import CONFIDENCE
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.engine import Limits
@@ -33,6 +33,7 @@ from posefit_reproduce.jobs import each
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
 SHARES = ("lost_rate", "swap_rate")
+RESAMPLES = 2000  # of a bootstrap
 WORKERS = click.option(
     "--workers",
     type=click.IntRange(1),
@@ -130,7 +131,7 @@ def percent(value: float | None, digits: int = 1) -> str:
 
 def quantiles(drawn: Array) -> tuple[float, float]:
     """Return the ends of the 95 % interval of drawn values (n,)."""
-    low, high = np.quantile(drawn, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
+    low, high = np.quantile(drawn, [0.5 - CONFIDENCE / 2.0, 0.5 + CONFIDENCE / 2.0])
     return float(low), float(high)
 
 

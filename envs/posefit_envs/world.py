@@ -28,6 +28,7 @@ from posefit.arrays import Array
 from posefit.fitting.check import between, finite_number, one_of, pair
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
+from posefit.fitting.validation import check_prior
 from posefit.geometry.body import varied
 from posefit.motion import built_in
 from posefit.motion.clips import load_motion
@@ -279,7 +280,9 @@ def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
     angles = np.concatenate(
         [load_motion(name, FPS).about_axes_of(skeleton).poses[:, 3:] for name in train]
     )
-    fitted: Prior = registry().prior(prior)().fit(angles, skeleton)
+    offer = registry().offer("prior", prior)
+    fitted: Prior = offer.factory().fit(angles, skeleton)
+    check_prior(fitted, angles, skeleton, offer.label)
     return fitted
 
 

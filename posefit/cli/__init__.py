@@ -24,7 +24,7 @@ from posefit.version import __version__
 THREAD_SECONDS = 1.0  # that threads have to end after a command
 GROUPS: dict[str, tuple[click.Command, ...]] = {
     "Follow a person": (tracking.track, tracking.fit, tracking.extract),
-    "Compare methods": (sweeping.sweep, sweeping.report, suite.suite),
+    "Compare methods": (sweeping.sweep, sweeping.report, sweeping.rerun, suite.suite),
     "Inspect": (motions, plugins.plugins, plugins.check),
 }
 

@@ -1,5 +1,6 @@
-"""`posefit sweep` and `posefit report`."""
+"""`posefit sweep`, `posefit report` and `posefit rerun`."""
 
+import re
 from contextlib import nullcontext
 from typing import Any
 
@@ -85,28 +86,70 @@ def sweep(
 
 @click.command()
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
-@click.option(
-    "--out", metavar="FILE.html", help="The page; an earlier report is replaced."
-)
+@click.option("--out", metavar="FILE.html", help="The page.")
+@click.option("--csv", metavar="FILE", help="A file of all rows.")
 @click.option(
     "--figures",
     metavar="DIR",
-    help="New folder for figures of a paper; needs posefit[figures].",
+    help="A folder for figures of a paper; needs posefit[figures].",
 )
-@click.option("--csv", metavar="FILE", help="New file of all rows.")
+@click.option("--latex", metavar="FILE", help="The leaderboard as a LaTeX table.")
+@click.option(
+    "--methods",
+    metavar="NAMES",
+    multiple=True,
+    help="Compare these methods alone, such as sapso@pca,cma@pca.",
+)
+@click.option(
+    "--latest",
+    is_flag=True,
+    help="Of methods that differ only in version, compare the latest alone.",
+)
 @JSON
 def report(
-    ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any
+    ledger: tuple[str, ...],
+    out: str | None,
+    methods: tuple[str, ...],
+    as_json: bool,
+    **others: Any,
 ) -> None:
     """Write the results of sweeps to DIR as one page that any browser opens, offline.
 
     Each DIR is a folder of ledgers (.sqlite), or one of them.
 
-    Without --out it prints which method leads and the leaderboard, and writes no page.
+    Without --out it prints the leaderboard and what it shows, and writes no page. What an earlier report wrote is
+    replaced, nothing else is.
 
     It may be written while the sweep goes on, of the cells that are done.
     """
     from posefit.report.write import leaderboard_lines, write_report
 
-    summary = write_report(ledger, out, **others)
+    summary = write_report(ledger, out, methods=_names(methods), **others)
     print_result(leaderboard_lines(summary), summary, as_json)
+
+
+def _names(texts: tuple[str, ...]) -> list[str]:
+    """Return the names of methods in the texts of an option: commas separate them, but not in brackets."""
+    parts = [part for text in texts for part in re.split(r",(?![^(]*\))", text)]
+    return [part.strip() for part in parts if part.strip()]
+
+
+@click.command()
+@click.argument("ledger", metavar="DIR")
+@click.argument("key")
+@click.option("--out", metavar="DIR", help="A folder for the ledger of the new row.")
+@JSON
+def rerun(ledger: str, key: str, out: str | None, as_json: bool) -> None:
+    """Run one row of the results in DIR again, and print which figures differ.
+
+    KEY is the row's key as the report shows it, or as many of its first digits as no other row has.
+    Exit status 1 if a figure other than a time differs.
+    """
+    from posefit.report import repeat
+
+    with results_alone() if as_json else nullcontext():
+        differences = repeat.rerun(ledger, key, out)
+    lines = differences or ["every figure but the times is the same"]
+    value = {"same": not differences, "differences": differences}
+    print_result(lines, value, as_json)
+    click.get_current_context().exit(1 if differences else 0)

@@ -10,6 +10,13 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
+from posefit.fitting.carried import (
+    CARRIED,
+    carried,
+    plugin_of,
+    revived,
+    with_carried,
+)
 from posefit.fitting.check import at_least, between, choices, one_of, positive, whole
 from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
@@ -115,6 +122,8 @@ class Task:
     start: "InitialiserFactory | None" = field(default=None, repr=False)
     # earlier ones, where an interrupted track goes on
     before: Sequence[Frame] = field(default=(), repr=False)
+    # whether frames hold what a filter carries, so that another process can go on
+    resumable: bool = False
     threads: int = 1
     # whether observations and training come in reverse, the last one first
     backwards: bool = False
@@ -398,6 +407,8 @@ class SynthesisTracker:
                 latest = _frame(best, searches, predictor.guess_evaluations)
                 yield latest
                 continue
+            if self.next_frame == "carry" and optimiser is None:
+                optimiser = self._revived(space, rng)
             if self.next_frame == "carry" and optimiser is not None:
                 cast(Filter, optimiser).advance(space)
             else:
@@ -409,7 +420,19 @@ class SynthesisTracker:
             minimise(problem, optimiser, budget_known=True)
             predictor.commit(problem.best)
             latest = _frame(problem, [[problem]], predictor.guess_evaluations)
+            if self.next_frame == "carry" and task.resumable:
+                state = carried(plugin_of(optimiser), space, rng)
+                latest = with_carried(latest, state)
             yield latest
+
+    def _revived(
+        self, space: SearchSpace, rng: np.random.Generator
+    ) -> Optimiser | None:
+        """Return the filter that the frames before this track held; None if they held none."""
+        for frame in reversed(self.task.before):
+            if state := frame.details.get(CARRIED):
+                return revived(state, space, rng, self.make)
+        return None
 
     def _made(
         self, space: Space, rng: np.random.Generator, evaluations: int

@@ -6,19 +6,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import trim_mean
 
 from posefit.arrays import Array
 from posefit.evaluation.measures import Measure
 from posefit.reading import counted
-from posefit.statistics.intervals import TRIMMED
 
 NAMED = 4  # names that a sentence lists; of more it gives the number
 _SYMBOLS = {"degrees": "°"}  # of units, where there is little room
 
 
 def average_by(function: Callable[[Array], Any]) -> Callable[[Array], float | None]:
-    """Return the function of finite values alone, None where there is none."""
+    """Return the function of finite values alone, None without any."""
 
     def average(values: Array) -> float | None:
         finite = values[np.isfinite(values)]
@@ -27,52 +25,43 @@ def average_by(function: Callable[[Array], Any]) -> Callable[[Array], float | No
     return average
 
 
-interquartile_mean = average_by(lambda values: trim_mean(values, TRIMMED))
 mean = average_by(np.mean)
 median = average_by(np.median)
 
 
 @dataclass(frozen=True)
 class Column:
-    """A figure of a run, under the name that it has in a report's data."""
+    """A figure of a run.
+
+    Its name is the same in a row of a ledger, in the CSV, in the report's data and on the page: `coverage.80` is the
+    entry `80` of the row's `coverage`. A figure that no row has is computed from the row by `compute`.
+    """
 
     name: str
     measure: Measure
-    path: tuple[str, ...] = ()  # where it stands in a row
-    scale: float = 1.0  # what the row's value is multiplied by
-    per_frame: bool = False  # the row has the sum over all frames
+    compute: Callable[[Mapping[str, Any]], float] | None = None
     higher_is_better: bool = False
     in_tables: bool = True
     # only methods with an uncertainty have it: tables show it if some row has it
     optional: bool = False
-    # of a method's runs; of shares the mean
-    average: Callable[[Array], float | None] = interquartile_mean
+    average: Callable[[Array], float | None] = mean
 
     def value(self, row: Mapping[str, Any]) -> float:
-        """Return the figure of a row, nan where it has none."""
+        """Return the figure of a row, nan if it has none."""
+        if self.compute is not None:
+            return self.compute(row)
         value: Any = row
-        for part in self.path:
+        for part in self.name.split("."):
             value = (value or {}).get(part)
-        if value is None:
-            return math.nan
-        return (
-            float(value) / row["spec"]["frames"]
-            if self.per_frame
-            else self.scale * float(value)
-        )
-
-    @property
-    def heading(self) -> str:
-        """The heading of a file's column, such as `error (degrees)`. Files have shares as numbers from 0 to 1."""
-        unit = self.measure.unit if self.measure.factor == 1.0 else ""
-        return f"{self.measure.label} ({unit})" if unit else self.measure.label
+        return math.nan if value is None else float(value)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what the page needs to show the figure."""
         measure = self.measure
+        symbol = _SYMBOLS.get(measure.unit, measure.unit)
         return {
-            "title": f"{measure.label} {_SYMBOLS.get(measure.unit, measure.unit)}".rstrip(),
-            "about": measure.meaning,
+            "title": f"{measure.label} {symbol}".rstrip(),
+            "about": f"{measure.meaning} ({self.name})",
             "digits": measure.digits,
             "factor": measure.factor,
             "down": self.higher_is_better,
@@ -84,6 +73,7 @@ class Score:
     """The figure by which methods are ordered, and the texts that depend on it."""
 
     name: str
+    title: str  # of its column in a printed table
     axis: str
     sentence: str  # with a place for the value
     unit: str
@@ -96,7 +86,20 @@ class Score:
 
     def text(self, value: float) -> str:
         """Return a value with its digits and unit."""
-        return f"{value:.{self.digits}f}{self.unit}"
+        return f"{value:z.{self.digits}f}{self.unit}"
+
+    def amount(self, value: float) -> str:
+        """Return a difference with its digits and unit."""
+        return f"{value:z.{self.digits}f}{self.points}".replace("-", "−")
+
+    def difference(self, value: float) -> str:
+        """Return a difference with its sign, digits and unit."""
+        return f"{value:+z.{self.digits}f}{self.points}".replace("-", "−")
+
+
+def p_text(p: float) -> str:
+    """Return a p as a sentence has it: `p = 0.034`, or `p < 0.001`."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
 def listed(values: Sequence[Any], most: int = NAMED) -> str:

@@ -1,42 +1,36 @@
 """The data of a report's page: what was run, the leader, how certain that is, and every run."""
 
+import shlex
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from posefit.errors import printable
-from posefit.geometry.skeleton import JOINTS
-from posefit.measuring.centres import PLACES
 from posefit.reading import counted
-from posefit.report import charts
 from posefit.report.kind import Contest, Runs
-from posefit.report.leaderboard import contest_of, leaderboard, paired_tests
+from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.page import COLOUR_COUNT
-from posefit.report.searches import running_times, search_charts
 from posefit.report.summary import leader_sentences, unpaired_sentence
-from posefit.statistics.intervals import RESAMPLES
-from posefit.suites.running import SHOWN
 from posefit.sweep.ledger import Ledger
 
 # of failures and warnings, the most frequent ones, that the first screen names
 REASONS = 5
 MAX_MISSING = 20  # instances that it names if they are not compared
-FEW_RUNS = 20  # of a method, below which intervals are called wide
-# at which very many runs are drawn by some of them
-POINTS = max(charts.POINTS, len(JOINTS))
 
 
 def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs; `sections` names the parts that it has."""
     contest = contest_of(runs)
     kind = runs.kind
+    date = time.strftime("%d %B %Y", time.localtime(ledger.changed))
     warnings = list(
         dict.fromkeys(text for texts in runs.warnings.values() for text in texts)
     )
     data: dict[str, Any] = {
         "title": kind.title,
-        "made": f"{printable(ledger.path.resolve().name)}, {time.strftime('%d %B %Y', time.localtime(ledger.changed))}",
+        "made": f"{printable(ledger.path.resolve().name)}, {date}",
+        "ledger": printable(shlex.quote(ledger.path.name or str(ledger.path))),
         "answer": [
             "Every cell failed."
             if runs.failures
@@ -49,7 +43,6 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
         ],
         "instances": [{"name": name} for name in runs.instances],
         "baseline_names": kind.baselines,
-        "joints": [place.replace("_", " ") for place in PLACES],
         "colours": COLOUR_COUNT,
         "columns": {name: kind.columns[name].as_dict() for name in runs.table_figures},
         "score": vars(kind.score),
@@ -69,68 +62,10 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
             "baselines": baselines,
             "taking_part": contest.methods,
         }
-    if kind.name == "track":
-        data |= _track_part(runs, contest)
-    else:
-        data |= _search_part(contest)
-    data["sections"] += ["failures"] if runs.failures else []
+    data |= kind.page(runs, contest)
+    if runs.failures:
+        data["sections"] = [*data["sections"], "failures"]
     return data
-
-
-def _track_part(runs: Runs, contest: Contest | None) -> dict[str, Any]:
-    """Return what the page has of tracks alone, and their list of sections."""
-    part: dict[str, Any] = {"sections": ["rows"] if len(runs) else []}
-    if contest is not None:
-        drawn = contest.fewer(POINTS)
-        errors = charts.joint_errors(drawn)
-        certainty = charts.certainty(contest)
-        names = {
-            "leaderboard": True,
-            "comparison": True,
-            "curves": True,
-            "joints": errors,
-            "certainty": certainty,
-        }
-        part = {
-            "sections": [name for name, present in names.items() if present]
-            + part["sections"],
-            "pairs": paired_tests(contest),
-            "charts": [
-                chart.as_dict() for chart in charts.track_charts(contest, drawn)
-            ],
-            "joint_errors": [vars(intervals) for intervals in errors],
-            "certainty": certainty,
-        }
-    numbers = [_exact(place["instance"]) for place in runs.places]
-    return {
-        **part,
-        "instances": [
-            {"name": name, "number": n}
-            for name, n in zip(runs.instances, numbers, strict=True)
-        ],
-        "rows": {
-            **{
-                name: getattr(runs, name)
-                for name in ("method", "instance", "head", "seed")
-            },
-            **{name: runs.figures[name] for name in runs.table_figures},
-            "key": [key[:8] for key in runs.keys],
-        },
-        "seeds": [_exact(seed) for seed in runs.seeds],
-        "heads": runs.heads,
-    }
-
-
-def _search_part(contest: Contest | None) -> dict[str, Any]:
-    """Return what the page has of single searches alone, and their list of sections."""
-    if contest is None:
-        return {"sections": []}
-    return {
-        "sections": ["leaderboard", "curves", "times"],
-        "charts": [chart.as_dict() for chart in search_charts(contest)],
-        "above": SHOWN,
-        "times": running_times(contest),
-    }
 
 
 def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
@@ -161,8 +96,7 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "version": runs.version,
         "summary": f"{runs_words} by {counted(len(runs.methods), 'method')}; {failed}.",
         "facts": [[name, printable(text)] for name, text in texts.items()],
-        "notes": _notes(runs, contest)
-        + (_track_notes(contest) if contest and runs.kind.name == "track" else []),
+        "notes": _notes(runs, contest),
         "done": len(runs),
         "failed": len(runs.failures),
         "dropped": dropped,
@@ -232,11 +166,9 @@ def _problems(
 def _notes(runs: Runs, contest: Contest | None) -> list[str]:
     notes = []
     if contest is not None:
-        (_, instances, seeds), size = contest.rows.shape, contest.rows.size
+        size = contest.blocks.size
         if size < len(runs):
-            each = (
-                f"{counted(instances, 'instance')} with {counted(seeds, 'seed')} each"
-            )
+            each = f"{counted(len(contest.instances), 'instance')} with {contest.seed_words}"
             notes.append(
                 f"Methods are compared on the {size:,} of {len(runs):,} runs that all of them share: {each}."
             )
@@ -257,28 +189,3 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
     }.items():
         notes += [advice] if len(runs.values(field)) > 1 else []
     return notes
-
-
-def _track_notes(contest: Contest) -> list[str]:
-    """Return what limits the figures of tracks."""
-    (methods, instances, seeds), size = contest.rows.shape, contest.rows.size
-    notes = []
-    if seeds > 1 and size / methods < FEW_RUNS:
-        notes.append(
-            f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide."
-        )
-    if contest.resamples(size) < RESAMPLES:
-        notes.append(
-            f"So many runs have {contest.resamples(size)} bootstrap resamples instead of {RESAMPLES:,}."
-        )
-    some = contest.fewer(POINTS).rows.shape
-    if some[1] * some[2] < instances * seeds:
-        notes.append(
-            f"Curves and joints use {some[1]:,} instances with {some[2]:,} seeds each, not all."
-        )
-    return notes
-
-
-def _exact(number: int) -> int | str:
-    """Return a number that a browser does not round: a text, where its floats would."""
-    return number if abs(number) < 2**53 else str(number)

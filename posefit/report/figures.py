@@ -1,26 +1,32 @@
-"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures.
-
-`methods` (m,) are names: a method has the same colour in every figure with the same names.
-"""
+"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures."""
 
 import importlib
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from posefit.errors import InputError
-from posefit.files import new_folder
+from posefit.files import Unfinished, other_entries
 from posefit.report.charts import Chart, track_charts
-from posefit.report.kind import Runs
+from posefit.report.columns import Score
+from posefit.report.kind import Row, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
+from posefit.report.page import LIGHT
+from posefit.report.table import board_rows
 from posefit.sweep.table import write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Okabe and Ito, Color universal design, 2008, without their yellow; lines of the first seven methods, the next, ...
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+# A method has the colour that it has on the page; lines of the first seven methods, the next, ...
+COLOURS = tuple(LIGHT.values())
 STYLES = ("-", "--", ":", "-.")
+MARKERS = ("o", "s", "^", "D", "v", "X", "*", "h")  # as the page's, in this order
+TABLE = "leaderboard.csv"
+TABLE_MARK = b"method,settings,"
+CHARTS = ("leaderboard", "convergence", "profile")
+NAMES = (*(f"{chart}.{kind}" for chart in CHARTS for kind in ("png", "pdf")), TABLE)
 _SIZE = (6.4, 3.6)  # inches
 
 
@@ -31,32 +37,86 @@ def save(figure: "Figure", path: Path) -> None:
     figure.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)
 
 
-def chart_figure(methods: Sequence[str], chart: Chart) -> "Figure":
-    """Return a chart as the page has it: a line for each method, with its band."""
+def chart_figure(
+    names: Sequence[str], chart: Chart, numbers: Sequence[int], order: Sequence[int]
+) -> "Figure":
+    """Return a chart as the page has it: a line for each method, with its band.
+
+    Args:
+        names: What each method of the chart is called.
+        chart: The chart.
+        numbers: Which method of the report each is: it has the same colour in every figure and on the page.
+        order: The places of the methods in the legend.
+
+    """
     figure: Figure = library("figure").Figure(figsize=_SIZE, layout="constrained")
     axes = figure.add_subplot(xlabel=chart.x_label, ylabel=chart.y_label)
     axes.spines[["top", "right"]].set_visible(False)
-    for k, line in enumerate(chart.lines):
+    for k in order:
+        line = chart.lines[k]
         if line is None:
             continue
-        colour = COLOURS[k % len(COLOURS)]
-        style = STYLES[k // len(COLOURS) % len(STYLES)]
-        # no mathematics
-        label = methods[k].replace("$", r"\$")
-        step = "steps-post" if chart.stepped else None
+        colour = COLOURS[numbers[k] % len(COLOURS)]
         axes.plot(
-            line.x, line.y, color=colour, linestyle=style, drawstyle=step, label=label
+            line.x,
+            line.y,
+            color=colour,
+            linestyle=STYLES[numbers[k] // len(COLOURS) % len(STYLES)],
+            drawstyle="steps-post",
+            label=_plain(names[k]),
         )
         if line.low is not None and line.high is not None:
             axes.fill_between(
-                line.x, line.low, line.high, color=colour, alpha=0.18, linewidth=0
+                line.x,
+                line.low,
+                line.high,
+                step="post",
+                color=colour,
+                alpha=0.12,
+                linewidth=0,
             )
     axes.set_xscale("log" if chart.log else "linear")
     if chart.most is not None:
         axes.set_ylim(-0.02 * chart.most, 1.02 * chart.most)
+    else:
+        axes.set_ylim(bottom=0.0)
     figure.legend(
-        loc="outside right upper", frameon=False, fontsize=8 if len(methods) < 20 else 6
+        loc="outside right upper", frameon=False, fontsize=8 if len(names) < 20 else 6
     )
+    return figure
+
+
+def board_figure(
+    score: Score, board: Sequence[Row], baselines: Sequence[tuple[str, float]]
+) -> "Figure":
+    """Return the leaderboard as a picture: a row a method with its interval, and a line a baseline."""
+    rows = [row for row in board if row[score.name] is not None]
+    height = 0.9 + 0.3 * len(rows)
+    figure: Figure = library("figure").Figure(
+        figsize=(_SIZE[0], height), layout="constrained"
+    )
+    axes = figure.add_subplot(xlabel=score.axis)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    for place, row in enumerate(rows):
+        colour = COLOURS[row["method"] % len(COLOURS)]
+        if row["low"] is not None:
+            axes.plot([row["low"], row["high"]], [place, place], color=colour)
+        marker = MARKERS[row["method"] % len(MARKERS)]
+        axes.plot(row[score.name], place, marker=marker, color=colour)
+    for name, value in baselines:
+        axes.axvline(value, color="0.5", linestyle=":", linewidth=1.0)
+        axes.annotate(
+            _plain(name),
+            (value, -0.6),
+            rotation=25,
+            fontsize=7,
+            color="0.35",
+            annotation_clip=False,
+        )
+    axes.set_yticks(range(len(rows)), [_plain(row["name"]) for row in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.6)
+    axes.set_xlim(left=0.0)
     return figure
 
 
@@ -70,34 +130,66 @@ def library(name: str) -> Any:
         ) from error
 
 
-def write_figures(runs: Runs, path: str | Path) -> None:
-    """Write a new folder of figures, as PNG and PDF, and the leaderboard as CSV.
+def check_folder(path: str | Path) -> None:
+    """Raise InputError unless a name is free, or an earlier folder of figures has it and nothing else is in there."""
+    folder = Path(path)
+    if not os.path.lexists(folder):
+        return
+    table = folder / TABLE
+    is_earlier = (
+        folder.is_dir()
+        and not folder.is_symlink()
+        and not other_entries(folder, NAMES)
+        and table.is_file()
+        and table.read_bytes().startswith(TABLE_MARK)
+    )
+    if not is_earlier:
+        raise InputError(
+            f"{path}: expected a new name or an earlier folder of figures, got something else"
+        )
 
-    Figures are left out where the runs do not have the data. Raises ValueError where no run has an error, or where the
-    folder exists or cannot be written.
+
+def write_figures(runs: Runs, path: str | Path) -> None:
+    """Write a folder of figures, as PNG and PDF, and the leaderboard as CSV; an earlier one is replaced.
+
+    Figures are left out if the runs do not have the data. Raises ValueError if no run has an error, or if something
+    else has the name or the folder cannot be written.
     """
     contest = contest_of(runs)
     if contest is None:
         raise InputError("figures must be of runs with errors, got none")
+    board = leaderboard(contest)
     names = [runs.methods[m] for m in contest.methods]
-    figures = {
-        chart.name: chart_figure(names, chart)
-        for chart in track_charts(contest, contest)
-    }
-    columns, (error, *others) = runs.kind.columns, runs.table_figures
-    table = {
-        "method": "name",
-        columns[error].heading: error,
-        "low": "low",
-        "high": "high",
-    }
-    table |= {**{columns[name].heading: name for name in others}, "runs": "runs"}
-    rows = [
-        {title: row[key] for title, key in table.items()}
-        for row in leaderboard(contest)
+    order = [
+        contest.methods.index(row["method"]) for row in board if row["taking_part"]
     ]
-    with new_folder(path) as folder:
-        for name, figure in figures.items():
-            for kind in ("png", "pdf"):
-                save(figure, folder / f"{name}.{kind}")
-        write_csv(rows, folder / "leaderboard.csv")
+    score = runs.kind.score
+    baselines = [
+        (runs.kind.baselines[row["baseline"]], row[score.name])
+        for row in runs.kind.baseline_rows(contest)
+        if row[score.name] is not None
+    ]
+    figures = {"leaderboard": board_figure(score, board, baselines)}
+    for chart in track_charts(contest):
+        figures[chart.name] = chart_figure(names, chart, contest.methods, order)
+    check_folder(path)
+    try:
+        unfinished = Unfinished.begin(Path(path), {})
+        try:
+            for name, figure in figures.items():
+                for kind in ("png", "pdf"):
+                    save(figure, unfinished.path / f"{name}.{kind}")
+            write_csv(board_rows(runs, board), unfinished.path / TABLE)
+            unfinished.finish(NAMES, replace=True)
+        except BaseException:
+            unfinished.remove(NAMES)
+            raise
+    except OSError as error:
+        raise InputError(
+            f"{path}: expected a place to write to, got {error.strerror or error}"
+        ) from error
+
+
+def _plain(name: str) -> str:
+    """Return a name that matplotlib does not take for mathematics."""
+    return name.replace("$", r"\$")

@@ -1,50 +1,75 @@
 """What a report knows of runs: their table, what their kind says of it, and the contest of methods that share them."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.report.columns import Column, Score
-from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES
+from posefit.statistics.paired import PairedTest, paired_tests
 from posefit.statistics.pairing import Shared
-from posefit.statistics.ranks import PairedTest, wilcoxon
-
-BOOTSTRAP_SEED = 2013
-WORK = 1e8  # numbers that the resamples of one study may come to
 
 Place = Mapping[str, Any]  # the fields of a plan that make an instance
+Row = Mapping[str, Any]
 
 
-class Kind(NamedTuple):
-    """A kind of runs, tracks or single searches: the figures and words that a report has of them."""
+class Kind(Protocol):
+    """A kind of runs, tracks or single searches: the figures, names and words that a report has of them."""
 
     name: str
     noun: str
     title: str
     columns: Mapping[str, Column]
+    score: Score
     named: tuple[str, ...]  # the fields that an instance's name says
     data: tuple[str, ...]  # what a row has besides its figures
     baselines: Mapping[str, str]
-    score: Score
-    # the figures of a row and its other data, given a table for arrays that many rows have
-    read: Callable[[Mapping[str, Any], dict[bytes, Any]], tuple[Array, tuple[Any, ...]]]
-    rank: Callable[[Place], tuple[Any, ...]]  # what instances are sorted by
-    place_name: Callable[[Place], str]
-    # the errors (methods, blocks, 1) that tests compare
-    tested_errors: Callable[["Contest"], Array]
-    # what each method's row has besides averages
-    board: Callable[["Contest"], dict[int, dict[str, Any]]]
-    # on the same runs as the methods
-    baseline_rows: Callable[["Contest"], list[dict[str, Any]]]
-    place_words: Callable[["Contest"], str]  # what a contest was on
-    # how the best baseline compares with the leader, given its row and those of the baselines
-    baseline_sentences: Callable[[Mapping[str, Any], Sequence[Any]], list[str]]
-    facts: Callable[["Runs"], dict[str, Any]]  # what was run
+
+    def read(
+        self, row: Row, shared: dict[bytes, Any], /
+    ) -> tuple[Array, tuple[Any, ...]]:
+        """Return the figures of a row and its other data, given a table for arrays that many rows have."""
+        ...
+
+    def rank(self, place: Place) -> tuple[Any, ...]:
+        """Return what instances are sorted by."""
+        ...
+
+    def place_name(self, place: Place) -> str:
+        """Return an instance's name."""
+        ...
+
+    def facts(self, runs: "Runs") -> dict[str, Any]:
+        """Return what was run."""
+        ...
+
+    def tested_errors(self, contest: "Contest") -> Array:
+        """Return the errors (methods, blocks, 1) that tests compare; lower is better."""
+        ...
+
+    def board(self, contest: "Contest") -> dict[int, dict[str, Any]]:
+        """Return what each method's row has besides averages."""
+        ...
+
+    def baseline_rows(self, contest: "Contest") -> list[dict[str, Any]]:
+        """Return the baselines' rows, on the same runs as the methods."""
+        ...
+
+    def place_words(self, contest: "Contest") -> str:
+        """Return what a contest was on."""
+        ...
+
+    def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
+        """Return how the best baseline compares with the first method, given their rows."""
+        ...
+
+    def page(self, runs: "Runs", contest: "Contest | None", /) -> dict[str, Any]:
+        """Return what the page has of this kind alone, and its list of `sections`."""
+        ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,7 +91,7 @@ class Runs:
     seed: Array  # (n,)
     seeds: tuple[int, ...]  # rising
     keys: tuple[str, ...]
-    # name -> (n,), nan where a row has none; a lower `error` is better
+    # name -> (n,), nan where a row has none
     figures: dict[str, Array]
     # what else each row has, by the names of `kind.data`: an array, or a tuple
     data: dict[str, Any]
@@ -91,6 +116,11 @@ class Runs:
             and not (column.optional and np.isnan(self.figures[name]).all())
         ]
 
+    @property
+    def scores(self) -> Array:
+        """The figure (n,) that methods are ordered by."""
+        return self.figures[self.kind.score.name]
+
     def values(self, field: str) -> list[Any]:
         """Return the values of a field of methods or instances, rising."""
         return sorted(
@@ -104,56 +134,53 @@ class Runs:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Contest(Shared):
-    """The runs that some methods share, paired by instance and seed: `rows` and `blocks` are indices of `runs`."""
+    """The runs that some methods share: `blocks` are indices of `runs`, a row a method."""
 
     runs: Runs
 
     def of(self, figure: str) -> Array:
-        """Return a figure of all runs (methods, instances, seeds)."""
-        return np.asarray(self.runs.figures[figure][self.rows])
+        """Return a figure of all shared runs (methods, blocks)."""
+        return np.asarray(self.runs.figures[figure][self.blocks])
+
+    @property
+    def scores(self) -> Array:
+        """The figure (methods, blocks) that methods are ordered by."""
+        return self.of(self.runs.kind.score.name)
 
     def rows_of(self, method: int) -> NDArray[np.int64]:
         """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
         if method in self.methods:
-            return np.asarray(self.rows[self.methods.index(method)].ravel())
+            return np.asarray(self.blocks[self.methods.index(method)])
         return np.flatnonzero(self.runs.method == method).astype(np.int64)
 
-    def places(self) -> list[dict[str, Any]]:
-        """Return the fields of a plan that make each instance."""
-        return [self.runs.places[i] for i in self.instances]
+    @cached_property
+    def instances(self) -> tuple[int, ...]:
+        """The instances that are shared, rising."""
+        return tuple(np.unique(self.instance).tolist())
 
-    def tested_errors(self) -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare."""
-        return self.runs.kind.tested_errors(self)
+    def place_field(self, name: str) -> Array:
+        """Return a field of the plan (blocks,) for each block's instance."""
+        values = np.array([place[name] for place in self.runs.places])
+        return np.asarray(values[self.instance])
 
     @property
-    def testable(self) -> bool:
-        """Whether there are methods and blocks enough for a paired test."""
-        return bool(min(self.tested_errors().shape[:2]) > 1)
+    def seed_words(self) -> str:
+        """How many seeds the instances have."""
+        counts = np.unique(self.instance, return_counts=True)[1]
+        least = int(counts.min())
+        most = int(counts.max())
+        if least < most:
+            return f"{least} to {most} seeds each"
+        return "one seed" if most == 1 else f"{most} seeds each"
+
+    @cached_property
+    def tested_errors(self) -> Array:
+        """The errors (methods, blocks, 1) that tests compare."""
+        return self.runs.kind.tested_errors(self)
 
     @cached_property
     def comparisons(self) -> list[PairedTest]:
-        """The paired tests of all methods, by their places in `methods`; none where too few runs are shared."""
-        return wilcoxon(self.tested_errors()) if self.testable else []
-
-    def rng(self) -> np.random.Generator:
-        """Return what resamples are drawn by."""
-        return np.random.default_rng(BOOTSTRAP_SEED)
-
-    def resamples(self, numbers: int) -> int:
-        """Return how many bootstrap resamples so many numbers may have."""
-        return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
-
-    def fewer(self, points: int) -> Self:
-        """Return the contest on so few seeds and instances that intervals at so many points are little work.
-
-        These are the first seeds, and every second, third, ... instance.
-        """
-        # runs of a method
-        most = int(WORK / (MIN_RESAMPLES * max(points, 1) * len(self.methods)))
-        _, instances, seeds = self.rows.shape
-        seeds = min(seeds, max(2, most // instances))
-        step = -(-instances * seeds // most)
-        return replace(
-            self, instances=self.instances[::step], rows=self.rows[:, ::step, :seeds]
-        )
+        """The paired tests of all methods, by their places in `methods`; none without two methods and two blocks."""
+        if min(self.tested_errors.shape[:2]) < 2:
+            return []
+        return paired_tests(self.tested_errors)

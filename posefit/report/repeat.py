@@ -1,80 +1,161 @@
-"""The command that runs one row of a ledger again: a plan of one cell, on standard input."""
+"""Rows of a ledger run again: by the key of a row, or by a command that needs no ledger."""
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from posefit.errors import InputError
+from posefit.progress import interactive
+from posefit.reading import counted, cut, quoted
 from posefit.settings import setting_text
 from posefit.sweep.check import FIELDS
+from posefit.sweep.command import engine, swept
+from posefit.sweep.engine import Limits
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.plan import Plan
+from posefit.sweep.table import flat
 
 LAST_FIELDS = ("instance", "seed")  # the fields that rows with the same head differ in
+TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
+MAX_SHOWN = 12  # figures that differ
 _BEGIN = "posefit sweep - --out rerun <<'END'\n"
 # beyond those of JSON
 _ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x2029)}
 
 
-def repeat_command(spec: Mapping[str, Any]) -> str:
-    """Return the shell command that runs the cell of a spec again, with the ledger `rerun`."""
-    if spec["kind"] == "track":
-        return (
-            command_head(spec)
-            + "".join(f"{name} = {_toml(spec[name])}\n" for name in LAST_FIELDS)
-            + "END"
+def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[str]:
+    """Run a row of a ledger again, and return what differs from it.
+
+    Args:
+        ledger: A folder of ledgers, or one.
+        key: The row's key, or as many of its first digits as only this row has.
+        out: The folder of a ledger for the new row; without it the row is not stored.
+
+    Returns:
+        Lines about what ran and which figures differ, none if all are equal but the times.
+
+    Raises:
+        ValueError: If no row or several have the key, or if the cell cannot be planned today.
+
+    """
+    earlier = _row_of(ledger, key)
+    plan = Plan.of(plan_tables(earlier["spec"]))
+    with TemporaryDirectory(prefix="posefit-") as temporary:
+        folder = Path(temporary) / "rerun" if out is None else Path(out)
+        start = engine(Limits(), workers=1)
+        swept(plan, folder, start(), interactive().log, quiet=True)
+        (cell,) = plan
+        with Ledger(folder) as results:
+            now = next(row for row in results.all_rows() if row["key"] == cell.key)
+    return _differences(earlier, now)
+
+
+def _row_of(ledger: str | Path, key: str) -> dict[str, Any]:
+    """Return the row of a ledger whose key begins with some digits."""
+    if not key:
+        raise InputError("KEY must be the first digits of a row's key, got none")
+    with Ledger(ledger) as results:
+        rows = [row for row in results.all_rows() if row["key"].startswith(key)]
+    if not rows:
+        raise InputError(
+            f"{ledger}: expected a row whose key begins with {quoted(key)}, got none: "
+            "the keys are in the report, and in its CSV"
         )
-    plan = {
+    if len(rows) > 1:
+        raise InputError(
+            f"{ledger}: expected one row whose key begins with {quoted(key)}, got {len(rows):,}: give more digits"
+        )
+    return rows[0]
+
+
+def _differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """Return the figures that differ between two rows of a cell, and why they may."""
+    before = flat(earlier)
+    after = flat(now)
+    lines = []
+    if before["version"] != after["version"]:
+        lines.append(
+            f"it was run by {cut(before['version'])}, and now by {cut(after['version'])}"
+        )
+    if now["status"] != "done":
+        return [*lines, f"it failed: {'; '.join(now['reasons'])}"]
+    if earlier["status"] != "done":
+        return [*lines, "it had failed, and is done now"]
+    names = [name for name in after if name not in (*TIMES, "key", "version")]
+    differing = [name for name in names if before.get(name) != after[name]]
+    for name in differing[:MAX_SHOWN]:
+        lines.append(f"{name}: {before.get(name)} before, {after[name]} now")
+    if len(differing) > MAX_SHOWN:
+        more = counted(len(differing) - MAX_SHOWN, "other figure")
+        lines.append(f"{more} differ, too")
+    return lines
+
+
+def plan_tables(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of a plan of one cell, which a spec describes."""
+    if spec["kind"] == "track":
+        last = {name: spec[name] for name in LAST_FIELDS}
+        return {"cells": [{**_track_fields(spec), **last}]}
+    method = {
+        name: spec[name]
+        for name in ("method", "name", "settings")
+        if name != "name" or spec[name]
+    }
+    lists = {
+        f"{name}s": [spec[name]]
+        for name in ("function", "dimension", "instance", "seed")
+    }
+    return {
         "suite": spec["suite"],
-        "methods": [
-            {
-                name: spec[name]
-                for name in ("method", "name", "settings")
-                if name != "name" or spec[name]
-            }
-        ],
-        **{
-            f"{name}s": [spec[name]]
-            for name in ("function", "dimension", "instance", "seed")
-        },
+        "methods": [method],
+        **lists,
         "budgets": [spec["evaluations"] // spec["dimension"]],
         "infeasible": spec["infeasible"],
     }
-    return (
-        _BEGIN
-        + "".join(f"{name} = {_toml(value)}\n" for name, value in plan.items())
-        + "END"
-    )
 
 
-def command_head(spec: Mapping[str, Any]) -> str:
-    """Return a track's command up to the lines of instance and seed; the line END follows these.
+def repeat_command(spec: Mapping[str, Any]) -> str:
+    """Return a shell command that runs the cell of a spec again, with the ledger `rerun`.
 
     The shell does not interpret the plan, whatever names it holds: each of its lines begins with a field's name.
     """
+    if spec["kind"] == "track":
+        last = {name: spec[name] for name in LAST_FIELDS}
+        return f"{command_head(spec)}{_lines(last)}END"
+    return f"{_BEGIN}{_lines(plan_tables(spec))}END"
+
+
+def command_head(spec: Mapping[str, Any]) -> str:
+    """Return a track's command up to the lines of instance and seed; the line END follows these."""
+    return f"{_BEGIN}[[cells]]\n{_lines(_track_fields(spec))}"
+
+
+def _track_fields(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a track's cell in a plan, but the last ones."""
     fields = {
         name: spec[name] for name in FIELDS if name in spec and name not in LAST_FIELDS
     }
-    fields = {name: value for name, value in fields.items() if name != "name" or value}
+    if not fields.get("name", True):
+        del fields["name"]
     # TOML has no null: settings are parsed from their text
     fields["settings"] = {
         name: setting_text(value) for name, value in spec["settings"].items()
     }
-    return (
-        _BEGIN
-        + "[[cells]]\n"
-        + "".join(f"{name} = {_toml(value)}\n" for name, value in fields.items())
-    )
+    return fields
+
+
+def _lines(fields: Mapping[str, Any]) -> str:
+    return "".join(f"{name} = {_toml(value)}\n" for name, value in fields.items())
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, Mapping):
-        return (
-            "{ "
-            + ", ".join(
-                f"{_string(name)} = {_toml(item)}" for name, item in value.items()
-            )
-            + " }"
-        )
+        items = [f"{_string(name)} = {_toml(item)}" for name, item in value.items()]
+        return f"{{ {', '.join(items)} }}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+        return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, bool):
         return str(value).lower()
     return _string(value) if isinstance(value, str) else str(value)

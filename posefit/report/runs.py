@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.errors import InputError, printable
+from posefit.reading import quoted, suggestion
+from posefit.report.columns import listed
 from posefit.report.kind import Kind, Runs
 from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
 from posefit.report.searches import SEARCHES
 from posefit.report.tracks import TRACKS
 from posefit.settings import setting_text, settings_text
-from posefit.sweep.cell import cell_from
+from posefit.sweep.cell import cell_from, other_version
 
 if TYPE_CHECKING:
     from posefit.arrays import Array
@@ -103,76 +105,122 @@ class _Rows:
         self.measured.append(KINDS[spec["kind"]].read(row, shared))
 
 
-def runs_of(ledger: "Ledger") -> Runs:
+def runs_of(
+    ledger: "Ledger", methods: Sequence[str] = (), *, latest: bool = False
+) -> Runs:
     """Return the finished rows of a ledger, in an order that does not depend on which of them finished first.
 
-    If every cell failed there are no rows, but failures. Raises ValueError where there is neither, and where it holds
-    both tracks and single searches.
+    If every cell failed there are no rows, but failures.
+
+    Args:
+        ledger: Ledgers of tracks, or of single searches.
+        methods: Names of methods that the runs are cut down to: as a report has them, or as the plan has them. All if
+            there is none.
+        latest: Whether methods that differ only in version are cut down to one of them, the one installed or else the
+            one that was planned last.
+
+    Raises:
+        ValueError: If there is neither a row nor a failure, if the ledgers hold both tracks and single searches, or if
+            no method has one of the names.
+
     """
     quarantined = ledger.quarantined()
     rows = _Rows(ledger, quarantined)
     kind = rows.kind
-    methods = rows.methods
-    places = rows.places
-    figures = np.array([values for values, _ in rows.measured], dtype=float).reshape(
-        -1, len(kind.columns)
-    )
-    instance, method, head_number = np.array(rows.numbers, dtype=int).reshape(-1, 3).T
-
-    errors = np.nan_to_num(figures[:, list(kind.columns).index("error")], nan=np.inf)
-    count = len(methods.values)  # those that only failed come after them
-    failed = Counter(methods.number(_variant(cell["spec"])) for cell in quarantined)
-    means = [
-        errors[method == m].mean() if m < count else np.inf
-        for m in range(len(methods.values))
+    count = len(rows.methods.values)  # those that only failed come after them
+    failed_method = [
+        rows.methods.number(_variant(cell["spec"])) for cell in quarantined
     ]
-    best_first = _order(
-        [
-            (m >= count, means[m], _text(variant))
-            for m, variant in enumerate(methods.values)
-        ]
+    variants = rows.methods.values
+    numbers = np.array(rows.numbers, dtype=int).reshape(-1, 3)
+    figures = np.array([values for values, _ in rows.measured], dtype=float)
+    figures = figures.reshape(-1, len(kind.columns))
+
+    chosen = _latest(variants) if latest else range(len(variants))
+    scores = figures[:, list(kind.columns).index(kind.score.name)]
+    badness = np.nan_to_num(-scores if kind.score.down else scores, nan=np.inf)
+    means = [
+        badness[numbers[:, 1] == m].mean() if m < count else np.inf
+        for m in range(len(variants))
+    ]
+    best_first = sorted(
+        chosen, key=lambda m: (m >= count, means[m], _text(variants[m]))
     )
-    variants = [methods.values[m] for m in best_first]
     labels = distinct(
-        [fields["name"] or fields["method"] for fields in variants],
-        map(_variation, variants),
+        [variants[m]["name"] or variants[m]["method"] for m in best_first],
+        [_variation(variants[m]) for m in best_first],
     )
     label_of = dict(zip(best_first, labels, strict=True))
+    if methods:
+        best_first = _named(methods, best_first, variants, label_of)
+    finished = [m for m in best_first if m < count]
+    place_of_method = {m: k for k, m in enumerate(finished)}
 
-    place_order = _order([(kind.rank(place), _text(place)) for place in places.values])
-    sorted_places = [places.values[i] for i in place_order]
+    retained = [k for k, row in enumerate(rows.numbers) if row[1] in place_of_method]
+    cells = [
+        (cell, label_of[m])
+        for cell, m in zip(quarantined, failed_method, strict=True)
+        if m in best_first
+    ]
+    failed = Counter(name for _, name in cells)
+
+    present = sorted({rows.numbers[k][0] for k in retained})
+    values = rows.places.values
+    place_order = sorted(
+        present, key=lambda i: (kind.rank(values[i]), _text(values[i]))
+    )
+    places = [values[i] for i in place_order]
     details = [
         {
             name: _text(value).strip('"')
             for name, value in place.items()
             if name not in kind.named
         }
-        for place in sorted_places
+        for place in places
     ]
-    commands = [command_head(spec) for spec in rows.heads.values]
-    rising = sorted(set(rows.seeds))
-    rank = {seed: k for k, seed in enumerate(rising)}
-    seed = np.array([rank[seed] for seed in rows.seeds], dtype=int)
-    instance = np.argsort(place_order)[instance]
-    method = np.argsort(best_first)[method]
-    head_number = np.argsort(_order(commands))[head_number]
-    order = np.lexsort((seed, method, instance))
+    commands = {
+        head: command_head(rows.heads.values[head])
+        for head in {rows.numbers[k][2] for k in retained}
+    }
+    heads = sorted(set(commands.values()))
+    place_of_command = {command: k for k, command in enumerate(heads)}
+    place_of_instance = {i: k for k, i in enumerate(place_order)}
+    rising = sorted({rows.seeds[k] for k in retained})
+    place_of_seed = {seed: k for k, seed in enumerate(rising)}
+
+    def index(row: int) -> tuple[int, int, int, int]:
+        """Return the instance, method, seed and command of a row."""
+        instance, method, head = rows.numbers[row]
+        return (
+            place_of_instance[instance],
+            place_of_method[method],
+            place_of_seed[rows.seeds[row]],
+            place_of_command[commands[head]],
+        )
+
+    indices = {k: index(k) for k in retained}
+    order = sorted(retained, key=indices.__getitem__)
+    table = np.array([indices[k] for k in order], dtype=int).reshape(-1, 4).T
     data = zip(*(rows.measured[k][1] for k in order), strict=True)
     return Runs(
         kind=kind,
         version=ledger.version,
-        methods=labels[:count],
+        methods=tuple(label_of[m] for m in finished),
         variants=tuple(
-            {**v, "settings": printable(", ".join(settings_text(v["settings"])))}
-            for v in variants[:count]
+            {
+                **variants[m],
+                "settings": printable(
+                    ", ".join(settings_text(variants[m]["settings"]))
+                ),
+            }
+            for m in finished
         ),
-        instances=distinct(
-            [kind.place_name(place) for place in sorted_places], details
-        ),
-        places=tuple(sorted_places),
-        method=method[order],
-        instance=instance[order],
-        seed=seed[order],
+        instances=distinct([kind.place_name(place) for place in places], details),
+        places=tuple(places),
+        instance=table[0],
+        method=table[1],
+        seed=table[2],
+        head=table[3],
         seeds=tuple(rising),
         keys=tuple(rows.keys[k] for k in order),
         figures=dict(zip(kind.columns, figures[order].T, strict=True)),
@@ -185,26 +233,53 @@ def runs_of(ledger: "Ledger") -> Runs:
             for k, row in enumerate(order)
             if rows.warnings[row]
         },
-        failures=tuple(
-            _failure(cell, label_of[methods.number(_variant(cell["spec"]))])
-            for cell in quarantined
-        ),
-        failed=tuple(failed[m] for m in best_first[:count]),
-        unfinished=labels[count:],
-        heads=tuple(sorted(commands)),
-        head=head_number[order],
+        failures=tuple(_failure(cell, name) for cell, name in cells),
+        failed=tuple(failed[label_of[m]] for m in finished),
+        unfinished=tuple(label_of[m] for m in best_first if m >= count),
+        heads=tuple(heads),
     )
 
 
-def _order(keys: Sequence[Any]) -> list[int]:
-    """Return the places of keys in the order of the keys."""
-    return sorted(range(len(keys)), key=keys.__getitem__)
+def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
+    """Return the methods that are left if of those that differ only in version one counts.
+
+    It is the one whose versions are those installed, or else the one that was planned last.
+    """
+    best: dict[Hashable, tuple[bool, int]] = {}
+    for m, variant in enumerate(variants):
+        versions = variant["version"].split(", ")
+        installed = not any(map(other_version, versions))
+        other_fields = {**variant, "version": ""}
+        key = _frozen(other_fields)
+        best[key] = max(best.get(key, (False, -1)), (installed, m))
+    return sorted(m for _, m in best.values())
+
+
+def _named(
+    names: Sequence[str],
+    numbers: Sequence[int],
+    variants: Sequence[Mapping[str, Any]],
+    label_of: Mapping[int, str],
+) -> list[int]:
+    """Return the methods that have one of some names. Raises InputError if a name is nobody's."""
+    names_of = {
+        m: {label_of[m], variants[m]["name"] or variants[m]["method"]} for m in numbers
+    }
+    known = set().union(*names_of.values())
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"--methods must be of {listed(sorted(label_of.values()), 12)}, got {quoted(name)}"
+                f"{suggestion(name, known)}"
+            )
+    return [m for m in numbers if names_of[m] & set(names)]
 
 
 def _failure(cell: Mapping[str, Any], name: str) -> dict[str, Any]:
     return {
         "name": printable(str(cell_from({**cell["spec"], "name": name}))),
         "method": name,
+        "key": cell["key"][:8],
         "reasons": [*map(printable, dict.fromkeys(cell["reasons"]))],
         "command": repeat_command(cell["spec"]),
     }

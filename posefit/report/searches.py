@@ -11,29 +11,50 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, mean, median
-from posefit.report.kind import Contest, Kind, Place, Runs
-from posefit.statistics.means import mean_interval, mean_intervals
+from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.statistics.means import mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
-from posefit.suites.running import ALL, SHOWN, suite_scores
+from posefit.suites.running import ALL, SHOWN, SuiteRun, suite_scores
 from posefit.sweep.table import search_run
 
 RANDOM = "random"  # the method that is the baseline
 POINTS = 61  # of a curve
 
-_COLUMNS = (
-    Column("reached", Measure("reached", "targets", "%", 1, "Share of all runs and targets that were reached"),
-           higher_is_better=True, average=mean),
-    Column("above", Measure("above", "above", "", 2, "Median of the best costs above the true pose's"), average=median),
-    Column("error", Measure("error", "targets missed", "%", 1, "What is left of 100 %"), in_tables=False, average=mean),
-)  # fmt: skip
+
+def _hits(run: SuiteRun) -> Array:
+    """Return after how many evaluations (targets,) a run reached each target, inf for never."""
+    return hits((run.evaluations, run.costs), run.targets)
 
 
+def _reached(row: Row) -> float:
+    return 100.0 * float(np.isfinite(_hits(search_run(row))).mean())
+
+
+def _above(row: Row) -> float:
+    run = search_run(row)
+    return run.cost - run.truth_cost
+
+
+_REACHED = Measure(
+    "reached", "targets", "%", 1, "Share of all runs and targets that were reached"
+)
+_ABOVE = Measure(
+    "above", "above", "", 2, "Median of the best costs above the true pose's"
+)
+COLUMNS = {
+    column.name: column
+    for column in (
+        Column("reached", _REACHED, _reached, higher_is_better=True, average=mean),
+        Column("above", _ABOVE, _above, average=median),
+    )
+}
 SCORE = Score(
     name="reached",
+    title="targets %",
     axis="share of targets reached",
-    sentence="{} of all targets reached",
+    sentence="reached {} of all targets",
     unit=" %",
     points=" points",
     digits=1,
@@ -46,112 +67,120 @@ SCORE = Score(
 )
 
 
-def _read(row: Mapping[str, Any], _: dict[bytes, Any]) -> tuple[Array, tuple[Any, ...]]:
-    run = search_run(row)
-    evaluations = hits((run.evaluations, run.costs), run.targets)
-    reached = 100.0 * float(np.isfinite(evaluations).mean())
-    return np.array([reached, run.cost - run.truth_cost, 100.0 - reached]), (
-        run,
-        evaluations,
-    )
+class Searches:
+    """What a report knows of single searches."""
 
+    name = "search"
+    noun = "searches"
+    title = "Report of single searches"
+    columns: Mapping[str, Column] = COLUMNS
+    score = SCORE
+    named: tuple[str, ...] = ("function", "dimension", "instance")
+    data: tuple[str, ...] = (
+        "runs",
+        "hits",
+    )  # `SuiteRun`; evaluations (targets,), inf for never
+    baselines: Mapping[str, str] = {RANDOM: "random search"}
 
-def _rank(place: Place) -> tuple[Any, ...]:
-    return place["function"], place["dimension"], place["instance"], place["suite"]
+    def read(self, row: Row, _: dict[bytes, Any], /) -> tuple[Array, tuple[Any, ...]]:
+        """Return the figures of a row, its run, and when it reached each target."""
+        run = search_run(row)
+        figures = np.array([column.value(row) for column in COLUMNS.values()])
+        return figures, (run, _hits(run))
 
+    def rank(self, place: Place) -> tuple[Any, ...]:
+        """Return what instances are sorted by."""
+        return place["function"], place["dimension"], place["instance"], place["suite"]
 
-def _place_name(place: Place) -> str:
-    return (
-        f"f{place['function']} in {place['dimension']}D, instance {place['instance']}"
-    )
+    def place_name(self, place: Place) -> str:
+        """Return an instance's name, such as `f7 in 24D, instance 3`."""
+        problem = f"f{place['function']} in {place['dimension']}D"
+        return f"{problem}, instance {place['instance']}"
 
-
-def _tested_errors(contest: Contest) -> Array:
-    """Return the errors (methods, blocks, 1) that tests compare.
-
-    A block is an instance of a function, the same pose in every dimension: the mean over seeds and dimensions.
-    """
-    poses = [
-        (place["function"], place["instance"], place["suite"])
-        for place in contest.places()
-    ]
-    index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
-    block = np.array([index[pose] for pose in poses])
-    sums = np.array(
-        [np.bincount(block, row) for row in contest.of("error").mean(axis=2)]
-    )
-    return np.asarray((sums / np.bincount(block))[:, :, None])
-
-
-def _board(contest: Contest) -> dict[int, dict[str, Any]]:
-    """Return each method's mean share of targets, with the interval of other instances."""
-    strata, clusters = (
-        [place[name] for place in contest.places()] for name in ("function", "instance")
-    )
-    variants = contest.runs.variants
-    board: dict[int, dict[str, Any]] = {
-        m: {"low": None, "high": None, "is_random": v["method"] == RANDOM}
-        for m, v in enumerate(variants)
-    }
-    for m, shares in zip(
-        contest.methods, contest.of("reached").mean(axis=2), strict=True
-    ):
-        share = mean_interval(shares, strata, clusters)
-        board[m] |= {
-            "reached": share.value,
-            "low": max(share.low, 0.0),
-            "high": min(share.high, 100.0),
+    def facts(self, runs: Runs) -> dict[str, Any]:
+        """Return what was run."""
+        targets = f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} above the true pose's"
+        return {
+            "instances": f"{len(runs.instances):,}",
+            "suite": runs.values("suite"),
+            "functions": [_function(number) for number in runs.values("function")],
+            "dimensions": runs.values("dimension"),
+            "seeds": f"{len(runs.seeds):,}",
+            "evaluations for each dimension": [
+                f"{budget:g}" for budget in runs.values("budget")
+            ],
+            "infeasible proposals": runs.values("infeasible"),
+            "targets of a problem": targets,
         }
-    return board
 
+    def tested_errors(self, contest: Contest) -> Array:
+        """Return the shares of targets that were missed (methods, blocks, 1), in percent.
 
-def _baseline_rows(contest: Contest) -> list[dict[str, Any]]:
-    """Return a row for random search, the best of its variants that take part; none if there is none."""
-    random = [
-        k
-        for k, m in enumerate(contest.methods)
-        if contest.runs.variants[m]["method"] == RANDOM
-    ]
-    shares = [
-        float(shares_of_runs.mean()) for shares_of_runs in contest.of("reached")[random]
-    ]
-    return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
+        A block is an instance of a function, the same pose in every dimension: the mean over seeds and dimensions.
+        """
+        fields = [contest.place_field(n) for n in ("function", "instance", "suite")]
+        poses = [*zip(*(field.tolist() for field in fields), strict=True)]
+        index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
+        block = np.array([index[pose] for pose in poses])
+        missed = 100.0 - contest.scores
+        sums = np.array([np.bincount(block, row) for row in missed])
+        return np.asarray((sums / np.bincount(block))[:, :, None])
 
+    def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
+        """Return the interval of each method's share of targets that other instances would give."""
+        functions = contest.place_field("function")
+        instances = contest.place_field("instance")
+        board: dict[int, dict[str, Any]] = {
+            m: {"low": None, "high": None, "is_random": v["method"] == RANDOM}
+            for m, v in enumerate(contest.runs.variants)
+        }
+        means = mean_intervals(contest.scores, functions, instances)
+        for m, low, high in zip(contest.methods, means.low, means.high, strict=True):
+            if np.isfinite(low):
+                board[m]["low"] = max(float(low), 0.0)
+                board[m]["high"] = min(float(high), 100.0)
+        return board
 
-def _place_words(contest: Contest) -> str:
-    places = contest.places()
-    functions, dimensions = (
-        sorted({place[name] for place in places}) for name in ("function", "dimension")
-    )
-    instances = counted(
-        len({(place["function"], place["instance"]) for place in places}), "instance"
-    )
-    noun = "function" if len(functions) == 1 else "functions"
-    numbers = (
-        f"{listed(functions, len(functions))} in {listed(dimensions, len(dimensions))}"
-    )
-    return f"{noun} {numbers} dimensions, {instances} in all"
+    def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
+        """Return a row for random search, the best of its variants that take part; none without it."""
+        shares = [
+            float(shares_of_runs.mean())
+            for m, shares_of_runs in zip(contest.methods, contest.scores, strict=True)
+            if contest.runs.variants[m]["method"] == RANDOM
+        ]
+        return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
 
+    def place_words(self, contest: Contest) -> str:
+        """Return what a contest was on."""
+        functions = sorted(set(contest.place_field("function").tolist()))
+        dimensions = sorted(set(contest.place_field("dimension").tolist()))
+        problems = {
+            (contest.runs.places[i]["function"], contest.runs.places[i]["instance"])
+            for i in contest.instances
+        }
+        noun = "function" if len(functions) == 1 else "functions"
+        words = f"{noun} {listed(functions, len(functions))}"
+        words += f" in {listed(dimensions, len(dimensions))} dimensions"
+        return f"{words}, {counted(len(problems), 'instance')} in all"
 
-def _baseline_sentences(first: Mapping[str, Any], rows: Sequence[Any]) -> list[str]:
-    if first["is_random"]:
-        return ["That is random search: no method does better."]
-    return [f"Random search reached {SCORE.text(row['reached'])}." for row in rows]
+    def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
+        """Return what random search reached."""
+        if first["is_random"]:
+            return ["That is random search: no method does better."]
+        return [
+            f"Random search reached {SCORE.text(row['reached'])}." for row in baselines
+        ]
 
-
-def _facts(runs: Runs) -> dict[str, Any]:
-    return {
-        "instances": f"{len(runs.instances):,}",
-        "suite": runs.values("suite"),
-        "functions": [_function(number) for number in runs.values("function")],
-        "dimensions": runs.values("dimension"),
-        "seeds": f"{len(runs.seeds):,}",
-        "evaluations for each dimension": [
-            f"{budget:g}" for budget in runs.values("budget")
-        ],
-        "infeasible proposals": runs.values("infeasible"),
-        "targets of a problem": f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} above the true pose's",
-    }
+    def page(self, _: Runs, contest: Contest | None, /) -> dict[str, Any]:
+        """Return the curves and the running times, and the list of sections."""
+        if contest is None:
+            return {"sections": []}
+        return {
+            "sections": ["leaderboard", "curves", "times"],
+            "charts": [chart.as_dict() for chart in search_charts(contest)],
+            "above": SHOWN,
+            "times": running_times(contest),
+        }
 
 
 def search_charts(contest: Contest) -> list[Chart]:
@@ -159,56 +188,39 @@ def search_charts(contest: Contest) -> list[Chart]:
 
     Intervals are those that other instances would give.
     """
-    functions, dimensions, instances = (
-        np.array([place[name] for place in contest.places()])
-        for name in ("function", "dimension", "instance")
-    )
-    runs = [contest.runs.data["runs"][k] for k in map(int, contest.rows.ravel())]
+    functions = contest.place_field("function")
+    dimensions = contest.place_field("dimension")
+    instances = contest.place_field("instance")
+    runs = [contest.runs.data["runs"][k] for k in map(int, contest.blocks.ravel())]
     most = max(float(run.evaluations[-1]) / run.dimension for run in runs)
     evaluations = np.unique(np.geomspace(1.0, max(most, 1.0), POINTS))
-    used = (
-        contest.runs.data["hits"][contest.rows]
-        / dimensions.astype(np.float64)[None, :, None, None]
+    hits_of_runs = contest.runs.data["hits"][contest.blocks]
+    hits_of_runs = hits_of_runs / dimensions.astype(np.float64)[None, :, None]
+    # (methods, blocks, points)
+    shares = np.array(
+        [[attained(times, evaluations) for times in rows] for rows in hits_of_runs]
     )
     numbers = np.unique(functions).tolist()
     parts = {"All functions": functions > 0}
-    parts |= {
-        _function(number): functions == number for number in numbers if len(numbers) > 1
-    }
+    if len(numbers) > 1:
+        parts |= {_function(number): functions == number for number in numbers}
     charts: list[Chart] = []
     for title, part in parts.items():
         lines = []
-        for hits_of_method in used[:, part]:
-            shares = np.array(
-                [
-                    attained(hits_of_instance, evaluations)
-                    for hits_of_instance in hits_of_method
-                ]
-            ).T
-            interval = mean_intervals(shares, functions[part], instances[part])
-            lines.append(
-                Line(evaluations, interval.values, interval.low, interval.high)
-            )
-        x = "evaluations for each dimension"
-        y = "share of targets reached"
+        for shares_of_method in shares[:, part]:
+            means = mean_intervals(shares_of_method.T, functions[part], instances[part])
+            lines.append(Line(evaluations, means.values, means.low, means.high))
         chart = Chart(
             name=f"chart-{len(charts)}",
             title=title,
-            x_label=x,
-            y_label=y,
+            x_label="evaluations for each dimension",
+            y_label="share of targets reached",
             lines=lines,
             log=True,
-            stepped=True,
         )
         charts.append(chart)
-    end = min(
-        1.0,
-        1.1
-        * max(
-            0.05,
-            *(float(line.y[-1]) for chart in charts for line in chart.lines if line),
-        ),
-    )
+    ends = [float(line.y[-1]) for chart in charts for line in chart.lines if line]
+    end = min(1.0, 1.1 * max(0.05, *ends))
     return [replace(chart, most=end) for chart in charts]
 
 
@@ -239,22 +251,4 @@ def _function(number: int) -> str:
     return f"{number} {suite_function(number).name}"
 
 
-SEARCHES = Kind(
-    name="search",
-    noun="searches",
-    title="Report of single searches",
-    columns={column.name: column for column in _COLUMNS},
-    named=("function", "dimension", "instance"),
-    data=("runs", "hits"),  # `SuiteRun`; evaluations (targets,), inf for never
-    baselines={RANDOM: "random search"},
-    score=SCORE,
-    read=_read,
-    rank=_rank,
-    place_name=_place_name,
-    tested_errors=_tested_errors,
-    board=_board,
-    baseline_rows=_baseline_rows,
-    place_words=_place_words,
-    baseline_sentences=_baseline_sentences,
-    facts=_facts,
-)
+SEARCHES: Kind = Searches()

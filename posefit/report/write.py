@@ -1,22 +1,23 @@
 """What `posefit report` does: a page, and on request figures, tables and files for other tools."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
-from posefit.evaluation.measures import BASELINES
-from posefit.files import check_new, check_place, replaceable, replaced_file
+from posefit.files import check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.content import data_of
+from posefit.report.kind import Kind
 from posefit.report.page import MARK, document
-from posefit.report.runs import runs_of
+from posefit.report.runs import KINDS, runs_of
+from posefit.report.table import LATEX_MARK, board_lines, latex_table
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat, write_csv
 
-SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
+CSV_MARK = "key,version,status,"  # how the CSV of a sweep begins
 
 
 def write_report(
@@ -25,37 +26,65 @@ def write_report(
     *,
     figures: str | None = None,
     csv: str | None = None,
+    latex: str | None = None,
+    methods: Sequence[str] = (),
+    latest: bool = False,
 ) -> dict[str, Any]:
     """Write the report of a ledger, or of several together, to a file, and return what the command prints.
 
-    That is the header, the answer, the leaderboard, the baselines, and the running times of single searches. Without
-    `out` no page is written; an earlier report of that name is replaced, nothing else is. `figures` is a new folder for
-    figures (PNG, PDF) and the leaderboard (CSV), `csv` a new file of all rows.
-    Raises ValueError where the ledger has no finished row or something cannot be written, and ImportError where figures
-    need matplotlib: before anything is written, if possible.
+    What an earlier report wrote is replaced, nothing else is.
+
+    Args:
+        path: A folder of ledgers, or a ledger, or several.
+        out: The page; without it no page is written.
+        figures: A folder for figures (PNG, PDF) and the leaderboard (CSV).
+        csv: A file of all rows.
+        latex: A file of the leaderboard as a LaTeX table.
+        methods: The methods that are compared, by their names in the report or in the plan; all if there is none.
+        latest: Whether of methods that differ only in version the latest alone is compared.
+
+    Returns:
+        The header, the answer, the leaderboard, the baselines, and the running times of single searches.
+
+    Raises:
+        ValueError: If the ledger has no finished row, or something cannot be written: before anything is, if possible.
+        ImportError: If figures need matplotlib.
+
     """
     paths = [path] if isinstance(path, str | Path) else path
-    _check_places(Path(paths[0]), out, [figures, csv])
+    files = [(out, MARK), (csv, CSV_MARK), (latex, LATEX_MARK)]
+    _check_files(files)
+    _check_distinct(Path(paths[0]), [out, figures, csv, latex])
     if figures is not None:
-        from posefit.report.figures import library, write_figures
+        from posefit.report.figures import check_folder, library, write_figures
 
+        check_folder(figures)
         library("figure")
     with Ledger(*paths) as ledger:
-        runs = runs_of(ledger)
+        runs = runs_of(ledger, methods, latest=latest)
         if runs.kind.name == "search" and figures is not None:
             raise InputError(
                 "--figures must be given with a sweep of tracks, got one of single searches"
             )
         data = data_of(ledger, runs)
+        if latex is not None and "leaderboard" not in data:
+            raise InputError("--latex must be of runs with errors, got none")
         if out is not None:
             with replaced_file(out, MARK.encode()) as building:
                 building.write_text(document(data), encoding="utf-8", newline="\n")
         if figures is not None:
             write_figures(runs, figures)
         if csv is not None:
-            write_csv(map(flat, ledger.all_rows()), csv)
+            with replaced_file(csv, CSV_MARK.encode()) as building:
+                building.unlink()
+                write_csv(_csv_rows(ledger, runs.kind), building)
+        if latex is not None:
+            with replaced_file(latex, LATEX_MARK.encode()) as building:
+                text = latex_table(runs.kind.score, data["leaderboard"])
+                building.write_text(text, encoding="utf-8", newline="\n")
     return {
         "out": out,
+        "kind": runs.kind.name,
         **dict(plain({name: data[name] for name in PRINTED if name in data})),
         "gaps": data["header"]["dropped"],
     }
@@ -66,72 +95,50 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     lines = [*report["answer"]] if "leaderboard" in report else []
     for text, details in report["header"]["problems"]:
         lines += [text, *(f"  {detail}" for detail in details)]
-    lines += _board_lines(report) if "leaderboard" in report else []
-    return (
-        lines
-        if report["out"] is None
-        else [*lines, f"written to {report['out']}: open it in any browser"]
-    )
+    if "leaderboard" in report:
+        score = KINDS[report["kind"]].score
+        lines += board_lines(score, report["leaderboard"], report["baselines"])
+    if report["out"] is not None:
+        lines.append(f"written to {report['out']}: open it in any browser")
+    return lines
 
 
-def _board_lines(report: dict[str, Any]) -> list[str]:
-    """Return the leaderboard and, below it, the baseline that skills compare with."""
-    board = report["leaderboard"]
-    score, digits = ("reached", 1) if "reached" in board[0] else ("error", 2)
-    title = {"error": "error deg", "reached": "targets %"}[score]
-
-    def number(value: float | None, digits: int) -> str:
-        return "-" if value is None else f"{value:z.{digits}f}"
-
-    def cells(row: dict[str, Any]) -> dict[str, str]:
-        """Return what stands below each title."""
-        ends = (
-            ""
-            if row["low"] is None
-            else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
-        )
-        shown = {title: number(row[score], digits), "  95 % interval": ends}
-        shown |= {
-            "  behind": number(row["behind"], digits),
-            "      p": number(row["p"], 3),
-        }
-        if score == "reached":
-            return {**shown, "   above": number(row["above"], 2)}
-        lost = "-" if row["lost"] is None else number(100.0 * row["lost"], 1)
-        shown |= {" lost in": f"{row['lost_tracks']}/{row['runs']}", "  lost %": lost}
-        return {**shown, "   skill": number(row[f"skill_{SKILL_OF}"], 2)}
-
-    width = max(len(BASELINES[SKILL_OF]), *(len(row["name"]) for row in board))
-    lines = [f"{'':{width}} {' '.join(cells(board[0]))}"]
-    lines += [
-        f"{row['name']:{width}} "
-        + " ".join(f"{v:>{len(k)}}" for k, v in cells(row).items())
-        for row in board
-    ]
-    compared = [
-        row
-        for row in report["baselines"]
-        if row["baseline"] == SKILL_OF and row["error"] is not None
-    ]
-    return lines + [
-        f"{BASELINES[SKILL_OF]:{width}} {row['error']:9.2f}" for row in compared
-    ]
+def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
+    """Yield the rows of the CSV, with the figures that are computed of a row."""
+    for row in ledger.all_rows():
+        columns = flat(row)
+        if row["status"] == "done":
+            for column in kind.columns.values():
+                if column.compute is not None:
+                    columns[column.name] = column.value(row)
+        yield columns
 
 
-def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:
-    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
-    if out is not None and not replaceable(Path(out), MARK.encode()):
-        raise InputError(
-            f"{out}: expected a new name or an earlier report, got something else"
-        )
-    places = [place for place in (out, *others) if place is not None]
-    for place in places:
-        if Path(place).resolve() == ledger.resolve() or places.count(place) > 1:
+def _check_files(files: Sequence[tuple[str | None, str]]) -> None:
+    """Raise InputError if a file cannot be written: each may replace an earlier one that begins with its mark."""
+    for place, mark in files:
+        if place is None:
+            continue
+        is_page = mark == MARK
+        if is_page and Path(place).suffix.lower() not in (".html", ".htm"):
             raise InputError(
-                f"{place}: expected a place of its own for each of what is written, got it twice"
+                f"--out must be a file that ends in .html, got {cut(place)}"
             )
-        if place != out:
-            check_new(place)
-    for place in places:
+        if not replaceable(place, mark.encode()):
+            earlier = "an earlier report" if is_page else "an earlier file of this kind"
+            raise InputError(
+                f"{place}: expected a new name or {earlier}, got something else"
+            )
+
+
+def _check_distinct(ledger: Path, places: Sequence[str | None]) -> None:
+    """Raise InputError if two outputs, or an output and the ledger, have one path, or a path is in no folder."""
+    paths = [place for place in places if place is not None]
+    resolved = [Path(place).resolve() for place in paths]
+    for place, path in zip(paths, resolved, strict=True):
+        if path == ledger.resolve() or resolved.count(path) > 1:
+            raise InputError(
+                f"two outputs, or an output and the ledger, have the same path: {place}"
+            )
+    for place in paths:
         check_place(place)

@@ -1,23 +1,23 @@
 """Statistics of repeated runs: nothing here knows of poses, sweeps or files.
 
     import numpy as np
-    from posefit.statistics.intervals import iqm_intervals
-    from posefit.statistics.ranks import wilcoxon
+    from posefit.statistics.means import run_means
+    from posefit.statistics.paired import paired_tests
 
     rng = np.random.default_rng(0)
-    errors = rng.gamma(2.0, 1.0, (3, 12, 10))              # (methods, instances, seeds); lower is better
-    print(iqm_intervals(errors, rng).values)               # interquartile mean of each method, with `low` and `high`
-    for pair in wilcoxon(errors):
-        print(pair.first, pair.second, pair.adjusted)      # signed ranks, p adjusted after Holm
+    errors = rng.gamma(2.0, 1.0, (3, 12, 10))   # (methods, instances, seeds); lower is better
+    means = run_means(errors)
+    print(means.values, means.low, means.high)
+    for pair in paired_tests(errors):
+        print(pair.first, pair.second, pair.difference, pair.adjusted)
 
-Everything that compares methods takes errors (methods, instances, seeds), paired by instance and seed. Randomness comes
-from a numpy Generator alone.
+Errors (methods, instances, seeds) are paired by instance and seed. Nothing is drawn at random: the same errors give
+the same numbers.
 
 | looking for | field's term | file |
 |---|---|---|
 | paired runs, and what can be compared of a sweep with gaps | paired, blocked design | pairing.py |
-| the mean of the middle half, with its interval | interquartile mean, studentised bootstrap | intervals.py |
-| the mean of runs of which some have a draw in common | stratified cluster sample | means.py |
-| which method is better, by order alone | Wilcoxon, Holm | ranks.py |
+| the mean of runs with its interval | stratified cluster sample, Satterthwaite | means.py |
+| which method is better, and how many runs would show it | paired t test, Holm, power | paired.py |
 | shares of runs and targets reached in time, or within an error | ECDF, ERT, performance profiles | profiles.py |
 """

@@ -1,8 +1,4 @@
-"""Runs side by side: every method on the same instances with the same seeds.
-
-Everything that compares methods takes errors (methods, instances, seeds), or one more block of them: what a run is
-judged by, an angle, a distance or a cost; lower is better.
-"""
+"""Runs side by side: every method on the same instances with the same seeds."""
 
 from dataclasses import dataclass
 
@@ -42,18 +38,11 @@ def finite(
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """The runs that some methods share, paired by instance and seed.
-
-    Means and intervals need as many seeds of every instance and have `rows`; tests work on blocks, an instance with a
-    seed, and have all `blocks` that every method has finished.
-    """
+    """The runs that some methods share, paired by instance and seed: each pair is a block."""
 
     methods: tuple[int, ...]  # that take part
-    instances: tuple[int, ...]
-    rows: Array  # (methods, instances, seeds) which row each is
-    # (methods, blocks) the same of each block; these are more where instances differ in
-    # their seeds
-    blocks: Array
+    blocks: Array  # (methods, blocks) which row each is; by instance, then by seed
+    instance: Array  # (blocks,)
     left_out: int  # runs of these methods that not all of them have
     # instances without a shared run, and the methods without any there
     missing: tuple[tuple[int, tuple[int, ...]], ...]
@@ -72,14 +61,15 @@ def most_shared(
     counts = np.bincount(runs[1])
     most_first = sorted(np.flatnonzero(counts).tolist(), key=lambda m: (-counts[m], m))
     every = _shared(runs, most_first) if most_first else None
-    if every is not None and every.rows[0].size >= MIN_SHARE * counts.max():
+    if every is not None and every.blocks.shape[1] >= MIN_SHARE * counts.max():
         return every
     best: Shared | None = None
     accepted: list[int] = []
     for m in most_first:
         candidate = _shared(runs, [*accepted, m])
         if candidate is not None and (
-            best is None or candidate.rows[0].size >= MIN_SHARE * best.rows[0].size
+            best is None
+            or candidate.blocks.shape[1] >= MIN_SHARE * best.blocks.shape[1]
         ):
             best = candidate
             accepted.append(m)
@@ -99,17 +89,14 @@ def _shared(runs: Array, methods: list[int]) -> Shared | None:
     if not everywhere.any():
         return None
     blocks = table.compress(everywhere, axis=1)
-    instances, first, counts = np.unique(
-        names[everywhere] // seeds, return_index=True, return_counts=True
-    )
+    instance_of_block = names[everywhere] // seeds
     all_instances, start = np.unique(names // seeds, return_index=True)
     absent = ~np.logical_or.reduceat(present, start, axis=1)
-    missing = np.flatnonzero(~np.isin(all_instances, instances))
+    missing = np.flatnonzero(~np.isin(all_instances, instance_of_block))
     return Shared(
         methods=tuple(methods),
-        instances=tuple(instances.tolist()),
-        rows=blocks.take(first[:, None] + np.arange(counts.min()), axis=1),
         blocks=blocks,
+        instance=instance_of_block,
         left_out=len(row) - blocks.size,
         missing=tuple(
             (int(all_instances[k]), tuple(np.array(methods)[absent[:, k]].tolist()))

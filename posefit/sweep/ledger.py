@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from posefit.errors import InputError
-from posefit.files import lock
+from posefit.files import lock, made_folders, remove_empty
 from posefit.reading import counted, cut, quoted
 from posefit.sweep.cell import Cell, CellResult, cell_from
 from posefit.sweep.check import checked_row
@@ -258,7 +258,8 @@ class Writer:
         _check_place(self.path)
         with ExitStack() as opened:
             try:
-                opened.enter_context(_undone_folders(self.path.parent))
+                made = made_folders(self.path.parent)
+                opened.push(partial(_undo_folders, made))
                 # the lock is the last to be released
                 opened.enter_context(_locked(self.path))
                 if not self.path.exists():
@@ -282,7 +283,7 @@ class Writer:
             (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
-        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.executescript("PRAGMA journal_mode = WAL")
         for later in range(form + 1, FORMAT + 1):
             self._db.executescript(
                 f"BEGIN; {MIGRATIONS[later]} PRAGMA user_version = {later}; COMMIT;"
@@ -486,18 +487,10 @@ def _check_place(path: Path) -> None:
         )
 
 
-@contextmanager
-def _undone_folders(folder: Path) -> Iterator[None]:
-    """Create a folder, and its parents; if the body fails, remove the new ones that are empty."""
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        yield
-    except BaseException:
-        for one in missing:
-            with suppress(OSError):
-                one.rmdir()
-        raise
+def _undo_folders(made: Iterable[Path], error: object, *_: object) -> None:
+    """Remove new folders that are empty, if there was an error: the exit of a context."""
+    if error is not None:
+        remove_empty(made)
 
 
 def _undo_files(path: Path, error: object, *_: object) -> None:

@@ -73,7 +73,9 @@ class Context(SpawnContext):
         super().__init__()
         self._started: list[_Process] = []
 
-    def Process(self, *arguments: Any, **more: Any) -> _Process:  # noqa: N802
+    def Process(  # type: ignore[override]  # noqa: N802, as its class is called
+        self, *arguments: Any, **more: Any
+    ) -> _Process:
         """Return a process that is to be started."""
         process = _Process(*arguments, **more)
         self._started.append(process)

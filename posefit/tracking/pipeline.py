@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, on_device
@@ -215,6 +216,11 @@ def track_hypotheses(
             frames = list(hypothesis.frames)
             of_several = f" of {which}, {hypothesis.guess}" if total > 1 else ""
             progress.log(f"going on from frame {done} of {count}{of_several}")
+            if _starts_anew(method, frames):
+                progress.warn(
+                    f"{method.name} starts anew at frame {done}: the frames from there on may be "
+                    "others than those of a track that was not interrupted"
+                )
         elif not done and total > 1:
             progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
@@ -229,7 +235,7 @@ def track_hypotheses(
                 track_hypothesis(hypothesis, method, ahead, gap, behind), count - done
             ):
                 recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
-                frames.append(frame)
+                frames.append(with_carried(frame, None))
         tracked.append(replace(hypothesis, frames=frames))
     return tracked
 
@@ -248,6 +254,7 @@ def track_hypothesis(
     back and again from there; its frame has the effort of both.
     """
     task = after(hypothesis.task, behind[0]) if behind else hypothesis.task
+    task = replace(task, resumable=True)
     frames = relocalised(task, method.follow, ahead, hypothesis.rng, gap)
     if behind:
         pivot = next(frames)
@@ -369,6 +376,12 @@ def _hypothesis(
         number, first, scene.yaw, options.first_pose == "given", estimate
     )
     return Hypothesis(guess, task, stream(options.seed, "hypothesis", number))
+
+
+def _starts_anew(method: Method, recorded: Sequence[Frame]) -> bool:
+    """Return whether what a method knew after recorded frames is lost: it is a tracker, or a filter of other values."""
+    kept = [frame.details[CARRIED] for frame in recorded if CARRIED in frame.details]
+    return method.prior is None or (bool(kept) and not kept[-1])
 
 
 def _resumed(

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.carried import with_carried
 from posefit.fitting.driving import with_evaluations
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
@@ -234,7 +235,8 @@ def after(task: Task, frame: Frame) -> Task:
         first_pose=frame.pose[3:],
         modes=(),
     )
-    return replace(first, before=(frame,))
+    # the filter that goes on from it is a new one
+    return replace(first, before=(with_carried(frame, None),))
 
 
 # While a track goes on.

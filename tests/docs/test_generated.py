@@ -3,7 +3,7 @@
 import json
 import pkgutil
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +14,22 @@ from generator.prose import restructured
 
 import posefit
 from posefit import track
+from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
 from posefit.registry import registry
+from posefit.report.leaderboard import contest_of, leaderboard
+from posefit.report.runs import runs_of
+from posefit.report.table import board_rows
+from posefit.report.write import write_report
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import DROPPED, TrackCell, run_cell
-from posefit.sweep.check import FIELDS, cell_of
+from posefit.sweep.check import FIELDS, cell_of, search_of
+from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import LISTS
-from posefit.sweep.table import flat
 from tests.docs.pages import DOCS
+from tests.report.browser import ledger, result
+from tests.report.contests import FIRST
 
 
 def rows(page: str) -> set[str]:
@@ -64,21 +71,44 @@ def test_every_column_of_frames_csv_is_described(tracked: Path) -> None:
     ] == list(figures.FRAME)
 
 
-def test_every_column_of_a_sweeps_csv_is_described() -> None:
-    row = run_cell(
-        cell_of(
-            {"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80}
-        )
-    ).row
-    described = rows(figures.page()) | rows(
-        (DOCS / "howto" / "plan.md").read_text("utf-8")
-    )
-    names = [
-        column for column in flat(row) if not column.startswith("joint_errors_mm.")
+def columns_of(page: str, heading: str) -> set[str]:
+    """Return the columns that a section of a page describes."""
+    section = page.partition(f"## Columns of {heading}")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (`.+?`) \|", section, re.MULTILINE)
+    return {name for row in rows for name in re.findall(r"`([^`]+)`", row)}
+
+
+def test_every_column_of_a_sweeps_csv_is_described(tmp_path: Path) -> None:
+    small = {"motion": "walk", "frames": 2, "evaluations": 80}
+    problem = {"suite": "posefit-2026.3", "function": 1, "dimension": 9, "instance": 3}
+    rows_of_cells = [
+        run_cell(cell_of({"method": "sapso@pca", **small})),
+        run_cell(cell_of({"method": "exemplars", **small, "evaluations": 800})),
+        run_cell(search_of({"method": "random", **problem, "seed": 1, "budget": 5})),
     ]
-    assert [
-        name for name in names if not described & {name, name.partition(".")[0]}
-    ] == []
+    described = columns_of(figures.page(), "a sweep's CSV")
+    present: set[str] = set()
+    for k, made in enumerate(rows_of_cells):
+        path = ledger(tmp_path / f"results-{k}", [made])
+        write_report(str(path), None, csv=str(tmp_path / f"{k}.csv"))
+        present |= set(head_of(tmp_path / f"{k}.csv"))
+    joints = {name for name in present if name.startswith("joint_errors_mm.")}
+    assert len(joints) == len(JOINTS)
+    # without a value they have one column
+    whole = {"coverage", "interval_mm"}
+    assert present - joints - whole == described - {"joint_errors_mm.JOINT"}
+
+
+def test_every_column_of_a_leaderboard_is_described(tmp_path: Path) -> None:
+    made = [result(replace(FIRST, method=m), 1.0) for m in "ab"]
+    path = ledger(tmp_path / "results", made)
+    with Ledger(path) as opened:
+        runs = runs_of(opened)
+    contest = contest_of(runs)
+    assert contest is not None
+    columns = set(board_rows(runs, leaderboard(contest))[0])
+    described = columns_of(figures.page(), "`leaderboard.csv`")
+    assert columns - {"method", "settings", *runs.table_figures} == described
 
 
 def test_every_angle_is_described(tracked: Path) -> None:

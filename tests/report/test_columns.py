@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from posefit.evaluation.measures import BASELINES, MEASURES
 from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import run_cell
+from posefit.sweep.table import flat
 from tests.report.contests import FIRST
 
 COLUMNS = TRACKS.columns
@@ -23,32 +23,22 @@ def row():
 def test_every_figure_has_its_place_in_a_row(row):
     values = {name: column.value(row) for name, column in COLUMNS.items()}
     assert all(map(math.isfinite, values.values()))
-    expected = {
-        "coverage_80": row["coverage"]["80"],
-        "interval_95": row["interval_mm"]["95"],
-        "unknown": row["unknown_rate"],
-        "error": row["error_degrees"]["mean"],
-        "ms": 1e3 * row["seconds_per_frame"],
-        "cpu_ms": 1e3 * row["cpu_seconds_per_frame"],
-        "evaluations": row["evaluations_used"] / 3,
-        **{f"skill_{name}": row["skill"][name] for name in BASELINES},
-        **{f"baseline_{name}": row["baselines_degrees"][name] for name in BASELINES},
+    columns = flat(row)
+    named = {
+        name: columns[name] for name, column in COLUMNS.items() if not column.compute
     }
-    assert {name: values[name] for name in expected} == expected
+    assert {name: values[name] for name in named} == named
+    assert {name for name in values if name not in named} == {
+        "error_with_losses_degrees"
+    }
 
 
-def test_a_figure_is_shown_as_that_of_a_single_track_is(row):
-    renamed = {"evaluations_used": "evaluations"}
-    for name, column in COLUMNS.items():
-        raw = row
-        for part in column.path:
-            raw = raw[part]
-        if column.per_frame:
-            raw /= row["spec"]["frames"]
-        place = column.path[0]
-        measure = MEASURES[renamed.get(place, place)]
-        shown = column.measure.factor * column.value(row)
-        assert shown == pytest.approx(measure.factor * raw), name
+def test_figures_have_the_units_of_the_csv_and_pages_multiply_them(row):
+    assert COLUMNS["cpu_seconds_per_frame"].value(row) == row["cpu_seconds_per_frame"]
+    shown = COLUMNS["cpu_seconds_per_frame"].as_dict()
+    assert (shown["title"], shown["factor"]) == ("CPU time ms a frame", 1e3)
+    shown = COLUMNS["coverage.80"].as_dict()
+    assert (shown["title"], shown["factor"]) == ("80 % interval holds %", 100.0)
 
 
 def test_a_row_has_how_often_the_likeliest_mode_was_right(row):

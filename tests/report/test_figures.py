@@ -5,6 +5,8 @@ import pytest
 
 from posefit.report import figures
 from posefit.report.charts import Chart, Line
+from posefit.report.page import LIGHT
+from posefit.report.tracks import SCORE
 
 pytest.importorskip("matplotlib")
 
@@ -13,7 +15,7 @@ GRID = np.array([40.0, 400.0, 2440.0])
 
 def axes_of(line, **more):
     chart = Chart(name="a", title="A", x_label="x", y_label="y", lines=[line], **more)
-    return figures.chart_figure(["cma_$x$@full"], chart).axes[0]
+    return figures.chart_figure(["cma_$x$@full"], chart, [8], [0]).axes[0]
 
 
 def test_lines_and_bands_have_their_values():
@@ -22,12 +24,41 @@ def test_lines_and_bands_have_their_values():
     assert axes.lines[0].get_ydata().tolist() == [9, 5, 3]
     band = axes.collections[0].get_paths()[0].vertices
     assert (band[:, 1].min(), band[:, 1].max()) == (2.5, 10.0)
+    # steps: no corner between two of the values
+    assert set(band[:, 1].tolist()) <= {*(values - 0.5), *(values + 1.0)}
     assert axes.get_xscale() == "log"
-    line = axes_of(Line(GRID, np.array([0.1, 0.5, 1.0])), stepped=True, most=1.0).lines[
-        0
-    ]
+    line = axes_of(Line(GRID, np.array([0.1, 0.5, 1.0])), most=1.0).lines[0]
     assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (
         GRID.tolist(),
         [0.1, 0.5, 1.0],
     )
     assert line.get_drawstyle() == "steps-post"
+
+
+def test_a_method_has_the_colour_of_the_page_and_the_legend_the_leaderboards_order():
+    lines = [Line(GRID, np.full(3, float(k))) for k in range(3)]
+    chart = Chart(name="a", title="A", x_label="x", y_label="y", lines=lines)
+    figure = figures.chart_figure(["a", "b", "c"], chart, [9, 1, 0], [2, 0, 1])
+    drawn = {line.get_label(): line for line in figure.axes[0].lines}
+    colours = [*LIGHT.values()]
+    assert [drawn[name].get_color() for name in "abc"] == [
+        colours[2], colours[1], colours[0],
+    ]  # fmt: skip
+    assert drawn["a"].get_linestyle() == "--"  # of the second seven
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "c",
+        "a",
+        "b",
+    ]
+
+
+def test_the_leaderboard_is_a_picture_with_its_rows_from_top_to_bottom():
+    row = {"low": 0.5, "high": 1.5, SCORE.name: 1.0, "name": "a", "method": 2}
+    other = {**row, "low": None, "high": None, SCORE.name: 2.0, "name": "b"}
+    axes = figures.board_figure(SCORE, [row, other], [("mean pose", 4.0)]).axes[0]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["a", "b"]
+    assert axes.yaxis_inverted()
+    interval, first, second, baseline = axes.lines
+    assert list(interval.get_xdata()) == [0.5, 1.5]
+    assert [float(one.get_xdata()[0]) for one in (first, second, baseline)] == [1, 2, 4]
+    assert first.get_color() == [*LIGHT.values()][2]

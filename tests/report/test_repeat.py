@@ -1,5 +1,6 @@
 """The command of a row runs it again."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -15,6 +16,8 @@ from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import run_cell
 from posefit.sweep.check import cell_of, search_of
 from posefit.sweep.plan import Plan
+from tests.commands import error_of, run
+from tests.report.browser import ledger
 from tests.sweep.fake import cells, rows_in
 
 SMALL: dict[str, Any] = {"frames": 2, "size": [80, 60], "evaluations": 80}
@@ -112,3 +115,44 @@ def test_nothing_in_a_name_ends_the_plan_or_reaches_the_shell() -> None:
         (cell,) = plan_in(command)["cells"]
         assert cell.items() >= {"motion": name, "train": [name], **more}.items()
         assert "END" not in command.split("\n")[1:-1]
+
+
+def test_a_row_is_run_again_by_the_first_digits_of_its_key(tmp_path: Path) -> None:
+    made = [run_cell(cell_of(SMALL | spec)) for spec in SPECS[:2]]
+    path = ledger(tmp_path / "results", made)
+    key = made[0].row["key"]
+    done = run("rerun", path, key[:8], "--out", tmp_path / "again")
+    assert (done.exit_code, done.stdout) == (
+        0,
+        "every figure but the times is the same\n",
+    )
+    (row,) = rows_in(tmp_path / "again")
+    assert row["key"] == key
+
+
+def test_what_differs_in_a_row_that_is_run_again_is_printed(tmp_path: Path) -> None:
+    made = run_cell(cell_of(SMALL | SPECS[0]))
+    iou = made.row["iou"]
+    made.row["iou"] = 0.25
+    path = ledger(tmp_path / "results", [made])
+    done = run("rerun", path, made.row["key"][:8], "--json")
+    assert done.exit_code == 1
+    assert json.loads(done.stdout) == {
+        "same": False,
+        "differences": [f"iou: 0.25 before, {iou} now"],
+    }
+    assert [entry.name for entry in tmp_path.iterdir()] == ["results"]
+
+
+def test_a_key_that_no_row_or_several_have_is_one_line(tmp_path: Path) -> None:
+    made = []
+    for seed in range(1000):
+        cell = cell_of(SMALL | SPECS[0] | {"seed": seed})
+        if cell.key.startswith("0") and len(made) < 2:
+            made.append(run_cell(cell))
+    path = ledger(tmp_path / "results", made)
+    assert "whose key begins with 'xyz', got none" in error_of("rerun", path, "xyz")
+    assert "must be the first digits of a row's key, got none" in error_of(
+        "rerun", path, ""
+    )
+    assert "got 2: give more digits" in error_of("rerun", path, "0")

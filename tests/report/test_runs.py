@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from posefit.report.kind import Runs
 from posefit.report.runs import distinct
@@ -100,7 +101,7 @@ def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(
     runs = read(tmp_path / "a", *made)
     mixed = read(tmp_path / "b", *random.Random(0).sample(made, len(made)))
     assert runs.keys == mixed.keys
-    assert (runs.figures["error"] == mixed.figures["error"]).all()
+    assert (runs.scores == mixed.scores).all()
     assert runs.heads == mixed.heads
     assert (runs.head == mixed.head).all()
 
@@ -120,13 +121,13 @@ def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
         ),
     )
     assert {name for name in TRACKS.columns if np.isnan(runs.figures[name][0])} == {
-        "error", "skill_mean_pose", "baseline_mean_pose", "baseline_persistence", "baseline_nearest", "unknown",
-        *(f"{kind}_{level}" for kind in ("coverage", "interval") for level in (50, 80, 95)),
+        "error_with_losses_degrees", "error_degrees.mean", "skill.mean_pose", "unknown_rate",
+        *(f"baselines_degrees.{name}" for name in ("mean_pose", "persistence", "nearest")),
+        *(f"{kind}.{level}" for kind in ("coverage", "interval_mm") for level in (50, 80, 95)),
     }  # fmt: skip
-    figures = [
-        runs.figures[name].item() for name in ("skill_nearest", "evaluations", "ms")
-    ]
-    assert figures == [0.25, FIRST.evaluations, 10.0]
+    names = ("skill.nearest", "evaluations_used", "seconds_per_frame")
+    figures = [runs.figures[name].item() for name in names]
+    assert figures == [0.25, FIRST.evaluations * FIRST.frames, 0.01]
     assert len(runs.data["traces"][0][0]) == 0
 
 
@@ -136,3 +137,44 @@ def test_seeds_of_any_size_keep_every_digit(tmp_path: Path) -> None:
         *(result(replace(FIRST, seed=seed), 1.0) for seed in (2**70 + 1, 2**70)),
     )
     assert [runs.seeds[k] for k in runs.seed] == [2**70, 2**70 + 1]
+
+
+def test_reports_of_some_methods_name_them_as_the_report_of_all_does(
+    tmp_path: Path,
+) -> None:
+    made = [
+        result(SAPSO, 3.0),
+        result(COOLER, 2.0),
+        result(FIRST, 1.0),
+        result(replace(FIRST, instance=5), 1.0),
+    ]
+    path = ledger(tmp_path / "results", made, [(replace(SAPSO, seed=9), ["no"])])
+    both = ("sapso@pca (cooling 0.9)", "sapso@pca")
+    runs = runs_in(path, "sapso@pca")
+    assert runs.methods == both
+    assert runs.failed == (0, 1)
+    assert runs.instances == ("walk, view 45°, instance 0",)
+    assert runs_in(path, both[0]).methods == both[:1]
+    assert len(runs_in(path, both[0]).failures) == 0
+    everything = runs_in(path)
+    some = runs_in(path, "sapso@pca", "random@pca")
+    assert (some.methods, some.keys) == (everything.methods, everything.keys)
+    with pytest.raises(ValueError, match="got 'sapso'; did you mean 'sapso@pca'"):
+        runs_in(path, "sapso")
+
+
+def test_of_versions_the_installed_one_counts_or_else_the_last(tmp_path: Path) -> None:
+    def of(version: str, seed: int = 0, **more: Any) -> CellResult:
+        return result(replace(FIRST, version=version, seed=seed, **more), 1.0)
+
+    old, older = "posefit 0.0.2 bb", "posefit 0.0.1 aa"
+    now = FIRST.version
+    runs = runs_in(ledger(tmp_path / "a", [of(now), of(older), of(old)]), latest=True)
+    assert (runs.methods, runs.values("version")) == (("random@pca",), [now])
+    runs = runs_in(ledger(tmp_path / "b", [of(older), of(old, 1)]), latest=True)
+    assert (runs.values("version"), runs.seeds) == ([old], (1,))
+    # another setting is another method
+    warm = {"settings": {"pca.components": 4}}
+    runs = runs_in(ledger(tmp_path / "c", [of(older, **warm), of(now)]), latest=True)
+    assert len(runs.methods) == 2
+    assert len(runs_in(tmp_path / "a").methods) == 3

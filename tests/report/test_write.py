@@ -89,12 +89,12 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(
     lines, page = written(results)
     assert lines[-1] == f"written to {tmp_path / 'report.html'}: open it in any browser"
     assert lines[0].startswith(
-        "sapso@pca leads with an error of 1.06° on 2 instances of walk with 2 seeds each."
+        "No method leads; sapso@pca, which comes first, lost frames in none of 4 tracks"
     )
-    assert lines[4] == "1 cell failed, left out of all figures: random@pca 1"
-    assert [line.split()[:6] for line in lines[8:-1]] == [
-        ["sapso@pca", "1.06", "-", "-", "0/4", "0.0"],
-        ["random@pca", "2.06", "1.00", "0.125", "0/4", "0.0"],
+    first = lines.index("1 cell failed, left out of all figures: random@pca 1")
+    assert [line.split()[:6] for line in lines[first + 4 : -1]] == [
+        ["sapso@pca", "1.06", "-", "-", "-", "0/4"],
+        ["random@pca", "2.06", "-", "1.00", "0.125", "0/4"],
         ["mean", "training", "pose", "4.00"],
     ]
     links = re.findall(r'\s(?:src|href|action)="([^"]*)"', page)
@@ -111,7 +111,7 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(
     assert not [
         name
         for name in (*data["columns"], *data["rows"])
-        if re.match("coverage|interval|unknown", name)
+        if re.match("coverage|interval_mm|unknown", name)
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "report.html",
@@ -137,7 +137,7 @@ def test_a_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(
         "sapso@pca",
         "random@pca",
     ]
-    assert printed["leaderboard"][0]["skill_mean_pose"] == pytest.approx(
+    assert printed["leaderboard"][0]["skill.mean_pose"] == pytest.approx(
         1.0 - 1.06 / 4.0
     )
     assert {row["baseline"] for row in printed["baselines"]} == {
@@ -163,7 +163,8 @@ def test_failures_and_instances_left_out_are_named_above_the_leaderboard(
         for s in range(2)
     ]
     lines, page = written(ledger(tmp_path / "results", made, lost))
-    assert lines[4:9] == [
+    first = lines.index("2 cells failed, left out of all figures: sapso@pca 2")
+    assert lines[first : first + 5] == [
         "2 cells failed, left out of all figures: sapso@pca 2",
         "  2 x its process died of SIGSEGV",
         "2 finished runs are left out of the comparison, as some method has no run to pair them with",
@@ -171,8 +172,8 @@ def test_failures_and_instances_left_out_are_named_above_the_leaderboard(
         "  walk, view 45°, instance 1: no run of sapso@pca",
     ]
     assert (
-        " ".join(lines[9].split())
-        == "error deg 95 % interval behind p lost in lost % skill"
+        " ".join(lines[first + 5].split())
+        == "error with losses 95 % interval behind p lost in lost % skill"
     )
     assert data_in(page)["header"]["dropped"] == [
         {"instance": "walk, view 45°, instance 1", "missing": ["sapso@pca"]}
@@ -201,7 +202,7 @@ def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> Non
     written(results, "--figures", figures, "--csv", rows)
     drawn = {
         f"{name}.{kind}"
-        for name in ("convergence", "profile")
+        for name in ("leaderboard", "convergence", "profile")
         for kind in ("png", "pdf")
     }
     assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.csv"}
@@ -225,7 +226,7 @@ def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
         ledger(tmp_path / "results", made), "--figures", figures, "--csv", rows
     )
     head, first, *_ = (figures / "leaderboard.csv").read_text().splitlines()
-    assert "flagged unknown,80 % interval holds,80 % interval (mm)" in head
+    assert "unknown_rate,coverage.80,interval_mm.80" in head
     assert ",0.8,60.0," in first
     row = csv_rows(rows)[0]
     assert (row["interval_mm.80"], row["coverage.80"]) == ("60.0", "0.8")
@@ -236,7 +237,7 @@ def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
         False,
         True,
     ]
-    assert data["rows"]["coverage_80"] == [0.8] * 4 + [None] * 2
+    assert data["rows"]["coverage.80"] == [0.8] * 4 + [None] * 2
 
 
 MISTAKES = [
@@ -261,16 +262,23 @@ MISTAKES = [
     ("results --out none/OUT.html", "expected a place to write to, got one in "),
     (
         "results --out OUT.html --csv OTHER.html",
-        "expected a new name to write to, got one that exists",
+        "expected a new name or an earlier file of this kind, got something else",
     ),
     (
-        "results --out OUT.html --figures results",
-        "expected a place of its own for each",
+        "results --latex OTHER.html",
+        "expected a new name or an earlier file of this kind, got something else",
+    ),
+    ("results --figures results", "have the same path"),
+    ("results --csv OUT --latex OUT", "two outputs, or an output and the ledger, have"),
+    (
+        "results --out OUT.html --figures DIR.html",
+        "expected a new name or an earlier folder of figures, got something else",
     ),
     (
         "results --out OUT.html --figures none/OUT",
         "expected a place to write to, got one in ",
     ),
+    ("results --methods sapso", "got 'sapso'; did you mean 'sapso@pca'?"),
 ]
 
 
@@ -281,7 +289,7 @@ def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) 
     before = sorted(tmp_path.rglob("*"))
     for words, message in MISTAKES:
         arguments = [
-            word if re.match(r"--|\d", word) else tmp_path / word
+            word if re.match(r"--|\d|sapso", word) else tmp_path / word
             for word in words.split()
         ]
         assert message in error_of("report", *arguments), words
@@ -293,6 +301,74 @@ def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) 
         # SQLite has these beside a ledger as long as somebody reads it
         assert after == before, words
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
+
+
+def test_what_an_earlier_report_wrote_is_replaced_by_every_option(
+    results: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    places = {
+        "--csv": tmp_path / "rows.csv",
+        "--figures": tmp_path / "figures",
+        "--latex": tmp_path / "table.tex",
+    }
+    words = [word for pair in places.items() for word in pair]
+    written(results, *words)
+    tables = [tmp_path / "figures/leaderboard.csv", tmp_path / "table.tex"]
+    before = [path.read_bytes() for path in tables]
+    places["--csv"].write_text("key,version,status,of another day")
+    written(results, *words, "--methods", "sapso@pca")
+    assert len(csv_rows(places["--csv"])) == 9
+    for path, earlier in zip(tables, before, strict=True):
+        assert b"random@pca" in earlier
+        assert b"random@pca" not in path.read_bytes()
+    (tmp_path / "figures" / "mine.txt").write_text("")
+    line = error_of("report", results, "--figures", places["--figures"])
+    assert "expected a new name or an earlier folder of figures, got something" in line
+    assert (tmp_path / "figures" / "mine.txt").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "figures", "report.html", "results", "rows.csv", "table.tex",
+    ]  # fmt: skip
+
+
+def test_the_leaderboards_csv_has_all_that_the_page_has_of_a_method(
+    results: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    _, page = written(results, "--figures", tmp_path / "figures")
+    rows = csv_rows(tmp_path / "figures" / "leaderboard.csv")
+    data = data_in(page)
+    assert len(rows) == len(data["leaderboard"])
+    for made, shown in zip(rows, data["leaderboard"], strict=True):
+        assert made["method"] == shown["name"]
+        assert set(data["columns"]) < set(made)
+        for name, value in shown.items():
+            if name in ("name", "method", "settings", "taking_part"):
+                continue
+            if value is None:
+                assert made.get(name, "") in ("", "nan", "inf"), name
+            elif name in made:
+                assert float(made[name]) == pytest.approx(value, rel=1e-4), name
+    assert {"lost_tracks", "behind", "behind_low", "p", "blocks_needed"} < set(rows[0])
+
+
+def test_a_latex_table_has_the_leaderboard_with_its_signs_escaped(
+    tmp_path: Path,
+) -> None:
+    cells = [
+        replace(FIRST, method=m, name="a_b & 5 % {x}" if m == "b" else "", seed=s)
+        for m in "ab"
+        for s in range(12)
+    ]
+    made = [result(cell, 1.0 + 6.0 * (cell.method == "b")) for cell in cells]
+    place = tmp_path / "table.tex"
+    written(ledger(tmp_path / "results", made), "--latex", place)
+    lines = place.read_text().splitlines()
+    assert lines[1] == r"\begin{tabular}{lrrrrrrr}"
+    assert lines[5] == r"a & 1.00 & 1.00 to 1.00 & -- & -- & 0/12 & 0.0 & 0.75 \\"
+    assert lines[6] == (
+        r"a\_b \& 5 \% \{x\} & 7.00 & 7.00 to 7.00 & 6.00 & $<$ 0.001 & 0/12 & 0.0 & $-$0.75 \\"
+    )
 
 
 def test_without_matplotlib_figures_are_one_line_and_nothing_is_written(

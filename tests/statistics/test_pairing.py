@@ -25,32 +25,17 @@ def of(runs: list[tuple[int, int, int]], errors: list[float] | None = None) -> A
 def test_runs_are_paired_in_whatever_order_they_come() -> None:
     order = np.random.default_rng(0).permutation(len(ALL))
     shared = of([ALL[k] for k in order])
-    assert (shared.methods, shared.instances, shared.left_out, shared.missing) == (
-        (0, 1),
-        (2, 7),
-        0,
-        (),
-    )
-    assert [ALL[order[k]] for k in shared.rows.ravel()] == ALL
-    assert shared.blocks.tolist() == shared.rows.reshape(2, -1).tolist()
+    assert (shared.methods, shared.left_out, shared.missing) == ((0, 1), 0, ())
+    assert [ALL[order[k]] for k in shared.blocks.ravel()] == ALL
+    assert shared.instance.tolist() == [2, 2, 7, 7]
 
 
-def test_instances_may_have_seeds_of_their_own_but_as_many() -> None:
-    assert of([(0, 0, 5), (0, 1, 6)]).rows.tolist() == [[[0], [1]]]
-
-
-def test_means_have_the_lowest_shared_seeds_of_every_instance_and_tests_all_blocks() -> (
-    None
-):
+def test_instances_may_have_seeds_of_their_own_and_more_or_fewer() -> None:
+    assert of([(0, 0, 5), (0, 1, 6)]).blocks.tolist() == [[0, 1]]
     runs = [run for run in ALL if run != (1, 2, 0)]
     shared = of(runs)
-    assert [runs[k] for k in shared.rows.ravel()] == [
-        (0, 2, 1),
-        (0, 7, 0),
-        (1, 2, 1),
-        (1, 7, 0),
-    ]
     assert [runs[k] for k in shared.blocks[1]] == [(1, 2, 1), (1, 7, 0), (1, 7, 1)]
+    assert shared.instance.tolist() == [2, 7, 7]
     assert shared.left_out == 1
 
 
@@ -59,7 +44,7 @@ def test_an_error_that_is_nan_is_a_gap_and_an_instance_without_a_shared_run_is_m
 ):
     runs = [*ALL, (0, 9, 0), (1, 9, 0), (0, 11, 0), (1, 11, 1)]
     shared = of(runs, [1.0] * len(ALL) + [1.0, np.nan, 1.0, 1.0])
-    assert (shared.instances, shared.left_out) == ((2, 7), 3)
+    assert (shared.instance.tolist(), shared.left_out) == ([2, 2, 7, 7], 3)
     # the last has a run of each, but none with the same seed
     assert shared.missing == ((9, (1,)), (11, ()))
 

@@ -1,5 +1,7 @@
 // One method compared with all others, by paired tests and instance by instance.
 const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
+const MAX_NEEDED = 1e6;
+const neededRuns = (count) => (count > MAX_NEEDED ? `more than ${whole(MAX_NEEDED)}` : whole(count));
 const twoDigits = (value) => number(value, 2);
 const verdict = (row) => (row.adjusted >= 0.05 ? "no difference shown" : row.difference < 0 ? "better" : "worse");
 
@@ -10,29 +12,32 @@ function duelsOf(m) {
   const minus = (value) => (given(value) ? -value : null);
   return P.pairs
     .filter((pair) => pair.slice(0, 2).includes(place))
-    .map(([first, second, difference, from, to, p, adjusted]) =>
+    .map(([first, second, difference, from, to, p, adjusted, needed]) =>
       first === place
-        ? { other: P.methods[second], difference, from, to, p, adjusted }
-        : { other: P.methods[first], difference: -difference, from: minus(to), to: minus(from), p, adjusted },
+        ? { other: P.methods[second], difference, from, to, p, adjusted, needed }
+        : { other: P.methods[first], difference: -difference, from: minus(to), to: minus(from), p, adjusted, needed },
     );
 }
 
 function comparison() {
   const P = D.pairs;
   $("pairs-note").textContent = P
-    ? `Wilcoxon's signed ranks over ${whole(P.blocks)} pairs of instance and seed. Seeds of one instance are not ` +
-      "independent: all of it holds for these instances."
+    ? `Paired t tests of the errors with losses, over ${whole(P.blocks)} pairs of instance and seed. Seeds of one ` +
+      "instance are not independent: all of it holds for these instances."
     : "Tests need two methods that share at least two runs.";
   const columns = [
     methodColumn("other"),
-    column("median difference °", "difference", twoDigits, {
+    column("mean difference °", "difference", twoDigits, {
       about: "Below 0 the chosen method is better",
       down: true,
     }),
-    intervalColumn("Of the median, from six runs on", "difference", 2, ["from", "to"]),
+    intervalColumn("Of the mean difference, adjusted as p after Holm is", "difference", 2, ["from", "to"]),
     column("p", "p", probability),
     column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P?.pairs.length} comparisons` }),
     textColumn("verdict", verdict),
+    column("runs needed", "needed", neededRuns, {
+      about: "Paired runs that would show such a difference with a probability of 80 %",
+    }),
   ];
   const show = (m) => {
     const duels = P?.methods.includes(m) ? duelsOf(m) : [];
@@ -45,10 +50,10 @@ function comparison() {
   show(first);
 }
 
-// Each instance's mean errors over seeds: of a method, and of the best other one.
+// Each instance's mean errors with losses over seeds: of a method, and of the best other one.
 function against(m) {
   const sums = INSTANCES.map(() => METHODS.map(() => [0, 0]));
-  D.rows.error.forEach((error, k) => {
+  D.rows[D.score.name].forEach((error, k) => {
     const sum = sums[D.rows.instance[k]][D.rows.method[k]];
     if (given(error)) [sum[0], sum[1]] = [sum[0] + error, sum[1] + 1];
   });
@@ -62,7 +67,7 @@ function against(m) {
   const best = (least, row) => [number(least, 2), make("small", {}, METHODS[row.best])];
   const columns = [
     textColumn("instance", "instance", (k) => INSTANCES[k]),
-    figure("error"),
+    figure(D.score.name, "error"),
     column("rank", "rank", (rank, row) => `${rank} of ${row.of}`),
     column("best other °", "least", best),
     column("behind it by °", (row) => (given(row.least) ? row.error - row.least : null), twoDigits, { down: true }),

@@ -18,8 +18,8 @@ function firstScreen() {
   const notes = [D.score.caption];
   if (rows.some((row) => given(row.p)))
     notes.push(
-      "Below a name: how far it is behind the leader, the median of paired runs, with its 95 % interval and p, " +
-        "Wilcoxon's after Holm: below 0.05 a difference is shown.",
+      "Below a name: how far it is behind the first method, the mean of paired runs, with its 95 % interval and p by a " +
+        "paired t test, both after Holm: where p is below 0.05 a difference is shown.",
     );
   if (rows.length > MAX_METHODS) notes.push(`The table has ${counted(rows.length - MAX_METHODS, "more method")}.`);
   $("standing-note").textContent = notes.join(" ");
@@ -27,22 +27,25 @@ function firstScreen() {
   drawn($("standing"), (width) => forest(width, rows.slice(0, MAX_METHODS), lines));
 }
 
-// How far a method is behind the leader, how certain that is, and in how many tracks it loses frames.
+// How far a method is behind the first, how certain that is, and in how many tracks it loses frames.
 function behind(row) {
   const { digits, points } = D.score;
   const signed = (value) => `${value > 0 ? "+" : ""}${number(value, digits)}`;
+  const p = (value) => (value < 0.001 ? "p < 0.001" : `p = ${probability(value)}`);
   const ends = given(row.behind_low) ? ` (${signed(row.behind_low)} to ${signed(row.behind_high)})` : "";
   const lost = row.lost_tracks ? `lost in ${row.lost_tracks} of ${counted(row.runs, "track")}` : null;
-  const effect = given(row.p) ? `${signed(row.behind)}${points}${ends}, p ${probability(row.p)}` : null;
+  const effect = given(row.p) ? `${signed(row.behind)}${points}${ends}, ${p(row.p)}` : null;
   return [effect, lost].filter(Boolean).join("; ");
 }
 
 // A row a method with its interval, the first one in bold, and a line a baseline.
 function forest(width, rows, bases) {
   const { name: of, digits, unit, down } = D.score;
-  const [left, right, line] = [14, 12, 15];
+  const [left, right, line] = [14, 12, 16];
   // a logarithmic scale where less is better and the worst is far from the best
-  const values = [...rows, ...bases].flatMap((row) => [row[of], row.low, row.high].filter((value) => value > 0));
+  const values = [...rows, ...bases].flatMap((row) =>
+    [row[of], row.low, row.high].filter((value) => given(value) && value > 0),
+  );
   const [least, most] = [Math.min(...values), Math.max(...values)];
   const log = !down && most > 15 * least;
   const [from, to] = log ? [0.8 * least, 1.15 * most] : [0, 1.05 * most || 1];
@@ -65,6 +68,8 @@ function forest(width, rows, bases) {
   });
   const name = `${D.score.axis}, with 95 % intervals: ${titles.join("; ")}`;
   const { svg, at } = axes({ width, height: bottom + 40, left, right, top, bottom: 40, name }, x);
+  // not clamped, so that an interval may go beyond the axis
+  const free = (value) => (value < from ? left - 9 : at(value));
   // a baseline's name stands to the right of its line, in a row of its own
   bases.forEach((row, k) => {
     const [text, y] = [`${row.name} ${scored(row[of])}`, 16 * (bases.length - 1 - k)];
@@ -75,8 +80,8 @@ function forest(width, rows, bases) {
   rows.forEach((row, place) => {
     const { start, texts, y } = places[place];
     svg.append(...texts.map(([text, kind], k) => drawText(left, start + line * (k + 1), text, { class: kind })));
-    if (given(row.low))
-      svg.append(drawLine(at(row.low), y, at(row.high), y, { ...stroke(row.method, 3), "stroke-dasharray": null }));
+    const about = { ...stroke(row.method, 3), "stroke-dasharray": null };
+    if (given(row.low)) svg.append(...interval({ at: free, left, right: width - right }, y, row.low, row.high, about));
     svg.append(mark(row.method, at(row[of]), y, 5.5, titles[place]));
   });
   return svg;

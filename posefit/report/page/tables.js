@@ -1,6 +1,6 @@
 // Tables that any column sorts; leaderboard, all runs, running times, failures; the command that runs a cell again.
 const PAGE = 25; // rows
-const FEW = ["error", "lost", "ms"]; // figures of a run that need no button
+const FEW = ["error_with_losses_degrees", "lost_rate", "seconds_per_frame"]; // figures of a run that need no button
 
 // A column: its title, `of` to sort by, a name in a row or a function of the row, and how a value is shown.
 const pick = (of) => (typeof of === "string" ? (row) => row[of] : of);
@@ -14,7 +14,7 @@ const methodColumn = (of) => {
   const name = (row) => METHODS[pick(of)(row)];
   return textColumn("method", name, (text, row) => [swatch(pick(of)(row)), text]);
 };
-const buttonColumn = (unseen, show) => ({ unseen, text: true, show });
+const buttonColumn = (title, show) => ({ title, text: true, show });
 const intervalColumn = (about, of, digits, [low, high] = ["low", "high"]) => {
   const ends = (row) => `${number(row[low], digits)} – ${number(row[high], digits)}`;
   return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : "–") };
@@ -36,8 +36,7 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
   };
   const kinds = (one) => ["text", "more"].filter((word) => one[word]).join(" ") || null;
   const heads = columns.map((one, k) => {
-    const content = one.title ?? make("span", { class: "unseen" }, one.unseen);
-    const head = one.value ? button(one.title, () => sort(k), { title: one.about }) : content;
+    const head = one.value ? button(one.title, () => sort(k), { title: one.about }) : one.title;
     return make("th", { scope: "col", class: kinds(one) }, head);
   });
   const pager = make("div", { class: "row pager" });
@@ -93,13 +92,13 @@ function leaderboard() {
   const settings = (row) => make("small", {}, D.methods[row.method].settings || "default settings");
   const method = (text, row) => (row.baseline ? text : [swatch(row.method), text, settings(row)]);
   const width = (row) => (given(row.low) ? row.high - row.low : null);
-  const about = `The median of the differences from the leader in paired ${paired}`;
+  const about = `The mean difference from the first method in paired ${paired}`;
   const first = [
     textColumn("method", name, method),
     figure(score),
     intervalColumn("Sorts by its width", width, digits),
     column(`behind ${points.trim()}`, "behind", (value) => number(value, digits), { about }),
-    column("p", "p", probability, { about: "Of that difference: Wilcoxon's signed ranks, after Holm over all pairs" }),
+    column("p", "p", probability, { about: "Of that difference: a paired t test, after Holm over all pairs" }),
     column("lost in", "lost_tracks", (count, row) => `${count} of ${row.runs}`, { about: "Tracks that lost frames" }),
     column("failed", "failed", bad),
     ...(D.warnings.length ? [column("warned", "warned", bad, { about: "Runs with a warning" })] : []),
@@ -108,18 +107,22 @@ function leaderboard() {
     ...first.filter(({ value }) => D.leaderboard.some((row) => given(value(row)))),
     ...Object.keys(D.columns).flatMap((one) => (one === score ? [] : [further(figure(one))])),
     further(column("runs", "runs", whole, { down: true })),
+    further(
+      column("runs needed", "blocks_needed", neededRuns, { about: `Paired ${paired} that would show that difference` }),
+    ),
   ];
   const kind = (row) => (row.baseline ? "base" : null);
   table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
 }
 
-// The button for the command that runs a row again.
+// The command that runs a row again, and a button for one that needs no ledger.
+const rerun = (key) => make("code", {}, `posefit rerun ${D.ledger} ${key}`);
 function repeatButton(k) {
   const R = D.rows;
   const seed = D.seeds[R.seed[k]];
   const name = `${METHODS[R.method[k]]} on ${INSTANCES[R.instance[k]]}, seed ${seed}`;
   const text = `${D.heads[R.head[k]]}instance = ${D.instances[R.instance[k]].number}\nseed = ${seed}\nEND`;
-  return button("command", () => showCommand(name, text), { title: "The command that runs it again" });
+  return [rerun(R.key[k]), button("plan", () => showCommand(name, text), { title: "A command that needs no ledger" })];
 }
 
 function warningSign(k) {
@@ -141,19 +144,18 @@ function allRows() {
   const R = D.rows;
   const of = (name) => (k) => R[name][k];
   const columns = [
-    buttonColumn("run again", repeatButton),
     textColumn("method", of("method"), (m, k) => [METHODS[m], D.warned[k] ? warningSign(k) : null]),
     further(textColumn("settings", (k) => D.methods[R.method[k]].settings || "default")),
     textColumn("instance", of("instance"), (instance) => INSTANCES[instance]),
     column("seed", of("seed"), (seed) => String(D.seeds[seed])),
     ...Object.keys(D.columns).map((name) => ({ ...figure(name, of(name)), more: !FEW.includes(name) })),
-    further(textColumn("key", of("key"))),
+    buttonColumn("run again", repeatButton),
   ];
   const selects = [
     ["of-method", numbered(METHODS), of("method")],
     ["of-instance", numbered(INSTANCES), of("instance")],
   ];
-  const show = (rows) => table($("all-rows"), columns, rows, { name: "All runs", by: 5 });
+  const show = (rows) => table($("all-rows"), columns, rows, { name: "All runs", by: 4 });
   filtered(selects, range(R.key.length), show);
 }
 
@@ -187,7 +189,7 @@ function failures() {
   const columns = [
     textColumn("cell", "name"),
     textColumn("why its attempts failed", (row) => row.reasons.join("; ")),
-    buttonColumn("run again", (row) => button("command", () => showCommand(row.name, row.command))),
+    buttonColumn("run again", (row) => [rerun(row.key), button("plan", () => showCommand(row.name, row.command))]),
   ];
   table($("lost"), columns, D.failures, { name: "Failures" });
 }
