@@ -317,6 +317,8 @@ class HypothesisFilter:
                 )
                 evaluations += len(fresh[0]) * FRESH_EVALUATIONS
             evaluations += len(rows) * CONTINUED_EVALUATIONS
+            if frame_costs.root is not None:  # there is no other place to start at
+                evaluations -= 2.0 * len(rows)
             if len(rows):
                 moved, shifted = latest.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)

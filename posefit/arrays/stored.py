@@ -78,7 +78,8 @@ def _write(path: Path, arrays: Arrays) -> None:
     beside = path.with_name(f".{path.stem}-{secrets.token_hex(4)}.npz")
     try:
         with beside.open("xb") as file:
-            np.savez(file, **arrays)
+            named: dict[str, Any] = {**arrays}
+            np.savez(file, **named)
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
