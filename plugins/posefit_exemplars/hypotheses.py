@@ -301,7 +301,7 @@ class HypothesisFilter:
                 ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT,
             )
             if not len(latest.poses):
-                *fresh, used = contour_race(
+                poses, places, used = contour_race(
                     self._task.body,
                     contours,
                     fresh,
@@ -310,7 +310,8 @@ class HypothesisFilter:
                         frame_costs, poses, places, noise, FIRST_LIBRARY_COST
                     ),
                 )
-                evaluations += used + len(fresh[0])
+                fresh = poses, places
+                evaluations += used + len(poses)
             else:
                 fresh = fitted(
                     self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES
