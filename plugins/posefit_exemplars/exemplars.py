@@ -352,8 +352,8 @@ def _digest(motions: Sequence[Motion], skeleton: Skeleton) -> bytes:
     digest.update(skeleton.axes.tobytes())
     for motion in motions:
         digest.update(motion.skeleton.axes.tobytes())
-        digest.update(np.ascontiguousarray(motion.poses))
-        digest.update(np.ascontiguousarray(motion.translations))
+        digest.update(np.ascontiguousarray(motion.poses).data)
+        digest.update(np.ascontiguousarray(motion.translations).data)
     return digest.digest()
 
 

@@ -301,7 +301,7 @@ class HypothesisFilter:
                 ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT,
             )
             if not len(latest.poses):
-                *fresh, used = contour_race(
+                poses, places, used = contour_race(
                     self._task.body,
                     contours,
                     fresh,
@@ -310,13 +310,16 @@ class HypothesisFilter:
                         frame_costs, poses, places, noise, FIRST_LIBRARY_COST
                     ),
                 )
-                evaluations += used + len(fresh[0])
+                fresh = poses, places
+                evaluations += used + len(poses)
             else:
                 fresh = fitted(
                     self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES
                 )
                 evaluations += len(fresh[0]) * FRESH_EVALUATIONS
             evaluations += len(rows) * CONTINUED_EVALUATIONS
+            if frame_costs.root is not None:  # there is no other place to start at
+                evaluations -= 2.0 * len(rows)
             if len(rows):
                 moved, shifted = latest.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)

@@ -29,7 +29,7 @@ RIVAL_AREA = 0.4
 ABOVE_GAP = 0.3
 # of the person's area: the largest hole that is filled in a mask by itself. Between an
 # arm and the trunk it says where the arm is, and no other frame does
-MAX_HOLE_ALONE = 0.002
+MAX_HOLE_ALONE = 0.0005
 # of the person's area: where the picture's edge leaves less of it, there is too little
 # to search
 CUT_SHOWN = 0.5

@@ -294,14 +294,14 @@ def _owners(
     tracklets: Sequence[Tracklet], blobs: Sequence[_Blob], frame: int
 ) -> dict[int, Tracklet]:
     """Return whose each blob is, by its number, so that all are as near as possible to where they are expected."""
+    if not tracklets or not blobs:
+        return {}
     # takes a tenth of a second to import
     from scipy.optimize import linear_sum_assignment
 
     distances = np.array(
         [[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets]
     )
-    if not distances.size:
-        return {}
     rows, columns = linear_sum_assignment(np.minimum(distances, 1e6))
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
     return {

@@ -32,7 +32,11 @@ from posefit.tracking.evaluate import evaluate
 from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import Method, prepare
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.polish import polish_evaluations, polished
+from posefit.tracking.polish import (
+    polish_evaluations,
+    polished,
+    with_one_mode,
+)
 from posefit.tracking.restarts import (
     SEARCHED,
     after,
@@ -121,6 +125,7 @@ def track_scene(
         method = prepare(options, task)
         passes = _passes(scene, method, task.evaluations, bool(options.smooth))
         task = replace(task, evaluations=task.evaluations // passes)
+        alone = scene.count == 1 and scene.truth is None
         polishing = _polish_evaluations(scene, method, task.evaluations, options)
         task = replace(task, evaluations=task.evaluations - polishing)
         with progress.phase("build"):
@@ -149,6 +154,8 @@ def track_scene(
             shown = next(iter(scene.observations))
             frames = [polished(task, frames[0], shown, polishing, method.audit.beta)]
             effort["frames"] = _evaluations(frames)
+        elif alone and method.prior is not None and frames[0].posterior is None:
+            frames = [with_one_mode(frames[0])]
         smoothed = Smoothed(scene, frames, shape)
         smoothing = PoseCount()
         if options.smooth and scene.count > 1:

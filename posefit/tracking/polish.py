@@ -79,8 +79,15 @@ def polished(
         areas=areas[:, best],
         evaluations=total,
         trace=np.vstack([frame.trace, [total, least]]),
-        posterior=posterior_of(poses, places, costs) if len(poses) > 1 else None,
+        posterior=posterior_of(poses, places, costs),
     )
+
+
+def with_one_mode(frame: Frame) -> Frame:
+    """Return a frame whose posterior is its pose alone: its search left nothing else open."""
+    poses = frame.pose[None]
+    posterior = posterior_of(poses, frame.translation[None], np.array([frame.cost]))
+    return replace(frame, posterior=posterior)
 
 
 def _open_poses(

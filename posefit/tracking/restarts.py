@@ -190,7 +190,7 @@ def best_restart(
         [around(trial, mode) for mode in modes] or [trial] * restarts
     ):
         frames = list(follow(start, compared, np.random.default_rng([*prefix, k])))
-        if not k:
+        if not k and guess_evaluations:
             used = frames[0].evaluations + guess_evaluations
             frames[0] = with_evaluations(frames[0], used)
         tried += frames
