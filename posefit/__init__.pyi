@@ -10,6 +10,7 @@ from posefit.fitting.optimiser import Optimiser as Optimiser
 from posefit.fitting.prior import Prior as Prior
 from posefit.fitting.problem import BudgetSpentError as BudgetSpentError
 from posefit.fitting.problem import Problem as Problem
+from posefit.fitting.problem import Problems as Problems
 from posefit.fitting.problem import minimise as minimise
 from posefit.fitting.space import SearchSpace as SearchSpace
 from posefit.fitting.tracker import Frame as Frame

@@ -11,7 +11,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from operator import itemgetter
 from pathlib import Path
@@ -137,9 +137,16 @@ class Unfinished:
     """
 
     def __init__(
-        self, target: Path, path: Path, file: int, info: Mapping[str, Any]
+        self,
+        target: Path,
+        path: Path,
+        file: int,
+        info: Mapping[str, Any],
+        made: Sequence[Path] = (),
     ) -> None:
         self.path = path
+        # folders above it that are as new as it is
+        self._made = made
         self.info = info
         self._target = target
         self._file = file
@@ -147,7 +154,7 @@ class Unfinished:
     @classmethod
     def begin(cls, target: Path, info: Mapping[str, Any]) -> Self:
         """Return a new folder, whose mark holds `info`. Raises OSError where there is no room."""
-        target.parent.mkdir(parents=True, exist_ok=True)
+        made = made_folders(target.parent)
         path = _created_folder(target)
         with _undone(path):
             file = os.open(path / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
@@ -155,7 +162,7 @@ class Unfinished:
             (path / MARK).write_text(
                 json.dumps({"target": target.name, "info": info}), encoding="utf-8"
             )
-        return cls(target, path, file, info)
+        return cls(target, path, file, info, made)
 
     @classmethod
     def interrupted(cls, target: Path) -> list[Self]:
@@ -193,8 +200,9 @@ class Unfinished:
             self._file = -1
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove the entries of these names, and the folder where nothing else is in it."""
+        """Remove the entries of these names, and the folder where nothing else is in it, with those made for it."""
         emptied(self.path, [*names, MARK])
+        remove_empty(self._made)
         self.close()
 
     def finish(self, names: Iterable[str], replace: bool) -> None:
@@ -221,6 +229,20 @@ class Unfinished:
         if aside is not None:
             emptied(aside, names)
         self.close()
+
+
+def made_folders(folder: Path) -> list[Path]:
+    """Create a folder and its parents, and return the new ones, the deepest first."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def remove_empty(folders: Iterable[Path]) -> None:
+    """Remove those of some folders that are empty."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def other_entries(folder: Path, names: Iterable[str]) -> list[str]:

@@ -4,6 +4,7 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -196,3 +197,17 @@ def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():
         [sys.executable, "-c", script], capture_output=True, text=True, check=False
     )
     assert done.stdout == "SilhouetteCost 0.0\n", done.stderr
+
+
+def test_a_removed_folder_takes_along_the_parents_that_were_made_for_it(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "there").mkdir()
+    folder = Unfinished.begin(tmp_path / "there" / "o" / "p" / "q", {})
+    (folder.path / "poses.npz").touch()
+    folder.remove(["poses.npz"])
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+    kept = Unfinished.begin(tmp_path / "there" / "o" / "q", {})
+    (tmp_path / "there" / "o" / "mine").touch()
+    kept.remove([])
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["mine", "o", "there"]

@@ -48,6 +48,26 @@ def test_the_outer_limit_holds_where_the_inner_one_is_longer() -> None:
         time.sleep(20.0)
 
 
+def test_an_alarm_ends_the_body_or_nothing_whenever_it_comes() -> None:
+    def busy(seconds: float) -> None:
+        began = time.perf_counter()
+        while time.perf_counter() - began < seconds:
+            pass
+
+    outcomes = set()
+    for k in range(2000):
+        # about as long as the body takes, and, for each tenth, as long as entering it
+        limit = 1e-4 * (0.5 + k % 100 / 100) if k % 10 else 1e-6 * (1 + k % 70)
+        try:
+            with timed(limit):
+                busy(1e-4)
+            outcomes.add("in time")
+        except TimeoutError:
+            outcomes.add("too long")
+    assert outcomes <= {"in time", "too long"}
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
 def test_more_memory_than_it_may_have_is_an_error() -> None:
     with pytest.raises(MemoryError), memory(4.0):
         np.ones(10**10)

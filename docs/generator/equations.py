@@ -41,8 +41,11 @@ _TAG = re.compile(
     r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Interpretation S\d+)?$"
 )
 _WORDS = re.compile(r"[^a-z0-9]+")
+# a test, with the comment on the line before it or at the end of its line
 _TEST = re.compile(
-    r"^def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<tag>.*))?$", re.MULTILINE
+    r"^(?:# (?P<before>.*)\n)?"
+    r"def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<after>.*))?$",
+    re.MULTILINE,
 )
 
 
@@ -96,7 +99,7 @@ def tests_of(tag: Tag) -> list[str]:
     names = []
     for path in sorted((ROOT / "tests" / "sources").glob("test_*.py")):
         for one in _TEST.finditer(path.read_text("utf-8")):
-            carries = one["tag"] == f"{tag.source} {tag.step}"
+            carries = f"{tag.source} {tag.step}" in (one["before"], one["after"])
             if carries or (
                 path.name == f"test_{tag.source.lower()}.py"
                 and _is_named_after(one["name"], tag.step)

@@ -140,7 +140,7 @@ def constant(training: Training) -> Policy:
     if training.agent == "uniform":
         return lambda _: rng.uniform(-1.0, 1.0, env.action_space.shape)
     env.reset(options={"instance": TESTED})
-    truths = np.array([episode.truth for episode in env.unwrapped.episodes])
+    truths = np.array([problem.truth for problem in env.unwrapped.problems])
     return lambda _: truths
 
 

@@ -12,14 +12,17 @@ themselves are imported when they are made. `drive` runs an optimiser against an
 `drive_each` one in every environment of a vector, `track_reference` returns what a tracker would commit in Track-v0,
 and `to_sb3_vec_env` adapts a vector environment to Stable-Baselines3.
 
+A step draws proposals in scenes of a `Stage`, and counts them in a `posefit.Problem`, or in `posefit.Problems` for a
+vector. Each environment's file has its single class and its vector class, written on the same functions.
+
 | looking for | file |
 |---|---|
-| FitImage-v0, Track-v0 | fit.py, track.py |
-| Race-v0: racing | race.py |
-| single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
-| arguments and numbered instances (as in sweeps: `posefit.motion.instance`) | instance.py |
+| FitImage-v0, Track-v0, Race-v0: from an action to a reward | fit.py, track.py, race.py |
+| what they share: actions, rewards, infos, when episodes begin and end | base.py |
+| arguments, and what an instance shows (the numbers: `posefit.motion.instances`) | world.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
 | rendering | rendering.py |
+| single environments and vectors in any autoreset mode, row by row | rows.py |
 | optimisers that search an environment; policies | driving.py, policies.py |
 | Stable-Baselines3 | sb3.py |
 """

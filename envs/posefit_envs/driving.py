@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gymnasium import Env, error
-from gymnasium.vector import VectorEnv
+from gymnasium import ActionWrapper, Env, error
+from gymnasium.vector import VectorActionWrapper, VectorEnv
 
 from posefit import Optimiser, Problem, SearchSpace, minimise
 from posefit.arrays import Array
@@ -17,64 +17,77 @@ from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_envs.fit import FitImageEnv, FitImageVectorEnv
+from posefit_envs.rows import AnyEnv, rows_of
 from posefit_envs.track import TrackEnv, committed_infos
 
 
-class EnvObjective:
-    """The costs of proposals by stepping `posefit/FitImage-v0`, a single one or a vector.
+class FitImageSteps:
+    """Costs of proposals by stepping `posefit/FitImage-v0`: a single environment or a vector, in any autoreset mode.
 
-    An episode that ends begins again with the same instance. Raises gymnasium.error.Error for another environment.
+    An episode that ends begins again with the same instance. Raises gymnasium.error.Error for another environment, and
+    for one whose wrappers change actions.
     """
 
-    def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any]) -> None:
-        bare = env.unwrapped
-        if not isinstance(bare, FitImageEnv | FitImageVectorEnv):
-            raise error.Error(
-                f"env must be posefit/FitImage-v0, got {type(bare).__name__}"
-            )
+    def __init__(self, env: AnyEnv) -> None:
+        _check_actions_reach(env)
         self._env = env
-        self._bare = bare
-        self._vector = isinstance(env, VectorEnv)
-        self._count = env.num_envs if isinstance(env, VectorEnv) else 1
-        self._instances: Any = None
+        self._rows = rows_of(env)
+        self._numbers: list[int] = []
 
     def begin(
-        self, seed: int, instance: int | Sequence[int] | None
+        self, seed: int, instances: int | Sequence[int] | None
     ) -> tuple[list[SearchSpace], list[int]]:
         """Reset with an instance for all or each, or with random ones; return what each searches, and their numbers."""
-        self._instances = self._env.reset(seed=seed, options={"instance": instance})[1][
-            "instance"
-        ]
-        bare = self._bare
-        problems = [bare.problem] if isinstance(bare, FitImageEnv) else bare.problems
-        return [problem.space for problem in problems], np.atleast_1d(
-            self._instances
-        ).tolist()
+        rows = self._rows
+        chosen: Any = instances
+        if instances is None or isinstance(instances, int | np.integer):
+            chosen = [instances] * rows.count
+        options = [{"instance": number} for number in chosen]
+        _, infos = rows.reset([seed + i for i in range(rows.count)], options)
+        self._numbers = [int(info["instance"]) for info in infos]
+        return rows.attribute("space"), self._numbers
 
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
-        _, _, terminated, truncated, infos = self._env.step(
-            proposals if self._vector else proposals[0]
-        )
-        costs = np.array(infos["cost"])
-        done = np.logical_or(terminated, truncated)
-        if done.any():
-            mask = {"reset_mask": done} if self._vector else {}
-            self._env.reset(options={"instance": self._instances, **mask})
-        return np.atleast_1d(costs)
+        _, _, ended, infos = self._rows.step(proposals)
+        if ended.any():
+            options = [{"instance": number} for number in self._numbers]
+            self._rows.reset(None, options, ended)
+        return np.array([info["cost"] for info in infos])
 
     def costs(self, proposals: Array) -> Array:
         """Return the costs (m,) of any number of proposals (m, d), in environments of one instance."""
-        filling = np.repeat(proposals[-1:], -len(proposals) % self._count, axis=0)
-        turns = np.concatenate([proposals, filling]).reshape(
-            -1, self._count, proposals.shape[1]
-        )
-        return np.concatenate([self.step(turn) for turn in turns])[: len(proposals)]
+        count = self._rows.count
+        filling = np.repeat(proposals[-1:], -len(proposals) % count, axis=0)
+        turns = np.concatenate([proposals, filling])
+        turns = turns.reshape(-1, count, proposals.shape[1])
+        costs = np.concatenate([self.step(turn) for turn in turns])
+        return costs[: len(proposals)]
+
+
+def _check_actions_reach(env: AnyEnv) -> None:
+    """Raise gymnasium.error.Error for another environment than FitImage-v0, and where a wrapper changes actions."""
+    wrapper: Any = env
+    while wrapper is not env.unwrapped:
+        if isinstance(wrapper, ActionWrapper | VectorActionWrapper):
+            raise error.Error(
+                f"env must take proposals as they are, got {type(wrapper).__name__}: "
+                "drive the environment that it wraps"
+            )
+        wrapper = wrapper.env
+    try:
+        (space, *_) = rows_of(env).attribute("action_space")
+        rows_of(env).attribute("max_evaluations")
+    except AttributeError:
+        raise error.Error(
+            f"env must be posefit/FitImage-v0, got {type(env.unwrapped).__name__}"
+        ) from None
+    if (space.low != -1.0).any() or (space.high != 1.0).any():
+        raise error.Error(f"env must take proposals in [-1, 1], got actions in {space}")
 
 
 def drive(
-    env: VectorEnv[Any, Any, Any] | Env[Any, Any],
+    env: AnyEnv,
     optimiser: str | Optimiser = "sapso",
     *,
     seed: int = 0,
@@ -86,20 +99,20 @@ def drive(
 
     A population of any size is proposed in as many steps as it takes; the last of them is filled up with its last
     proposal, which does not count. An episode that ends begins again with the same instance: only `evaluations` end the
-    search. Actions are float64, so the result is the library's, bit for bit. Raises gymnasium.error.Error for another
-    environment, where the budget does not hold one population, and where the environments have several instances:
-    `drive_each` is for those.
+    search. Actions are float64, so the result is the library's, bit for bit, in every autoreset mode. Raises
+    gymnasium.error.Error for another environment or one whose wrappers change actions, where the budget does not hold
+    one population, and where the environments have several instances: `drive_each` is for those.
     """
-    objective = EnvObjective(env)
-    (space, *_), numbers = objective.begin(seed, instance)
+    steps = FitImageSteps(env)
+    (space, *_), numbers = steps.begin(seed, instance)
     if len(set(numbers)) > 1:
         raise error.Error(
             f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each"
         )
     if isinstance(optimiser, str):
         optimiser = _optimiser(space, optimiser, seed, evaluations, settings)
+    problem = Problem(steps.costs, space, evaluations)
     try:
-        problem = Problem(objective.costs, space, evaluations)
         return minimise(problem, optimiser, budget_known=True)
     except BudgetError as mistake:
         raise error.Error(str(mistake)) from None
@@ -120,18 +133,18 @@ def drive_each(
     `seed` + 1 and so on. `instances` names an instance for each environment; by default each has a random one. Raises
     gymnasium.error.Error as `drive` does.
     """
-    objective = EnvObjective(env)
+    steps = FitImageSteps(env)
     problems = []
     searches = []
-    for i, space in enumerate(objective.begin(seed, instances)[0]):
-        problem = Problem(objective.step, space, evaluations)
+    for i, space in enumerate(steps.begin(seed, instances)[0]):
+        problem = Problem(steps.costs, space, evaluations)
         made = _optimiser(space, optimiser, seed + i, evaluations, settings)
         problems.append(problem)
         searches.append(_stepwise(problem, made))
     proposals = np.stack([next(search) for search in searches])
     searching = set(range(len(searches)))
     while searching:
-        costs = objective.step(proposals).tolist()
+        costs = steps.step(proposals).tolist()
         for i in sorted(searching):
             try:
                 proposals[i] = searches[i].send(costs[i])

@@ -5,77 +5,36 @@ from typing import Any
 
 import numpy as np
 
+from posefit import Problem, Problems, SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import whole
+from posefit.motion.instances import HELD_OUT
 from posefit_envs.base import (
     Flags,
     Infos,
-    Outcome,
     SearchEnv,
     SearchVectorEnv,
     image_spaces,
+    proposal_infos,
+    reward_of_cost,
+    row_of,
 )
-from posefit_envs.instance import Episode, Image, checked, first_episode, is_held_out
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Evaluation, Rows, prepared
+from posefit_envs.stage import Rows, Stage, first_scene
+from posefit_envs.world import (
+    FirstFrame,
+    Image,
+    World,
+    checked,
+    first_problem,
+)
 
 MAX_EVALUATIONS = 8
 
 
-class FitImageVectorEnv(SearchVectorEnv):
-    """`num_envs` environments as FitImageEnv."""
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        max_evaluations: int = MAX_EVALUATIONS,
-        **arguments: Any,
-    ) -> None:
-        checked(whole, "max_evaluations", max_evaluations, 1)
-        super().__init__(num_envs, image_spaces, **arguments)
-        self._budget = int(max_evaluations)
-        self._best = np.full(num_envs, np.inf)
-        self._last: Evaluation | None = None
-
-    def _begin_search(self, i: int, number: int) -> None:
-        values, self._truths[i] = prepared(self.world, number, self._budget)
-        self._stage.set_values(i, values)
-        self._episodes[i] = partial(first_episode, self.world, number, self._budget)
-        self._best[i] = np.inf
-
-    def _opened(self, started: Flags) -> tuple[Image, Infos]:
-        return self._stage.pictures(), {"instance": self._numbers.copy()}
-
-    def _begun_infos(self, i: int) -> Infos:
-        hidden = is_held_out(int(self._numbers[i])) or not self.world.errors
-        return {} if hidden else {"truth": self._episode(i).truth}
-
-    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
-        last = self._last = self._stage.evaluate(actions, rows)
-        np.minimum(self._best, last.costs, out=self._best, where=stepping)
-        truncated = stepping & (self._steps >= self._budget)
-        infos = self._progress(
-            self._best, self._steps, last.poses, cost=last.costs, areas=last.areas
-        )
-        common = {"instance": self._numbers}
-        return Outcome(
-            last.pictures,
-            -np.log1p(last.costs),
-            np.zeros_like(truncated),
-            infos,
-            common,
-            truncated,
-        )
-
-    def _render_row(self, i: int, episode: Episode) -> Picture:
-        last = self._last
-        if not self._steps[i] or last is None:
-            return render_frame(
-                episode.problem, None, None, f"instance {episode.instance.number}"
-            )
-        label = f"cost {last.costs[i]:.1f}, best {self._best[i]:.1f}, {self._steps[i]} evaluations"
-        return render_frame(episode.problem, last.poses[i], last.translations[i], label)
+def shows_truth(world: World, number: int) -> bool:
+    """Return whether a reset gives the true proposal: of training instances only, so that others hold no answer."""
+    return world.errors and number not in HELD_OUT
 
 
 class FitImageEnv(SearchEnv):
@@ -140,4 +99,128 @@ class FitImageEnv(SearchEnv):
     - v0: not released yet; until then a version changes without a number.
     """
 
-    vector = FitImageVectorEnv
+    def __init__(
+        self,
+        *,
+        max_evaluations: int = MAX_EVALUATIONS,
+        render_mode: str | None = None,
+        **arguments: Any,
+    ) -> None:
+        super().__init__(render_mode, arguments)
+        self.max_evaluations = checked(whole, "max_evaluations", max_evaluations, 1)
+        self.action_space, self.observation_space = image_spaces(self.world)
+        self.stage = Stage(self.world, 1)
+        self._cost = np.nan  # of the last proposal
+
+    def begin(self, number: int) -> tuple[Image, Infos]:
+        """Begin an episode with an instance: return its first observation and infos."""
+        self.stage.set_scene(0, first_scene(self.world, number))
+        frame = FirstFrame(self.world, number)
+        self._problem = Problem(frame, self.stage.space(0), self.max_evaluations)
+        infos: Infos = {"instance": number}
+        if shows_truth(self.world, number):
+            infos["truth"] = frame.truth
+        return self.stage.pictures(self.stage.all_rows)[0], infos
+
+    def step(self, action: Any) -> tuple[Image, float, bool, bool, Infos]:
+        """Evaluate a proposal. Raises gymnasium.error.ResetNeeded where the episode has ended."""
+        proposal = self.checked_action(action)[None]
+        problem = self.problem
+        drawn = self.stage.draw(proposal, self.stage.all_rows)
+        problem.count(proposal, drawn.costs)
+        self._cost = float(drawn.costs[0])
+        reward = float(reward_of_cost(self._cost))
+        self.ended = not problem.remaining_evaluations
+        numbers = np.array([self.number])
+        infos = proposal_infos(self.stage, drawn, numbers, self.world.errors)
+        infos = row_of(infos, 0)
+        infos["best_cost"] = problem.best_cost
+        infos["evaluations"] = problem.evaluations
+        return drawn.pictures[0], reward, False, self.ended, infos
+
+    @property
+    def space(self) -> SearchSpace:
+        """The box of the episode's proposals."""
+        self.check_reset()
+        return self.stage.space(0)
+
+    def picture(self) -> Picture:
+        """Return the picture of the last proposal."""
+        problem = self.problem
+        label = _label(self.number, self._cost, problem.best_cost, problem.evaluations)
+        return render_frame(problem.cost, self.stage.body(0), label)
+
+
+class FitImageVectorEnv(SearchVectorEnv):
+    """`num_envs` environments as FitImageEnv."""
+
+    row_attributes = ("instance", "number", "problem", "space")
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_evaluations: int = MAX_EVALUATIONS,
+        **arguments: Any,
+    ) -> None:
+        super().__init__(num_envs, **arguments)
+        self.max_evaluations = checked(whole, "max_evaluations", max_evaluations, 1)
+        self.set_spaces(*image_spaces(self.world))
+        self.stage = Stage(self.world, num_envs, self.threads)
+        self._problems = Problems(num_envs, self.world.dimensions)
+        self._costs = np.full(num_envs, np.nan)  # of the last proposals
+
+    def begin(self, rows: Rows) -> None:
+        """Begin episodes in some environments, with the instances of `numbers`."""
+        for i in rows.tolist():
+            number = int(self.numbers[i])
+            self.stage.set_scene(i, first_scene(self.world, number))
+            self._problems.begin(i, partial(first_problem, self.world, number))
+
+    def observe(self, rows: Rows) -> Image:
+        """Return the pictures of some environments as they are now."""
+        return self.stage.pictures(rows)
+
+    def reset_infos(self) -> Infos:
+        """Return the infos of a reset, by name."""
+        return {"instance": self.numbers.copy()}
+
+    def started_infos(self, i: int) -> Infos:
+        """Return the true proposal of environment i, where a reset gives it."""
+        if not shows_truth(self.world, int(self.numbers[i])):
+            return {}
+        return {"truth": self._problems[i].truth}
+
+    def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
+        """Evaluate a proposal in each environment; one whose episode has ended resets instead, or at once."""
+        proposals, stepping = self.begin_step(actions)
+        rows = np.flatnonzero(stepping)
+        problems = self._problems
+        drawn = self.stage.draw(proposals, rows)
+        problems.count(rows, proposals[rows, None], drawn.costs[rows, None])
+        self._costs = drawn.costs
+        rewards = reward_of_cost(drawn.costs)
+        truncated = problems.evaluations >= self.max_evaluations
+        infos = proposal_infos(self.stage, drawn, self.numbers, self.world.errors)
+        infos["best_cost"] = problems.best_costs.copy()
+        infos["evaluations"] = problems.evaluations.copy()
+        ends = np.zeros_like(truncated), truncated
+        return self.end_step(stepping, drawn.pictures, rewards, ends, infos)
+
+    def picture(self, i: int) -> Picture:
+        """Return the picture of the last proposal in environment i."""
+        problems = self.problems
+        label = _label(
+            int(self.numbers[i]),
+            self._costs[i],
+            problems.best_costs[i],
+            problems.evaluations[i],
+        )
+        return render_frame(problems[i].cost, self.stage.body(i), label)
+
+
+def _label(number: int | None, cost: float, best: float, evaluations: int) -> str:
+    """Return the words below a picture."""
+    if not evaluations:
+        return f"instance {number}"
+    return f"cost {cost:.1f}, best {best:.1f}, {evaluations} evaluations"

@@ -29,7 +29,7 @@ from posefit.silhouette.rasteriser import (
 
 
 class Scenes(NamedTuple):
-    """What the drawn scenes (n) differ in: bodies, cameras, silhouettes and pictures."""
+    """What the drawn scenes (n) differ in: bodies, cameras and silhouettes."""
 
     offsets: Array  # (n, 26, 3) bones in their own frames
     radii: Array  # (n, 26, 2)
@@ -40,7 +40,6 @@ class Scenes(NamedTuple):
     observed: Bits  # (n, views, ...) bit images
     valid: Bits  # (n, views, ...) bit images
     totals: NDArray[np.int64]  # (n, views) pixels of the silhouettes
-    backdrops: NDArray[np.uint16]  # (n, height, width, views)
 
 
 @jit
@@ -93,24 +92,17 @@ def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations)
 def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures):
     """Write the areas (views, n, k, 3) R, B, Y of poses (n, k, 66) in some rows, each in its own scene.
 
-    Where there are `pictures` (n, height, width, views), and k is 1, they become the backdrops with `value` in the
-    pixels of each body; those of other rows stay as they are.
+    Each pixel of a body in `pictures` (n, height, width, views) gets `value` too, unless there are no pictures.
     """
     views = scenes.places.shape[1]
     many = poses.shape[1]
     total = rows.size * poses.shape[1]
-    height, width = scenes.backdrops.shape[1:3]
+    height, width = pictures.shape[1:3]
     flat = poses.reshape(-1, poses.shape[2])
     places = translations.reshape(-1, 3)
     work = scratch(scenes.observed.shape[2], scenes.observed.shape[3])
     block = np.empty(LANES, np.int64)
     drawn = np.empty(LANES, np.int64)
-    if pictures.size:
-        for i in rows:
-            pixels = pictures[i].reshape(-1)
-            backdrop = scenes.backdrops[i].reshape(-1)
-            for p in range(pixels.size):
-                pixels[p] = backdrop[p]
     for v in range(views):
         drawn[:] = -1  # the scene of a lane
         for first in range(0, total, LANES):

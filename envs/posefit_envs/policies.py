@@ -3,32 +3,57 @@
 A policy is called with an observation and the number of the step, and returns an action.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
+from gymnasium.vector import VectorEnv
 
 from posefit.arrays import Array
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES
+from posefit_envs.rows import AnyEnv, rows_of
 
 Policy = Callable[[Any, int], Array]
 
 
 def rollout(
-    env: gym.Env[Any, Any], policy: Policy, instance: int, seed: int
-) -> dict[str, Any]:
-    """Return the last info of an episode of a policy on an instance, with its `actions` (k, d) and `rewards` (k,)."""
-    observation, info = env.reset(seed=seed, options={"instance": instance})
+    env: AnyEnv,
+    policy: Policy,
+    instance: int | Sequence[int],
+    seed: int,
+) -> Any:
+    """Return the last infos of an episode of a policy on an instance, with its `actions` (k, d) and `rewards` (k,).
+
+    Of a vector, in any autoreset mode, it is a list of them, one of each environment: `instance` is then one for all or
+    a list, the seeds are `seed`, `seed` + 1 and so on, and the policy is called with the observations of all. An
+    environment whose episode has ended begins it again until all others have ended.
+    """
+    rows = rows_of(env)
+    numbers = [instance] * rows.count if isinstance(instance, int) else instance
+    options = [{"instance": number} for number in numbers]
+    seeds = [seed + i for i in range(rows.count)]
+    vector = isinstance(env, VectorEnv)
     actions: list[Array] = []
-    rewards = []
-    ended = False
-    cut = False
-    while not (ended or cut):
-        actions.append(policy(observation, len(actions)))
-        observation, reward, ended, cut, info = env.step(actions[-1])
-        rewards.append(float(reward))
-    return info | {"actions": np.array(actions), "rewards": np.array(rewards)}
+    rewards: list[Array] = []
+    episodes: dict[int, dict[str, Any]] = {}
+    observations, _ = rows.reset(seeds, options)
+    while len(episodes) < rows.count:
+        shown = observations if vector else observations[0]
+        action = np.asarray(policy(shown, len(actions)))
+        actions.append(action if vector else action[None])
+        observations, reward, ended, infos = rows.step(actions[-1])
+        rewards.append(reward)
+        for i in np.flatnonzero(ended).tolist():
+            own = {
+                "actions": np.array([step[i] for step in actions]),
+                "rewards": np.array([float(step[i]) for step in rewards]),
+            }
+            episodes.setdefault(i, infos[i] | own)
+        if ended.any() and len(episodes) < rows.count:
+            observations, _ = rows.reset(None, options, ended)
+    if vector:
+        return [episodes[i] for i in range(rows.count)]
+    return episodes[0]
 
 
 def race_features(observation: Any) -> tuple[Array, Array]:

@@ -1,13 +1,14 @@
 """Race-v0: searches of one silhouette share a budget; an action says which of them goes on, or begins another."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from posefit import Optimiser
+from posefit import Optimiser, Problem, Problems
 from posefit.arrays import Array
 from posefit.fitting.check import pair, whole
 from posefit.reading import quoted
@@ -16,15 +17,21 @@ from posefit.settings import planned, settings_of
 from posefit_envs.base import (
     Flags,
     Infos,
-    Outcome,
     SearchEnv,
     SearchVectorEnv,
+    error_degrees,
     log_cost,
     log_improvement,
+    row_of,
 )
-from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Rows
+from posefit_envs.stage import Rows, Stage, first_scene
+from posefit_envs.world import (
+    ArgumentError,
+    World,
+    checked,
+    first_problem,
+)
 
 OPTIMISER = "pso"
 SEARCHES = 8
@@ -40,197 +47,181 @@ MIN_SPREAD = 1e-3
 MAX_SPREAD = 1.0
 
 
-class RaceVectorEnv(SearchVectorEnv):
-    """`num_envs` environments as RaceEnv; the populations of their chosen searches are evaluated in one call."""
+class Races:
+    """n races side by side, a row each: the searches, and what is observed of them."""
 
     def __init__(
         self,
-        num_envs: int = 1,
+        world: World,
+        rows: int,
         *,
         optimiser: str = OPTIMISER,
         searches: int = SEARCHES,
         population_size: int = POPULATION_SIZE,
         generations: Sequence[int] = GENERATIONS,
-        **arguments: Any,
+        threads: int = 1,
     ) -> None:
-        k = int(checked(whole, "searches", searches, 2))
-        self.population_size = int(
-            checked(whole, "population_size", population_size, 2)
-        )
+        self.world = world
+        self.searches = checked(whole, "searches", searches, 2)
+        self.population_size = checked(whole, "population_size", population_size, 2)
         self._least, self._most = _bounds(generations)
-        self._optimiser, self._factory = (
-            optimiser,
-            checked(registry().optimiser, optimiser),
-        )
-        size = {"population_size": self.population_size}
-        sized = any(setting.name in size for setting in settings_of(self._factory))
+        self._name = optimiser
+        self._factory = checked(registry().optimiser, optimiser)
+        sizes = {"population_size": self.population_size}
+        names = [setting.name for setting in settings_of(self._factory)]
         self._settings = planned(
             self._factory,
-            size if sized else {},
+            sizes if "population_size" in names else {},
             self.population_size * (self._most + 1),
         )
+        self.stage = Stage(world, rows, threads)
+        self.problems = Problems(rows, world.dimensions)
+        self._rngs = [np.random.default_rng(0)] * rows
+        self._optimisers: list[dict[int, Optimiser]] = [{} for _ in range(rows)]
+        self.budgets = np.zeros(rows, dtype=np.int64)  # generations
+        self.left = np.zeros(rows, dtype=np.int64)
+        particles = (rows, self.searches, self.population_size)
+        self.bests = np.zeros((*particles, world.dimensions))  # of each particle
+        self.best_costs = np.full(particles, np.inf)
+        self.costs = np.zeros((rows, self.searches))  # the best of each search
+        self.slopes = np.zeros((rows, self.searches))
+        self.spreads = np.zeros((rows, self.searches))
+        self.used = np.zeros((rows, self.searches), dtype=np.int64)  # generations
 
-        def race_spaces(_: World) -> tuple[spaces.Box, spaces.Box]:
-            features = SEARCH_FEATURES * k + COMMON_FEATURES
-            return spaces.Box(-1.0, 1.0, (k + 1,), np.float32), spaces.Box(
-                0.0, 1.0, (features,), np.float32
-            )
+    @property
+    def spaces(self) -> tuple[Box, Box]:
+        """The spaces of the actions and the observations of one race."""
+        features = SEARCH_FEATURES * self.searches + COMMON_FEATURES
+        return (
+            Box(-1.0, 1.0, (self.searches + 1,), np.float32),
+            Box(0.0, 1.0, (features,), np.float32),
+        )
 
-        super().__init__(num_envs, race_spaces, **arguments)
-        n = num_envs
-        m = self.population_size
-        d = self.world.dimensions
-        self._rngs = [np.random.default_rng(0)] * n
-        self._budgets, self._left, self._evaluations = np.zeros((3, n), dtype=np.int64)
-        # of all searches, those that ended too
-        self._best, self._leaders = np.full(n, np.inf), np.zeros((n, d))
-        self._searches: list[dict[int, Optimiser]] = [{} for _ in range(n)]
-        # of each particle
-        self._bests, self._best_costs = (
-            np.zeros((n, k, m, d)),
-            np.full((n, k, m), np.inf),
-        )
-        self._costs, self._slopes, self._spreads = np.zeros((3, n, k))  # of each search
-        self._used = np.zeros((n, k), dtype=np.int64)
+    def begin(self, row: int, number: int, seed: int) -> None:
+        """Begin a race on an instance; its first populations are evaluated by `evaluate_first`."""
+        self.stage.set_scene(row, first_scene(self.world, number))
+        self.problems.begin(row, partial(first_problem, self.world, number))
+        rng = np.random.default_rng(seed)
+        self._rngs[row] = rng
+        self.budgets[row] = rng.integers(self._least, self._most, endpoint=True)
+        self.left[row] = self.budgets[row]
+        for search in range(self.searches):
+            self._begin_search(row, search)
 
-    def _begin_search(self, i: int, number: int) -> None:
-        self._enter(
-            i,
-            first_episode(
-                self.world,
-                number,
-                self.population_size * (self._most + self._used.shape[1]),
-            ),
-        )
-        self._rngs[i] = rng = np.random.default_rng(
-            int(self._generator(i).integers(2**63))
-        )
-        self._budgets[i] = self._left[i] = rng.integers(
-            self._least, self._most, endpoint=True
-        )
-        self._best[i], self._evaluations[i] = np.inf, 0
-        for search in range(self._used.shape[1]):
-            self._begin_another(i, search)
-
-    def _begin_another(self, i: int, search: int) -> None:
-        """Begin another search in the place of one of an environment's."""
-        space = self._episode(i).problem.space
-        rng = np.random.default_rng(int(self._rngs[i].integers(2**63)))
-        self._searches[i][search] = checked(
+    def _begin_search(self, row: int, search: int) -> None:
+        """Begin a search in the place of one of a race's."""
+        space = self.stage.space(row)
+        rng = np.random.default_rng(int(self._rngs[row].integers(2**63)))
+        self._optimisers[row][search] = checked(
             lambda: self._factory(space, rng, **self._settings)
         )
-        self._best_costs[i, search] = self._costs[i, search] = np.inf
-        self._slopes[i, search], self._used[i, search] = MAX_SLOPE, 0
+        self.best_costs[row, search] = np.inf
+        self.costs[row, search] = np.inf
+        self.slopes[row, search] = MAX_SLOPE
+        self.used[row, search] = 0
 
-    def _opened(self, started: Flags) -> tuple[NDArray[np.float32], Infos]:
-        self._evaluate_first(np.flatnonzero(started))
-        return self._states(), self._infos()
+    def evaluate_first(self, rows: Rows) -> None:
+        """Evaluate the first population of every search of some races."""
+        for search in range(self.searches):
+            self._generation(rows, np.full(len(rows), search))
 
-    def _evaluate_first(self, rows: Rows) -> None:
-        """Evaluate the first population of every search of some environments."""
-        for search in range(self._used.shape[1]):
-            self._advance_searches(rows, np.full(len(rows), search))
-
-    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
-        if len(rows) < self.num_envs:
-            self._evaluate_first(np.flatnonzero(~stepping))
-        before = self._best.copy()
-        searches = self._used.shape[1]
+    def advance(self, rows: Rows, actions: Array) -> Array:
+        """Make the generations that actions (m, searches + 1) choose in some races; return the rewards (m,)."""
+        before = self.problems.best_costs[rows]
         chosen = actions.argmax(axis=1)
-        for i in np.flatnonzero(stepping & (chosen == searches)).tolist():
-            chosen[i] = self._costs[i].argmax()
-            self._begin_another(i, int(chosen[i]))
-        self._advance_searches(rows, chosen[rows])
-        self._left[rows] -= 1
-        infos = self._infos()
-        rewards = log_improvement(before, self._best)
-        return Outcome(
-            self._states(), rewards, stepping & (self._left == 0), infos, infos
-        )
+        for k in np.flatnonzero(chosen == self.searches).tolist():
+            row = int(rows[k])
+            chosen[k] = self.costs[row].argmax()
+            self._begin_search(row, int(chosen[k]))
+        self._generation(rows, chosen)
+        self.left[rows] -= 1
+        return log_improvement(before, self.problems.best_costs[rows])
 
-    def _advance_searches(self, rows: Rows, chosen: NDArray[np.int64]) -> None:
-        """Make one generation of the chosen search (k,) of some environments (k,)."""
-        proposals = np.zeros(
-            (self.num_envs, self.population_size, self.world.dimensions)
-        )
-        searches = [
-            (i, self._searches[i][search])
-            for i, search in zip(rows.tolist(), chosen.tolist(), strict=True)
-        ]
-        for i, search in searches:
-            asked = search.ask()
-            if asked.shape != proposals[i].shape:
+    def _generation(self, rows: Rows, chosen: NDArray[np.int64]) -> None:
+        """Make one generation of the chosen search (m,) of some races (m,): ask, evaluate, tell."""
+        pairs = list(zip(rows.tolist(), chosen.tolist(), strict=True))
+        count = self.population_size
+        proposals = np.zeros((len(self.problems), count, self.world.dimensions))
+        for row, search in pairs:
+            population = self._optimisers[row][search].ask()
+            if population.shape != proposals[row].shape:
                 raise ArgumentError(
-                    f"optimiser must propose {self.population_size} poses at a time, "
-                    f"got {len(asked)} of {quoted(self._optimiser)}"
+                    f"optimiser must propose {count} poses at a time, "
+                    f"got {len(population)} of {quoted(self._name)}"
                 )
-            proposals[i] = asked
-        costs = self._stage.costs(proposals, rows)
-        for i, search in searches:
-            search.tell(proposals[i].copy(), costs[i].copy())
-        self._evaluations[rows] += self.population_size
-        self._remember(rows, chosen, proposals[rows], costs[rows])
+            proposals[row] = population
+        costs = self.stage.costs(proposals, rows)
+        self.problems.count(rows, proposals[rows], costs[rows])
+        for row, search in pairs:
+            told = proposals[row].copy(), costs[row].copy()
+            self._optimisers[row][search].tell(*told)
+        self._remember((rows, chosen), proposals[rows], costs[rows])
 
     def _remember(
-        self, rows: Rows, chosen: NDArray[np.int64], proposals: Array, costs: Array
+        self,
+        at: tuple[Rows, NDArray[np.int64]],
+        proposals: Array,
+        costs: Array,
     ) -> None:
-        """Update what is observed of chosen searches (k,) by their proposals (k, m, d) and costs (k, m)."""
-        at = (rows, chosen)
-        each = np.arange(len(rows))
-        before = self._costs[at]
-        searched = self._used[at] > 0
-        bests = self._bests[at]
-        best_costs = self._best_costs[at]
+        """Update what is observed of searches by their proposals (m, k, d) and costs (m, k)."""
+        before = self.costs[at]
+        searched = self.used[at] > 0
+        bests = self.bests[at]
+        best_costs = self.best_costs[at]
         better = costs < best_costs
-        bests[better], best_costs[better] = proposals[better], costs[better]
+        bests[better] = proposals[better]
+        best_costs[better] = costs[better]
         after = best_costs.min(axis=1)
-        leaders = bests[each, best_costs.argmin(axis=1)]
         falls = log_improvement(np.where(searched, before, after), after)
-        slopes = self._slopes[at] + SMOOTHING * (falls - self._slopes[at])
-        self._bests[at], self._best_costs[at], self._costs[at] = (
-            bests,
-            best_costs,
-            after,
-        )
-        self._slopes[at] = np.where(searched, slopes, MAX_SLOPE)
-        self._spreads[at] = bests.std(axis=1).mean(axis=1)
-        self._used[at] += 1
-        better = after < self._best[rows]
-        self._best[rows[better]], self._leaders[rows[better]] = (
-            after[better],
-            leaders[better],
-        )
+        slopes = self.slopes[at] + SMOOTHING * (falls - self.slopes[at])
+        self.bests[at] = bests
+        self.best_costs[at] = best_costs
+        self.costs[at] = after
+        self.slopes[at] = np.where(searched, slopes, MAX_SLOPE)
+        self.spreads[at] = bests.std(axis=1).mean(axis=1)
+        self.used[at] += 1
 
-    def _states(self) -> NDArray[np.float32]:
-        budgets = self._budgets[:, None]
-        spreads = np.log(np.maximum(self._spreads / MIN_SPREAD, 1.0)) / np.log(
-            MAX_SPREAD / MIN_SPREAD
-        )
-        each = (
-            log_cost(self._costs),
-            self._slopes / MAX_SLOPE,
-            spreads,
-            self._used / budgets,
-        )
-        common = (
-            log_cost(self._best)[:, None],
-            self._left[:, None] / budgets,
+    def observations(self) -> NDArray[np.float32]:
+        """Return the features (n, 4 searches + 3) of the races."""
+        budgets = self.budgets[:, None]
+        widths = np.maximum(self.spreads / MIN_SPREAD, 1.0)
+        features = [
+            log_cost(self.costs),
+            self.slopes / MAX_SLOPE,
+            np.log(widths) / np.log(MAX_SPREAD / MIN_SPREAD),
+            self.used / budgets,
+            log_cost(self.problems.best_costs)[:, None],
+            self.left[:, None] / budgets,
             budgets / self._most,
-        )
-        return np.asarray(
-            np.minimum(np.concatenate([*each, *common], axis=1), 1.0), dtype=np.float32
-        )
+        ]
+        shown = np.minimum(np.concatenate(features, axis=1), 1.0)
+        return np.asarray(shown, dtype=np.float32)
 
-    def _infos(self) -> Infos:
-        poses = self._stage.poses(self._leaders)
-        return self._progress(
-            self._best, self._evaluations, poses, proposal=self._leaders.copy()
-        )
+    def infos(self, numbers: NDArray[np.int64]) -> Infos:
+        """Return the infos (n, ...) of the races on these instances, by name."""
+        problems = self.problems
+        infos = {
+            "best_cost": problems.best_costs.copy(),
+            "proposal": problems.best.copy(),
+            "evaluations": problems.evaluations.copy(),
+            "instance": numbers.copy(),
+        }
+        if self.world.errors:
+            # a pose does not depend on where the body is aligned
+            nobody = self.stage.all_rows[:0]
+            poses = self.stage.decode(problems.best[:, None], nobody)[0][:, 0]
+            infos["error_degrees"] = error_degrees(self.stage.truths, poses)
+        return infos
 
-    def _render_row(self, i: int, episode: Episode) -> Picture:
-        poses, places = episode.problem.decode(self._leaders[i : i + 1])
-        label = f"best {self._best[i]:.1f}, {self._left[i]} of {self._budgets[i]} generations left"
-        return render_frame(episode.problem, poses[0], places[0], label)
+    def picture(self, row: int) -> Picture:
+        """Return the picture of the best proposal of a race."""
+        frame = self.problems[row]
+        poses, places = frame.decode(self.problems.best[row][None])
+        best = self.problems.best_costs[row]
+        label = (
+            f"best {best:.1f}, {self.left[row]} of {self.budgets[row]} generations left"
+        )
+        return render_frame(frame.cost, (poses[0], places[0]), label)
 
 
 class RaceEnv(SearchEnv):
@@ -293,7 +284,111 @@ class RaceEnv(SearchEnv):
     - v0: not released yet; until then a version changes without a number.
     """
 
-    vector = RaceVectorEnv
+    def __init__(
+        self,
+        *,
+        optimiser: str = OPTIMISER,
+        searches: int = SEARCHES,
+        population_size: int = POPULATION_SIZE,
+        generations: Sequence[int] = GENERATIONS,
+        render_mode: str | None = None,
+        **arguments: Any,
+    ) -> None:
+        super().__init__(render_mode, arguments)
+        self.races = Races(
+            self.world,
+            1,
+            optimiser=optimiser,
+            searches=searches,
+            population_size=population_size,
+            generations=generations,
+        )
+        self.action_space, self.observation_space = self.races.spaces
+
+    def begin(self, number: int) -> tuple[Any, Infos]:
+        """Begin an episode with an instance: return its first observation and infos."""
+        self.races.begin(0, number, int(self.np_random.integers(2**63)))
+        self.races.evaluate_first(np.array([0]))
+        return self.races.observations()[0], self._infos()
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
+        """Make one generation. Raises gymnasium.error.ResetNeeded where the episode has ended."""
+        action = self.checked_action(action)[None]
+        reward = self.races.advance(np.array([0]), action)[0]
+        self.ended = bool(self.races.left[0] == 0)
+        observation = self.races.observations()[0]
+        return observation, float(reward), self.ended, False, self._infos()
+
+    def _infos(self) -> Infos:
+        return row_of(self.races.infos(np.array([self.number])), 0)
+
+    @property
+    def problem(self) -> Problem:
+        """The episode's problem, for a search of its own. Raises gymnasium.error.ResetNeeded before the first reset."""
+        self.check_reset()
+        return self.races.problems[0]
+
+    def picture(self) -> Picture:
+        """Return the picture of the best proposal."""
+        return self.races.picture(0)
+
+
+class RaceVectorEnv(SearchVectorEnv):
+    """`num_envs` environments as RaceEnv; the populations of their chosen searches are evaluated in one call."""
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        optimiser: str = OPTIMISER,
+        searches: int = SEARCHES,
+        population_size: int = POPULATION_SIZE,
+        generations: Sequence[int] = GENERATIONS,
+        **arguments: Any,
+    ) -> None:
+        super().__init__(num_envs, **arguments)
+        self.races = Races(
+            self.world,
+            num_envs,
+            optimiser=optimiser,
+            searches=searches,
+            population_size=population_size,
+            generations=generations,
+            threads=self.threads,
+        )
+        self.set_spaces(*self.races.spaces)
+        self._problems = self.races.problems
+
+    def begin(self, rows: Rows) -> None:
+        """Begin episodes in some environments, with the instances of `numbers`."""
+        for i in rows.tolist():
+            seed = int(self.generator(i).integers(2**63))
+            self.races.begin(i, int(self.numbers[i]), seed)
+        self.races.evaluate_first(rows)
+
+    def observe(self, rows: Rows) -> NDArray[np.float32]:
+        """Return the observations of some environments as they are now."""
+        return self.races.observations()[rows]
+
+    def reset_infos(self) -> Infos:
+        """Return the infos of a reset, by name."""
+        return self.races.infos(self.numbers)
+
+    def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
+        """Make one generation in each environment; one whose episode has ended resets instead, or at once."""
+        actions, stepping = self.begin_step(actions)
+        rows = np.flatnonzero(stepping)
+        rewards = np.zeros(self.num_envs)
+        rewards[rows] = self.races.advance(rows, actions[rows])
+        terminated = self.races.left == 0
+        infos = self.races.infos(self.numbers)
+        observations = self.races.observations()
+        ends = terminated, np.zeros_like(terminated)
+        return self.end_step(stepping, observations, rewards, ends, infos)
+
+    def picture(self, i: int) -> Picture:
+        """Return the picture of the best proposal in environment i."""
+        return self.races.picture(i)
 
 
 def _bounds(generations: Any) -> tuple[int, int]:

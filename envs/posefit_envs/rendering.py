@@ -1,10 +1,11 @@
 """Pictures of an environment: the silhouettes on each other, the body from its side, and the cost in words."""
 
+from typing import Any
+
 import numpy as np
 from gymnasium import error
 from numpy.typing import NDArray
 
-from posefit import Problem
 from posefit.arrays import Array
 from posefit.output.drawing import blank, side_view, write
 from posefit.output.picture import OVERLAP, panel_of
@@ -26,15 +27,18 @@ def check_mode(mode: str | None) -> None:
 
 
 def render_frame(
-    problem: Problem, pose: Array | None, translation: Array | None, label: str
+    cost: Any, proposed: tuple[Array, Array] | None, label: str
 ) -> Picture:
-    """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side."""
+    """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side.
+
+    `cost` is the cost function of a frame; `proposed` is a pose (66,) with its translation (3,), or None.
+    """
     panels = []
-    for camera, silhouette in zip(problem.cameras, problem.silhouettes, strict=True):
+    for camera, silhouette in zip(cost.cameras, cost.silhouettes, strict=True):
         mask = silhouette.mask
         body = np.zeros_like(mask)
-        if pose is not None and translation is not None:
-            body = project(problem.body, camera, pose, translation)
+        if proposed is not None:
+            body = project(cost.body, camera, *proposed)
         panels.append(
             OVERLAP[
                 panel_of(
@@ -42,10 +46,8 @@ def render_frame(
                 )
             ]
         )
-    if pose is not None and translation is not None:
-        panels.append(
-            side_view(problem.body, problem.cameras[0], pose, translation, HEIGHT)
-        )
+    if proposed is not None:
+        panels.append(side_view(cost.body, cost.cameras[0], *proposed, HEIGHT))
     else:
         panels.append(blank(HEIGHT, HEIGHT))
     image = np.hstack(panels)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium import error
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.wrappers.vector import DictInfoToList
 
 from posefit_envs.base import mixed
+from posefit_envs.rows import VectorRows
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -18,10 +18,10 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
     """Return the environment as a `VecEnv` of Stable-Baselines3.
 
     Stable-Baselines3 resets an environment in the step that ends its episode, with the last observation in
-    `info["terminal_observation"]`. So `vector` must be able to reset some of its environments, by
-    `options={"reset_mask": ...}`, as those of this package are. Its environments share their attributes and methods, so
-    that only all of them together can be set or called. Raises gymnasium.error.DependencyNotInstalled without
-    Stable-Baselines3.
+    `info["terminal_observation"]`. Every autoreset mode can be adapted: by NEXT_STEP and DISABLED `vector` must be able
+    to reset some of its environments, by `options={"reset_mask": ...}`, as those of this package and Gymnasium's own
+    are. Options and attributes are those of each environment; attributes and methods are set and called for all of them
+    together. Raises gymnasium.error.DependencyNotInstalled without Stable-Baselines3.
     """
     try:
         from stable_baselines3.common.vec_env import VecEnv
@@ -29,12 +29,8 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
         raise error.DependencyNotInstalled(
             "to_sb3_vec_env needs Stable-Baselines3: python -m pip install stable-baselines3"
         ) from None
-    if vector.metadata.get("autoreset_mode") != AutoresetMode.NEXT_STEP:
-        raise error.Error(
-            f"autoreset_mode must be NEXT_STEP, got {vector.metadata.get('autoreset_mode')}"
-        )
-
-    rows_of: Any = DictInfoToList(vector)
+    rows = VectorRows(vector)
+    no_options: list[dict[str, Any]] = [{} for _ in range(rows.count)]
 
     class Adapted(VecEnv):
         def __init__(self) -> None:
@@ -47,12 +43,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             )
 
         def reset(self) -> Any:
-            seeds: Any = (
-                None if all(seed is None for seed in self._seeds) else list(self._seeds)
-            )
-            observations, self.reset_infos = rows_of.reset(
-                seed=seeds, options=self._options[0] or None
-            )
+            observations, self.reset_infos = rows.reset(self._seeds, self._options)
             self._reset_seeds()
             self._reset_options()
             return observations
@@ -61,37 +52,39 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             self._actions = actions
 
         def step_wait(self) -> Any:
-            observations, rewards, terminated, truncated, rows = rows_of.step(
-                self._actions
-            )
-            done = terminated | truncated
+            observations, rewards, done, infos = rows.step(self._actions)
+            infos = [dict(info) for info in infos]
+            for info, truncated in zip(infos, rows.truncated.tolist(), strict=True):
+                info["TimeLimit.truncated"] = truncated
             if done.any():
-                for i in np.flatnonzero(done):
-                    rows[i]["terminal_observation"] = observations[i].copy()
-                    rows[i]["TimeLimit.truncated"] = bool(
-                        truncated[i] and not terminated[i]
-                    )
-                fresh, fresh_rows = rows_of.reset(options={"reset_mask": done})
+                for i in np.flatnonzero(done).tolist():
+                    infos[i]["terminal_observation"] = observations[i].copy()
+                fresh, fresh_infos = rows.begun
+                if rows.mode is not AutoresetMode.SAME_STEP:
+                    fresh, fresh_infos = rows.reset(None, no_options, done)
                 observations = mixed(done, fresh, observations)
-                for i in np.flatnonzero(done):
-                    self.reset_infos[i] = fresh_rows[i]
-            return observations, rewards.astype(np.float32), done, rows
+                for i in np.flatnonzero(done).tolist():
+                    self.reset_infos[i] = fresh_infos[i]
+            return observations, rewards.astype(np.float32), done, infos
 
         def close(self) -> None:
             vector.close()
 
         def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-            return [getattr(vector, attr_name)] * len(list(self._get_indices(indices)))
+            values = rows.attribute(attr_name)
+            return [values[i] for i in self._get_indices(indices)]
 
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             self._check_all(indices)
-            setattr(vector, attr_name, value)
+            base: Any = vector.unwrapped
+            base.set_attr(attr_name, value)
 
         def env_method(
             self, method_name: str, *arguments: Any, indices: Any = None, **named: Any
         ) -> list[Any]:
             self._check_all(indices)
-            return [getattr(vector, method_name)(*arguments, **named)] * self.num_envs
+            base: Any = vector.unwrapped
+            return list(base.call(method_name, *arguments, **named))
 
         def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
             return [False] * len(list(self._get_indices(indices)))

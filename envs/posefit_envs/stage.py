@@ -1,5 +1,6 @@
 """Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple, final
@@ -7,32 +8,91 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit import Problem
-from posefit.arrays import Array
+from posefit import SearchSpace, SilhouetteCost
+from posefit.arrays import Array, Bits
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
+from posefit.motion.instances import TRAINING
 from posefit.silhouette.cost import mean_over_views, mismatch
-from posefit.silhouette.drawn import count_poses
+from posefit.silhouette.drawn import count_poses, uncounted
 from posefit.silhouette.mask import pack
 from posefit.silhouette.sharing import LEAST_SHARE, work_through
-from posefit_envs.instance import (
+from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes
+from posefit_envs.world import (
     BODY,
     OBSERVED,
-    SPLITS,
     Image,
     World,
     body_of,
-    first_episode,
+    first_space,
+    instance,
 )
-from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes
 
 Rows = NDArray[np.int64]
 _BODY = np.uint16(BODY)
-CAMERA_VALUES = ("rotation", "translation", "focal", "centre")
-# pixels of an instance whose values are remembered, in about 5 kB
+# pixels of an instance whose scene is remembered, in about 5 kB
 LARGEST_REMEMBERED = 2 * 64 * 64
 
 
-class Evaluation(NamedTuple):
+class Scene(NamedTuple):
+    """What a stage stores of one observation: the columns of a row."""
+
+    centre: Array  # (d,) of the box
+    half: Array  # (d,)
+    anchor: Array  # (3,) metres
+    offsets: Array  # (26, 3) the body's bones
+    radii: Array  # (26, 2)
+    rotations: Array  # (views, 3, 3)
+    places: Array  # (views, 3) the cameras' translations
+    focals: Array  # (views, 2)
+    centres: Array  # (views, 2)
+    observed: Bits  # (views, ...) bit images
+    valid: Bits  # (views, ...)
+    totals: NDArray[np.int64]  # (views,) pixels of the silhouettes
+    joint_radii: Array  # (27,)
+    borders: Array  # (views, 4) of the silhouettes
+    truth: Array  # (66,) the true pose
+    masks: NDArray[np.uint8]  # (height, bytes, views) the silhouettes, a bit a pixel
+
+    @staticmethod
+    def of(cost: SilhouetteCost, truth: Array) -> "Scene":
+        """Return the scene of an observation, and the true pose (66,) in it."""
+        cameras = cost.cameras
+        silhouettes = cost.silhouettes
+        masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
+        return Scene(
+            centre=cost.space.centre,
+            half=cost.space.half,
+            anchor=cost.space.anchor,
+            offsets=cost.body.skeleton.chain.offsets,
+            radii=cost.body.radii,
+            rotations=np.array([camera.rotation for camera in cameras]),
+            places=np.array([camera.translation for camera in cameras]),
+            focals=np.array([camera.focal for camera in cameras]),
+            centres=np.array([camera.centre for camera in cameras]),
+            observed=np.array([silhouette.bits[0] for silhouette in silhouettes]),
+            valid=np.array([silhouette.bits[1] for silhouette in silhouettes]),
+            totals=np.count_nonzero(masks, axis=(0, 1)),
+            joint_radii=cost.body.joint_radii(),
+            borders=np.array([silhouette.extent for silhouette in silhouettes]),
+            truth=truth,
+            masks=np.packbits(masks, axis=1),
+        )
+
+
+def first_scene(world: World, number: int) -> Scene:
+    """Return the scene of an instance's first frame; small ones are remembered."""
+    width, height = world.size
+    remembers = width * height * len(world.view_degrees) <= LARGEST_REMEMBERED
+    return (_first_scene if remembers else _first_scene.__wrapped__)(world, number)
+
+
+@lru_cache(maxsize=len(TRAINING))
+def _first_scene(world: World, number: int) -> Scene:
+    made = instance(world, number)
+    return Scene.of(made.cost(0, first_space(world, made)), made.truth.poses[0])
+
+
+class Drawn(NamedTuple):
     """Poses, costs and pictures of proposals, a row a scene; rows of scenes that were left out mean nothing."""
 
     poses: Array  # (n, 66)
@@ -40,55 +100,6 @@ class Evaluation(NamedTuple):
     costs: Array  # (n,)
     areas: NDArray[np.int64]  # (n, views, 3), zero where a scene was left out
     pictures: Image  # (n, height, width, 2 views)
-
-
-def values_of(problem: Problem) -> tuple[NDArray[Any], ...]:
-    """Return everything of a problem that a stage stores: its masks as bits, its box, and the rest in order."""
-    cameras = problem.cameras
-    silhouettes = problem.silhouettes
-    body = problem.body
-    space = problem.space
-    masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
-    return (
-        np.packbits(masks, axis=1),
-        space.centre,
-        space.half,
-        space.anchor,
-        body.skeleton.chain.offsets,
-        body.radii,
-        *(
-            np.array([getattr(camera, name) for camera in cameras])
-            for name in CAMERA_VALUES
-        ),
-        *(
-            np.array(bits)
-            for bits in zip(
-                *(silhouette.bits for silhouette in silhouettes), strict=True
-            )
-        ),
-        np.count_nonzero(masks, axis=(0, 1)),
-        body.joint_radii(),
-        np.array([silhouette.extent for silhouette in silhouettes]),
-    )
-
-
-def prepared(
-    world: World, number: int, evaluations: int
-) -> tuple[tuple[NDArray[Any], ...], Array]:
-    """Return the values of an instance's first frame, and the true pose; small ones are remembered."""
-    width, height = world.size
-    remembers = width * height * len(world.view_degrees) <= LARGEST_REMEMBERED
-    return (_prepared if remembers else _prepared.__wrapped__)(
-        world, number, evaluations
-    )
-
-
-@lru_cache(maxsize=SPLITS["train"][1])
-def _prepared(
-    world: World, number: int, evaluations: int
-) -> tuple[tuple[NDArray[Any], ...], Array]:
-    episode = first_episode(world, number, evaluations)
-    return values_of(episode.problem), episode.instance.truth.poses[0]
 
 
 @final
@@ -99,120 +110,130 @@ class Stage:
     """
 
     def __init__(self, world: World, rows: int, threads: int = 1) -> None:
-        views, (width, height) = len(world.view_degrees), world.size
-        bones = len(BONES)
+        width, height = world.size
+        views = len(world.view_degrees)
         bits = pack(np.zeros((height, width), dtype=bool)).shape
-        self._width = width
-        self._height = height
+        d = world.dimensions
         self.threads = threads
-        self._prior = world.learned
-        self._aligned = world.translation == "aligned"
-        self._chain = body_of(world.motion[0]).skeleton.chain
-        self._scenes = Scenes(
-            np.empty((rows, bones, 3)),
-            np.empty((rows, bones, 2)),
-            np.empty((rows, views, 3, 3)),
-            np.empty((rows, views, 3)),
-            np.empty((rows, views, 2)),
-            np.empty((rows, views, 2)),
-            np.empty((rows, views, *bits), dtype=np.uint64),
-            np.empty((rows, views, *bits), dtype=np.uint64),
-            np.empty((rows, views), dtype=np.int64),
-            np.empty((rows, height, width, views), dtype=np.uint16),
-        )
-        self._joint_radii, self._borders = (
-            np.empty((rows, len(JOINTS))),
-            np.empty((rows, views, 4)),
-        )
-        self._first = 6 if world.translation == "searched" else 3
-        d = self._first + len(self._prior.low)
-        self._centres, self._halves, self._anchors = (
-            np.empty((rows, d)),
-            np.empty((rows, d)),
-            np.empty((rows, 3)),
-        )
-        boxes = self._centres, self._halves, self._anchors
-        self._columns = *boxes, *self._scenes[:-1], self._joint_radii, self._borders
         self.all_rows: Rows = np.arange(rows)
-
-    def set_values(self, row: int, values: tuple[NDArray[Any], ...]) -> None:
-        """Make a row the problem, one of the world's, that these are the values of."""
-        masks, *others = values
-        backdrop = self._scenes.backdrops[row]
-        backdrop[:] = np.unpackbits(masks, axis=1, count=self._width)
-        backdrop *= OBSERVED
-        for array, value in zip(self._columns, others, strict=True):
-            array[row] = value
-
-    def pictures(self) -> Image:
-        """Return the pictures (n, height, width, 2 views) before the first proposals."""
-        return np.array(self._scenes.backdrops).view(np.uint8)
-
-    def evaluate(self, proposals: Array, rows: Rows) -> Evaluation:
-        """Return the evaluation of proposals (n, d) in some rows; the others' pictures show no body."""
-        several = proposals[:, None]
-        whole = len(rows) == len(self.all_rows)
-        poses, translations = self.decode(several, rows)
-        pictures = (
-            np.empty_like(self._scenes.backdrops)
-            if whole
-            else np.array(self._scenes.backdrops)
+        self._width = width
+        self._prior = world.learned
+        self._translation = world.translation
+        self._chain = body_of(world.motion[0]).skeleton.chain
+        self._columns = Scene(
+            centre=np.empty((rows, d)),
+            half=np.empty((rows, d)),
+            anchor=np.empty((rows, 3)),
+            offsets=np.empty((rows, len(BONES), 3)),
+            radii=np.empty((rows, len(BONES), 2)),
+            rotations=np.empty((rows, views, 3, 3)),
+            places=np.empty((rows, views, 3)),
+            focals=np.empty((rows, views, 2)),
+            centres=np.empty((rows, views, 2)),
+            observed=np.empty((rows, views, *bits), dtype=np.uint64),
+            valid=np.empty((rows, views, *bits), dtype=np.uint64),
+            totals=np.empty((rows, views), dtype=np.int64),
+            joint_radii=np.empty((rows, len(JOINTS))),
+            borders=np.empty((rows, views, 4)),
+            truth=np.empty((rows, ANGLES)),
+            masks=np.empty((rows, height, (width + 7) // 8, views), dtype=np.uint8),
         )
+        # the bodies that were drawn last, and which scenes have one
+        self._poses = np.zeros((rows, ANGLES))
+        self._translations = np.zeros((rows, 3))
+        self._has_body = np.zeros(rows, dtype=bool)
+        # a pixel's pair of bytes: the observed silhouette, and the body that is drawn on it
+        self._backdrops = np.empty((rows, height, width, views), dtype=np.uint16)
+        self._no_pictures = np.empty((0, height, width, views), dtype=np.uint16)
+        drawn_columns = self._columns._asdict()
+        self._scenes = Scenes(*[drawn_columns[name] for name in Scenes._fields])
+
+    @property
+    def truths(self) -> Array:
+        """The true poses (n, 66)."""
+        return self._columns.truth
+
+    def set_scene(self, row: int, scene: Scene) -> None:
+        """Let a row be a scene of the world, without a body."""
+        self._has_body[row] = False
+        columns: Sequence[NDArray[Any]] = self._columns
+        for column, value in zip(columns, scene, strict=True):
+            column[row] = value
+        pixels = np.unpackbits(scene.masks, axis=1, count=self._width)
+        np.multiply(pixels, OBSERVED, out=self._backdrops[row], dtype=np.uint16)
+
+    def space(self, row: int) -> SearchSpace:
+        """Return the box of a row's proposals."""
+        columns = self._columns
+        return SearchSpace(
+            self._prior,
+            columns.centre[row, :3].copy(),
+            columns.half[row, :3].copy(),
+            columns.anchor[row].copy(),
+            self._translation,
+        )
+
+    def set_body(self, row: int, pose: Array, translation: Array) -> None:
+        """Let a row's pictures show a body, as it is."""
+        self._poses[row] = pose
+        self._translations[row] = translation
+        self._has_body[row] = True
+
+    def body(self, row: int) -> tuple[Array, Array] | None:
+        """Return the pose (66,) and translation (3,) of the body that a row's pictures show; None for no body."""
+        if not self._has_body[row]:
+            return None
+        return self._poses[row], self._translations[row]
+
+    def pictures(self, rows: Rows) -> Image:
+        """Return the pictures (m, height, width, 2 views) of some rows, each with the body that was drawn last."""
+        pictures = self._backdrops.copy()
+        shown = rows[self._has_body[rows]]
+        with uncounted():  # a body that is drawn again is no evaluation
+            self._drawn(
+                self._poses[:, None], self._translations[:, None], shown, pictures
+            )
+        return pictures[rows].view(np.uint8)
+
+    def draw(self, proposals: Array, rows: Rows) -> Drawn:
+        """Return poses, costs and pictures of proposals (n, d) in some rows; the others' pictures show no body."""
+        poses, translations = self.decode(proposals[:, None], rows)
+        pictures = self._backdrops.copy()
         costs, areas = self._drawn(poses, translations, rows, pictures)
-        counts = np.ascontiguousarray(areas[:, :, 0].swapaxes(0, 1))
-        return Evaluation(
-            poses[:, 0],
-            translations[:, 0],
+        drawn_poses = poses[:, 0]
+        drawn_translations = translations[:, 0]
+        # most steps draw in every row, and nothing is copied
+        if len(rows) == len(self.all_rows):
+            self._poses = drawn_poses
+            self._translations = drawn_translations
+        else:
+            self._poses[rows] = drawn_poses[rows]
+            self._translations[rows] = drawn_translations[rows]
+        self._has_body[rows] = True
+        return Drawn(
+            drawn_poses,
+            drawn_translations,
             costs[:, 0],
-            counts,
+            np.ascontiguousarray(areas[:, :, 0].swapaxes(0, 1)),
             pictures.view(np.uint8),
         )
 
     def costs(self, proposals: Array, rows: Rows) -> Array:
-        """Return the costs (n, k) of proposals (n, k, d), k in each scene, those of some rows."""
-        no_pictures = np.empty(
-            (0, self._height, self._width, self._scenes.places.shape[1]),
-            dtype=np.uint16,
-        )
-        return self._drawn(*self.decode(proposals, rows), rows, no_pictures)[0]
-
-    def redraw(
-        self, poses: Array, translations: Array, rows: Rows, pictures: Image
-    ) -> None:
-        """Write the pictures of some rows with poses (n, 66) as they are, unaligned."""
-        self._drawn(
-            poses[:, None], translations[:, None], rows, pictures.view(np.uint16)
-        )
+        """Return the costs (n, k) of proposals (n, k, d), k in each scene, in some rows."""
+        return self._drawn(*self.decode(proposals, rows), rows, self._no_pictures)[0]
 
     def decode(self, proposals: Array, rows: Rows) -> tuple[Array, Array]:
-        """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), those of some rows aligned."""
-        poses, translations = self._unpacked(proposals)
-        if self._aligned:
-            align_scenes(
-                self._chain,
-                self._scenes,
-                self._joint_radii,
-                self._borders,
-                rows,
-                poses,
-                translations,
-            )
-        return poses, translations
-
-    def poses(self, proposals: Array) -> Array:
-        """Return the poses (n, 66) of proposals (n, d), wherever they stand."""
-        return self._unpacked(proposals[:, None])[0][:, 0]
-
-    def _unpacked(self, proposals: Array) -> tuple[Array, Array]:
-        (n, k, d), first = proposals.shape, self._first
+        """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), aligned in some rows."""
+        n, k = proposals.shape[:2]
+        columns = self._columns
         poses = np.empty((n, k, ANGLES))
         translations = np.empty((n, k, 3))
-        latents = np.empty((n, k, d - first))
+        latents = np.empty((n, k, len(self._prior.low)))
         finite = unpack_scenes(
             proposals,
-            self._centres,
-            self._halves,
-            self._anchors,
+            columns.centre,
+            columns.half,
+            columns.anchor,
             poses,
             translations,
             latents,
@@ -220,6 +241,16 @@ class Stage:
         assert finite, "actions are checked, and spaces are finite"
         angles = self._prior.inverse_transform(latents.reshape(n * k, -1))
         poses[..., 3:] = angles.reshape(n, k, -1)
+        if self._translation == "aligned":
+            align_scenes(
+                self._chain,
+                self._scenes,
+                columns.joint_radii,
+                columns.borders,
+                rows,
+                poses,
+                translations,
+            )
         return poses, translations
 
     def _drawn(
@@ -229,27 +260,28 @@ class Stage:
         rows: Rows,
         pictures: NDArray[np.uint16],
     ) -> tuple[Array, NDArray[np.int64]]:
-        """Return the costs (n, k) and areas (views, n, k, 3) of poses (n, k, 66) in some rows; write their pictures."""
+        """Return the costs (n, k) and areas (views, n, k, 3) of poses (n, k, 66) in some rows, drawn into pictures."""
         n, k = poses.shape[:2]
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
-        at = self._chain, self._scenes
-        values = poses, translations, areas, _BODY, pictures
-        shares = max(min(self.threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
-        if shares == 1:
-            draw_scenes(*at, rows, *values)
-        else:
-            cuts = [len(rows) * share // shares for share in range(shares + 1)]
-            parts = [slice(a, b) for a, b in pairwise(cuts)]
-            work_through(
-                parts,
-                self.threads,
-                lambda _: (),
-                lambda part: draw_scenes(*at, rows[part], *values),
+
+        def draw(part: slice) -> None:
+            draw_scenes(
+                self._chain,
+                self._scenes,
+                rows[part],
+                poses,
+                translations,
+                areas,
+                _BODY,
+                pictures,
             )
+
+        shares = max(min(self.threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
+        cuts = [len(rows) * share // shares for share in range(shares + 1)]
+        parts = [slice(start, stop) for start, stop in pairwise(cuts)]
+        work_through(parts, self.threads, lambda _: (), draw)
         # every pixel is known
-        costs = mean_over_views(
-            [mismatch(view) for view in areas.reshape(views, n * k, 3)]
-        )
-        return costs.reshape(n, k), areas
+        costs = [mismatch(view) for view in areas.reshape(views, n * k, 3)]
+        return mean_over_views(costs).reshape(n, k), areas

@@ -1,9 +1,11 @@
 """Track-v0: a sequence of silhouettes, several proposals for each."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from posefit import Problem, Problems
 from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.fitting.metrics import mpjpe_mm, pose_error_degrees
@@ -11,122 +13,49 @@ from posefit.fitting.tracker import Prediction, Predictor
 from posefit_envs.base import (
     Flags,
     Infos,
-    Outcome,
     SearchEnv,
     SearchVectorEnv,
     image_spaces,
+    proposal_infos,
+    reward_of_cost,
+    row_of,
 )
-from posefit_envs.instance import Episode, Image, Instance, checked, instance
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Evaluation, Rows
+from posefit_envs.stage import Rows, Scene, Stage
+from posefit_envs.world import Image, Instance, World, checked, instance
 
 FRAMES = 20
 EVALUATIONS = 100  # a frame
 
 
-class TrackVectorEnv(SearchVectorEnv):
-    """`num_envs` environments as TrackEnv."""
-
-    metadata = SearchVectorEnv.metadata | {"render_fps": 30}
+class Sequence:
+    """An instance that is followed frame by frame: each committed pose moves the next frame's box, SAPSO (6)."""
 
     def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        frames: int = FRAMES,
-        evaluations_per_frame: int = EVALUATIONS,
-        **arguments: Any,
+        self, world: World, number: int, frames: int, evaluations: int
     ) -> None:
-        checked(whole, "evaluations_per_frame", evaluations_per_frame, 2)
-        checked(whole, "frames", frames, 1)
-        super().__init__(num_envs, image_spaces, **arguments)
-        self._frame_count, self._budget = int(frames), int(evaluations_per_frame)
-        self._predictors: dict[int, Predictor] = {}
-        # used: of the current frame
-        self._frames, self._used = np.zeros((2, num_envs), dtype=np.int64)
-        self._best, self._best_proposals = np.empty(num_envs), np.empty(self._shape)
-        self._last: Evaluation | None = None
+        self.instance = instance(world, number, frames, evaluations)
+        self.frame = 0
+        task = self.instance.task
+        self._predictor = Predictor(task, world.learned, Prediction(tilt="box"))
 
-    def _begin_search(self, i: int, number: int) -> None:
-        made = instance(self.world, number, self._frame_count, self._budget)
-        self._predictors[i] = Predictor(
-            made.task, self.world.learned, Prediction(tilt="box")
-        )
-        self._begin_frame(i, made, 0)
+    def problem(self) -> Problem:
+        """Return the problem of the current frame."""
+        observation = self.instance.observations[self.frame]
+        space = self._predictor.space(observation)
+        cost = self.instance.cost(self.frame, space)
+        return Problem(cost, space, self.instance.task.evaluations)
 
-    def _begin_frame(self, i: int, made: Instance, frame: int) -> None:
-        self._enter(
-            i, made.episode(frame, self._predictors[i].space(made.observations[frame]))
-        )
-        self._frames[i], self._used[i], self._best[i] = frame, 0, np.inf
+    def scene(self, problem: Problem) -> Scene:
+        """Return the scene of the current frame's problem."""
+        cost: Any = problem.cost
+        return Scene.of(cost, self.instance.truth.poses[self.frame])
 
-    def _opened(self, started: Flags) -> tuple[Image, Infos]:
-        return self._stage.pictures(), {
-            "instance": self._numbers.copy(),
-            "frame": np.zeros_like(self._frames),
-        }
-
-    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
-        last = self._last = self._stage.evaluate(actions, rows)
-        self._used += stepping
-        better = (stepping & (last.costs < self._best)).nonzero()[0]
-        if better.size:
-            self._best[better], self._best_proposals[better] = (
-                last.costs[better],
-                actions[better],
-            )
-        infos = self._progress(
-            self._best, self._used, last.poses, cost=last.costs, areas=last.areas
-        )
-        terminated = full = stepping & (self._used >= self._budget)
-        committed: dict[int, Infos] = {}
-        if full.any():
-            terminated = full & (self._frames + 1 == self._frame_count)
-            committed = self._commit(full.nonzero()[0], last)
-        infos["frame"] = self._frames.copy()
-        common = {"instance": self._numbers, "frame": infos["frame"]}
-        return Outcome(
-            last.pictures,
-            -np.log1p(last.costs),
-            terminated,
-            infos,
-            common,
-            row_infos=committed,
-        )
-
-    def _commit(self, rows: Rows, last: Evaluation) -> dict[int, Infos]:
-        """Commit the best proposals of some environments, begin their next frames, and return their infos by row."""
-        poses, places = self._stage.decode(self._best_proposals[:, None], rows)
-        last.poses[rows], last.translations[rows] = poses[rows, 0], places[rows, 0]
-        infos = {}
-        entered = []
-        for i in rows.tolist():
-            made = self._episode(i).instance
-            frame = int(self._frames[i])
-            best = float(self._best[i])
-            infos[i] = committed_infos(
-                made, frame, poses[i, 0], places[i, 0], best, self.world.errors
-            )
-            self._predictors[i].commit(self._best_proposals[i])
-            if frame + 1 < self._frame_count:
-                self._begin_frame(i, made, frame + 1)
-                entered.append(i)
-        self._stage.redraw(
-            last.poses,
-            last.translations,
-            np.array(entered, dtype=np.int64),
-            last.pictures,
-        )
-        return infos
-
-    def _render_row(self, i: int, episode: Episode) -> Picture:
-        last = self._last
-        if not self._steps[i] or last is None:
-            label = f"instance {episode.instance.number}, frame {episode.frame}"
-            return render_frame(episode.problem, None, None, label)
-        best = "" if np.isinf(self._best[i]) else f", best {self._best[i]:.1f}"
-        label = f"frame {episode.frame}, cost {last.costs[i]:.1f}{best}"
-        return render_frame(episode.problem, last.poses[i], last.translations[i], label)
+    def commit(self, proposal: Array) -> bool:
+        """Commit a proposal (d,) to the current frame and go on; return whether it was the last frame."""
+        self._predictor.commit(proposal)
+        self.frame += 1
+        return self.frame == len(self.instance.observations)
 
 
 class TrackEnv(SearchEnv):
@@ -165,8 +94,222 @@ class TrackEnv(SearchEnv):
     - v0: not released yet; until then a version changes without a number.
     """
 
-    vector = TrackVectorEnv
     metadata = SearchEnv.metadata | {"render_fps": 30}
+
+    def __init__(
+        self,
+        *,
+        frames: int = FRAMES,
+        evaluations_per_frame: int = EVALUATIONS,
+        render_mode: str | None = None,
+        **arguments: Any,
+    ) -> None:
+        super().__init__(render_mode, arguments)
+        self.frames, self.evaluations_per_frame = _checked(
+            frames, evaluations_per_frame
+        )
+        self.action_space, self.observation_space = image_spaces(self.world)
+        self.stage = Stage(self.world, 1)
+        self._cost = np.nan  # of the last proposal
+
+    def begin(self, number: int) -> tuple[Image, Infos]:
+        """Begin an episode with an instance: return its first observation and infos."""
+        self._sequence = Sequence(
+            self.world, number, self.frames, self.evaluations_per_frame
+        )
+        self._begin_frame()
+        observation = self.stage.pictures(self.stage.all_rows)[0]
+        return observation, {"instance": number, "frame": 0}
+
+    def _begin_frame(self) -> None:
+        self._problem = self._sequence.problem()
+        self.stage.set_scene(0, self._sequence.scene(self._problem))
+
+    def step(self, action: Any) -> tuple[Image, float, bool, bool, Infos]:
+        """Evaluate a proposal; the last one of a frame commits the best, and the next frame appears."""
+        proposal = self.checked_action(action)[None]
+        rows = self.stage.all_rows
+        problem = self.problem
+        sequence = self._sequence
+        drawn = self.stage.draw(proposal, rows)
+        problem.count(proposal, drawn.costs)
+        self._cost = float(drawn.costs[0])
+        observation = drawn.pictures[0]
+        reward = float(reward_of_cost(self._cost))
+        numbers = np.array([self.number])
+        infos = proposal_infos(self.stage, drawn, numbers, self.world.errors)
+        infos = row_of(infos, 0)
+        infos["best_cost"] = problem.best_cost
+        infos["evaluations"] = problem.evaluations
+        if not problem.remaining_evaluations:
+            poses, places = self.stage.decode(problem.best[None, None], rows)
+            infos |= committed_infos(
+                sequence.instance,
+                sequence.frame,
+                poses[0, 0],
+                places[0, 0],
+                problem.best_cost,
+                self.world.errors,
+            )
+            self.ended = sequence.commit(problem.best)
+            if not self.ended:
+                self._begin_frame()
+                self.stage.set_body(0, poses[0, 0], places[0, 0])
+                observation = self.stage.pictures(rows)[0]
+        infos["frame"] = min(sequence.frame, self.frames - 1)
+        return observation, reward, self.ended, False, infos
+
+    @property
+    def instance(self) -> Instance:
+        """The episode's instance."""
+        self.check_reset()
+        return self._sequence.instance
+
+    def picture(self) -> Picture:
+        """Return the picture of the last proposal, or of the pose that was committed last."""
+        problem = self.problem
+        label = _label(
+            self.number,
+            self._sequence.frame,
+            self._cost,
+            problem.best_cost,
+            problem.evaluations,
+        )
+        return render_frame(problem.cost, self.stage.body(0), label)
+
+
+class TrackVectorEnv(SearchVectorEnv):
+    """`num_envs` environments as TrackEnv."""
+
+    metadata = SearchVectorEnv.metadata | {"render_fps": 30}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        frames: int = FRAMES,
+        evaluations_per_frame: int = EVALUATIONS,
+        **arguments: Any,
+    ) -> None:
+        super().__init__(num_envs, **arguments)
+        self.frames, self.evaluations_per_frame = _checked(
+            frames, evaluations_per_frame
+        )
+        self.set_spaces(*image_spaces(self.world))
+        self.stage = Stage(self.world, num_envs, self.threads)
+        self._problems = Problems(num_envs, self.world.dimensions)
+        self._sequences: dict[int, Sequence] = {}
+        self._costs = np.full(num_envs, np.nan)  # of the last proposals
+
+    def begin(self, rows: Rows) -> None:
+        """Begin episodes in some environments, with the instances of `numbers`."""
+        for i in rows.tolist():
+            self._sequences[i] = Sequence(
+                self.world,
+                int(self.numbers[i]),
+                self.frames,
+                self.evaluations_per_frame,
+            )
+            self._begin_frame(i)
+
+    def _begin_frame(self, i: int) -> None:
+        problem = self._sequences[i].problem()
+        self._problems.begin(i, partial(Problem, problem.cost, problem.space))
+        self.stage.set_scene(i, self._sequences[i].scene(problem))
+
+    def observe(self, rows: Rows) -> Image:
+        """Return the pictures of some environments as they are now."""
+        return self.stage.pictures(rows)
+
+    def reset_infos(self) -> Infos:
+        """Return the infos of a reset, by name."""
+        return {"instance": self.numbers.copy(), "frame": self._frames()}
+
+    def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
+        """Evaluate a proposal in each environment; the last one of a frame commits the best there."""
+        proposals, stepping = self.begin_step(actions)
+        rows = np.flatnonzero(stepping)
+        problems = self._problems
+        drawn = self.stage.draw(proposals, rows)
+        problems.count(rows, proposals[rows, None], drawn.costs[rows, None])
+        self._costs = drawn.costs
+        rewards = reward_of_cost(drawn.costs)
+        infos = proposal_infos(self.stage, drawn, self.numbers, self.world.errors)
+        infos["best_cost"] = problems.best_costs.copy()
+        infos["evaluations"] = problems.evaluations.copy()
+        full = stepping & (problems.evaluations >= self.evaluations_per_frame)
+        terminated, committed = self._commit(np.flatnonzero(full), drawn.pictures)
+        infos["frame"] = self._frames()
+        ends = terminated, np.zeros_like(terminated)
+        return self.end_step(stepping, drawn.pictures, rewards, ends, infos, committed)
+
+    def _commit(self, rows: Rows, pictures: Image) -> tuple[Flags, dict[int, Infos]]:
+        """Commit the best proposals of some environments, whose next frames begin in their pictures.
+
+        Returns which episodes (n,) end with that, and the infos of what was committed by environment.
+        """
+        terminated = np.zeros(self.num_envs, dtype=bool)
+        committed: dict[int, Infos] = {}
+        if not rows.size:
+            return terminated, committed
+        poses, places = self.stage.decode(self._problems.best[:, None], rows)
+        for i in rows.tolist():
+            sequence = self._sequences[i]
+            committed[i] = committed_infos(
+                sequence.instance,
+                sequence.frame,
+                poses[i, 0],
+                places[i, 0],
+                float(self._problems.best_costs[i]),
+                self.world.errors,
+            )
+            terminated[i] = sequence.commit(self._problems.best[i])
+            if not terminated[i]:
+                self._begin_frame(i)
+                self.stage.set_body(i, poses[i, 0], places[i, 0])
+        going = rows[~terminated[rows]]
+        pictures[going] = self.stage.pictures(going)
+        return terminated, committed
+
+    def _frames(self) -> Rows:
+        """Return the current frame (n,) of each environment."""
+        frames = [self._sequences[i].frame for i in range(self.num_envs)]
+        return np.minimum(frames, self.frames - 1)
+
+    def row_attribute(self, name: str, i: int) -> Any:
+        """Return an attribute that environment i has for itself."""
+        if name == "instance":
+            self.check_reset()
+            return self._sequences[i].instance
+        return super().row_attribute(name, i)
+
+    def picture(self, i: int) -> Picture:
+        """Return the picture of the last proposal in environment i, or of the pose that was committed last."""
+        problems = self.problems
+        label = _label(
+            int(self.numbers[i]),
+            self._sequences[i].frame,
+            self._costs[i],
+            problems.best_costs[i],
+            problems.evaluations[i],
+        )
+        return render_frame(problems[i].cost, self.stage.body(i), label)
+
+
+def _checked(frames: Any, evaluations_per_frame: Any) -> tuple[int, int]:
+    return (
+        checked(whole, "frames", frames, 1),
+        checked(whole, "evaluations_per_frame", evaluations_per_frame, 2),
+    )
+
+
+def _label(
+    number: int | None, frame: int, cost: float, best: float, evaluations: int
+) -> str:
+    """Return the words below a picture."""
+    if not evaluations:
+        return f"instance {number}, frame {frame}"
+    return f"frame {frame}: cost {cost:.1f}, best {best:.1f}, {evaluations} evaluations"
 
 
 def committed_infos(

@@ -30,6 +30,9 @@ FIRST_IOH_ID = 26_300
 def ioh_problem(problem: Problem) -> Any:
     """Return a problem of IOHexperimenter with the number, instance, bounds and, where known, the optimum.
 
+    Its name begins with that of the suite: to a log's own field for it, `unknown_suite`, ioh 0.4 lets no problem from
+    elsewhere write.
+
     Its count is the problem's, whose budget holds here too, and its `reset` resets both. J. de Nobel et al.,
     IOHexperimenter: benchmarking platform for iterative optimization heuristics, Evolutionary Computation 32(3), 2024.
     """

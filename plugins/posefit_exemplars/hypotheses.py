@@ -22,7 +22,13 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.contours import STEP_EVALUATIONS, fitted, precisions
+from posefit.fitting.contours import (
+    STEP_EVALUATIONS,
+    contour_race,
+    fitted,
+    precisions,
+    race_count,
+)
 from posefit.fitting.landmarks import (
     exchanged_given,
     exchanged_next,
@@ -48,6 +54,7 @@ CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 MIN_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS  # of a frame
 FRESH_SHARE = 0.45  # of the evaluations
 REFLECTED_SHARE = 0.25  # of the fresh hypotheses: reflections of the others
+FIRST_REFLECTED_SHARE = 0.5  # of those of the first frame
 # of clips, whose limbs are tried in turn, and how often each limb is
 LIMB_POSES = 16
 LIMB_ROUNDS = 2
@@ -64,6 +71,8 @@ SIMILAR_SPREAD = 0.03  # metres: that they are off the nearest of them
 # metres: d times that off the clips costs LIBRARY_COST log(1 + d^2 / 2)
 LIBRARY_DISTANCE = 0.05
 LIBRARY_COST = 4.0  # for a thirtieth of a second
+# the same of the first frame, whose hypotheses are fitted longer
+FIRST_LIBRARY_COST = 1.0
 # times the cost of a silhouette on the path, as fitted poses are nearer
 SHARPNESS = 2.0
 STEP_SPREAD = 4.0 / 3.0  # times the spread of the path's steps
@@ -210,9 +219,15 @@ class HypothesisFilter:
         )
         self._evaluations = evaluations
 
-    def counts(self, camera_count: int) -> Counts:
-        """Return how many hypotheses a frame has in which so many cameras show something; several leave less open."""
+    def counts(self, camera_count: int, first: bool = False) -> Counts:
+        """Return how many hypotheses a frame has in which so many cameras show something; several leave less open.
+
+        In the `first` frame of a track nothing continues, and all evaluations are for fresh ones.
+        """
         evaluations = max(self._evaluations / camera_count, MIN_EVALUATIONS)
+        if first:
+            fresh = race_count(evaluations)
+            return Counts(fresh, fresh - 1 - int(FIRST_REFLECTED_SHARE * fresh), 0)
         fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
         continued = int(
             (evaluations - fresh * FRESH_EVALUATIONS) / CONTINUED_EVALUATIONS
@@ -274,25 +289,34 @@ class HypothesisFilter:
         With them come how imprecise its masks are, and the evaluations of the fits.
         """
         frame_costs = estimate.frame_costs
-        evaluations = 0.0
         fresh = self._fresh(estimate, latest, rows, rng)
         continued = (latest.poses[rows], latest.places[rows])
-        noise = self._noise(frame_costs, *fresh)
+        noise, evaluations = self._noise(frame_costs, *fresh)
         if frame_costs.usable:
-            evaluations = (
-                len(fresh[0]) * FRESH_EVALUATIONS + len(rows) * CONTINUED_EVALUATIONS
-            )
-            evaluations += LIMB_EVALUATIONS * (
-                frame_costs.observation.estimate is not None
-            )
+            tried_limbs = frame_costs.observation.estimate is not None
+            evaluations += LIMB_EVALUATIONS * tried_limbs
             contours = frame_costs.contours(estimate.place)
             weights = precisions(
                 START_TURN / noise,
                 ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT,
             )
-            fresh = fitted(
-                self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES
-            )
+            if not len(latest.poses):
+                *fresh, used = contour_race(
+                    self._task.body,
+                    contours,
+                    fresh,
+                    weights,
+                    lambda poses, places: self._pose_costs(
+                        frame_costs, poses, places, noise, FIRST_LIBRARY_COST
+                    ),
+                )
+                evaluations += used + len(fresh[0])
+            else:
+                fresh = fitted(
+                    self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES
+                )
+                evaluations += len(fresh[0]) * FRESH_EVALUATIONS
+            evaluations += len(rows) * CONTINUED_EVALUATIONS
             if len(rows):
                 moved, shifted = latest.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)
@@ -317,6 +341,27 @@ class HypothesisFilter:
             evaluations,
         )
 
+    def _pose_costs(
+        self,
+        frame_costs: FrameCosts,
+        poses: Array,
+        places: Array,
+        noise: float,
+        library_cost: float,
+    ) -> Array:
+        """Return what poses (n, 66) at places (n, 3) cost: their silhouettes, and the distance from those of clips."""
+        squares = self._exemplars.nearest(poses, 1)[1][:, 0]
+        silhouette_costs = frame_costs.full(poses, places)
+        self._least_cost = float(silhouette_costs.min())
+        # beside an earlier track, with limbs that no clip has together, each view counts as much as clips do
+        alone = frame_costs.observation.estimate is None
+        views = 1 if alone else frame_costs.camera_count
+        distances = np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
+        return np.asarray(
+            silhouette_costs / (noise * self._temperature)
+            + library_cost / views * distances
+        )
+
     def _joined(
         self,
         frame_costs: FrameCosts,
@@ -334,21 +379,9 @@ class HypothesisFilter:
         landmarks = landmark_costs(likelihoods, exchanged[:, None])
         costs = landmarks.min(axis=0)
         if frame_costs.usable:
-            squares = self._exemplars.nearest(poses, 1)[1][:, 0]
-            silhouette_costs = frame_costs.full(poses, places)
-            self._costs.append(float(silhouette_costs.min()))
-            costs += silhouette_costs / (noise * self._temperature)
-            # beside an earlier track, with limbs that no clip has together, each view counts as much as clips do
-            views = (
-                1
-                if frame_costs.observation.estimate is None
-                else frame_costs.camera_count
-            )
-            costs += (
-                self._library_cost
-                / views
-                * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
-            )
+            library_cost = FIRST_LIBRARY_COST if before is None else self._library_cost
+            costs += self._pose_costs(frame_costs, poses, places, noise, library_cost)
+            self._costs.append(self._least_cost)
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
         latest = before.hypotheses
@@ -365,17 +398,22 @@ class HypothesisFilter:
         states = markov.frame_states(costs, before.states, steps)
         return states, exchanged_given(likelihoods, exchanged[states.parents])
 
-    def _noise(self, frame_costs: FrameCosts, poses: Array, places: Array) -> float:
-        """Return how many times less precise one camera's masks are than clean ones, by the best frames so far."""
+    def _noise(
+        self, frame_costs: FrameCosts, poses: Array, places: Array
+    ) -> tuple[float, float]:
+        """Return how many times less precise one camera's masks are than clean ones, by the best frames so far.
+
+        With it come the evaluations that this took.
+        """
         if frame_costs.camera_count > 1:
-            return 1.0
+            return 1.0, 0.0
+        evaluations = 0.0
         if frame_costs.usable and not self._costs:
-            self._costs.append(
-                FITTED_COST_SHARE * float(frame_costs.full(poses, places).min())
-            )
-        return max(
-            float(np.quantile(self._costs or [0.0], BEST_SHARE)) / CLEAN_COST, 1.0
-        )
+            least = float(frame_costs.full(poses, places).min())
+            self._costs.append(FITTED_COST_SHARE * least)
+            evaluations = float(len(poses))
+        typical = float(np.quantile(self._costs or [0.0], BEST_SHARE))
+        return max(typical / CLEAN_COST, 1.0), evaluations
 
     def _fresh(
         self,
@@ -400,7 +438,8 @@ class HypothesisFilter:
         tried = [(poses, places)]
         likeliest = latest.continued(rows) if len(rows) else (poses, places)
         # of reflections
-        count = self.counts(frame_costs.camera_count).fresh - len(poses)
+        counts = self.counts(frame_costs.camera_count, not len(latest.poses))
+        count = counts.fresh - len(poses)
         if count > 0:
             reflectable, place = (
                 array[: -(-count // frame_costs.camera_count)] for array in likeliest

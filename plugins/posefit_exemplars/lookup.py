@@ -41,6 +41,7 @@ PICTURE = 64
 SIDE = 16
 DIMENSIONS = 64  # of a code
 CANDIDATES = 512  # that are nearest in the table, whose costs are counted
+COSTS_SHARE = 0.08  # of a frame's evaluations: for these costs, at most
 TEMPERATURE = 4.0  # divides their costs
 # squared, of codes, to the nearest: 99 % of damaged silhouettes of unknown people are
 # nearer
@@ -234,13 +235,14 @@ class Lookup:
 
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return the poses that a frame may show, with weights; None where its silhouettes are like none of them."""
+        if not observation.usable:
+            return None
         known = self.task.yaw if observation.yaw is None else observation.yaw
-        nearest = (
-            self.nearest(observation, CANDIDATES, known) if observation.usable else None
-        )
+        frame_costs = FrameCosts(self.task, observation)
+        affordable = int(COSTS_SHARE * self.task.evaluations / frame_costs.small_share)
+        nearest = self.nearest(observation, min(CANDIDATES, affordable), known)
         if nearest is None or nearest[2] > MAX_DISTANCE:
             return None
-        frame_costs = FrameCosts(self.task, observation)
         poses = self.exemplars.with_yaws(*nearest[:2])
         places = frame_costs.aligned(
             poses, np.repeat(self.task.anchor[None], len(poses), axis=0)

@@ -332,7 +332,8 @@ class ExemplarTracker:
         """Return the estimate of a frame: the weighted mean of the states like that of the path."""
         beam = frame.beam
         frame_costs = frame.frame_costs
-        count = self.hypotheses.counts(frame_costs.camera_count).diverse
+        first = frame.states.kernel is None  # there is no frame before it
+        count = self.hypotheses.counts(frame_costs.camera_count, first).diverse
         diverse = beam.rows(
             beams.diverse_best(self.exemplars, beam, beam.totals, count)
         )

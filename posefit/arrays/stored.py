@@ -62,7 +62,8 @@ def stored(kind: str, key: bytes, make: Callable[[], Arrays]) -> Arrays:
 
 def _read(path: Path) -> Arrays:
     """Return the arrays of a file. An archive has a checksum of each array, which is compared as it is read."""
-    with np.load(path, allow_pickle=False) as file:
+    # NumPy leaves a damaged archive open that it has opened itself
+    with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}
     if not arrays:
         raise ValueError(f"{path} is empty")
@@ -77,7 +78,8 @@ def _write(path: Path, arrays: Arrays) -> None:
     beside = path.with_name(f".{path.stem}-{secrets.token_hex(4)}.npz")
     try:
         with beside.open("xb") as file:
-            np.savez(file, **arrays)
+            named: dict[str, Any] = dict(arrays)
+            np.savez(file, **named)
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)

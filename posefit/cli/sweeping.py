@@ -20,7 +20,7 @@ from posefit.cli.output import print_result, results_alone, say
 @click.option(
     "--shard",
     metavar="I/N",
-    help="Run each Nth cell from the Ith, into a file of its own in DIR.",
+    help="Run the Ith of N shards of the cells, into a file of its own in DIR.",
 )
 @options(ENGINE)
 @click.option(

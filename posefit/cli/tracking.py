@@ -196,7 +196,7 @@ def extract(
     person: Any,
     **options: Any,
 ) -> None:
-    """Take the masks of one person out of a VIDEO before a still background."""
+    """Take the masks of one person out of a VIDEO, or a folder of pictures, before a still background."""
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import kind_of

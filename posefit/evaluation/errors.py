@@ -3,7 +3,7 @@
 `FRAME` are the columns of frames.csv: a column is a line there, and its values in `evaluated`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -118,13 +118,15 @@ def evaluated(
     training: Array | None,
     beta: float,
     clock: Array,
+    effort: Mapping[str, int] | None = None,
 ) -> tuple[Table, Measures]:
     """Return a column for each figure of a frame, and what the whole track is worth.
 
     Baselines have the true root and translation, which a tracker has not: `mean_pose`, the mean of the training poses
     (n, 63), which only the errors against a truth need; `persistence`, the true pose of the first frame; `nearest`, the
     training pose of least cost in each frame. `prior_floor_degrees` is the error of the truth projected into the prior,
-    which is no floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took.
+    which is no floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took, and
+    `effort` the evaluations of each stage; without it all are of the frames.
     """
     cost = np.array([frame.cost for frame in frames])
     held = np.zeros(len(frames), dtype=bool)
@@ -152,6 +154,8 @@ def evaluated(
         "wall_seconds": np.array([frame.seconds for frame in frames]),
     }
     seconds, cpu_seconds = clock.tolist()
+    effort = effort or {"frames": int(evaluations.sum())}
+    total = sum(effort.values())
     measures = Measures(
         **error_measures,
         **certainty_measures,
@@ -161,8 +165,9 @@ def evaluated(
         held_frames=int(held.sum()),
         seconds_per_frame=seconds / len(frames),
         cpu_seconds_per_frame=cpu_seconds / len(frames),
-        evaluations=int(evaluations.sum()),
-        evaluations_per_second=float(evaluations.sum()) / seconds,
+        evaluations=total,
+        effort=effort,
+        evaluations_per_second=total / seconds,
     )
     return table, measures
 

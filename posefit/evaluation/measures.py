@@ -180,7 +180,13 @@ class Measures:
         "CPU time", "ms a frame", 1, "the same in CPU time of all threads", 1e3
     )
     evaluations: int = _figure(
-        "evaluations", "", 0, "poses whose cost was computed, in all frames together"
+        "evaluations", "", 0, "poses whose cost was computed, in all stages together"
+    )
+    effort: Mapping[str, int] | None = _figure(
+        "effort",
+        "evaluations",
+        0,
+        "evaluations by stage: the first pose, the build, the frames, and later passes over them",
     )
     evaluations_per_second: float = _figure(
         "speed", "poses a second", 0, "evaluations over that time"

@@ -192,7 +192,8 @@ class CMAES:
 
     It learns from the better half of a population and against the worse one (active CMA). When it stagnates it starts
     again from a fresh draw with twice the population (IPOP). As many proposals are drawn as should make enough feasible
-    ones; where these are too few, others are moved towards the best of the last generation until they are feasible.
+    ones; where these are too few, others are moved towards the best of the last generation until they are feasible. Of
+    a draw beyond the box it learns where it was drawn, as worse than all others; its cost counts for the best alone.
 
     Settings:
         population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen 2016.
@@ -234,6 +235,7 @@ class CMAES:
         self.asked = self._drawn()
 
     def _drawn(self) -> Array:
+        """Return the next population (n, d), and keep what the strategy learns of it."""
         n = self.population_size
         drawn = wrap(
             self.space,
@@ -243,11 +245,18 @@ class CMAES:
         self.share = max(np.count_nonzero(feasible) / len(drawn), MIN_SHARE)
         population = drawn[feasible][:n]
         moved = drawn[~feasible][: n - len(population)]
-        return (
-            np.concatenate([population, repair(self.space, moved, self.home)])
-            if len(moved)
-            else population
-        )
+        self.learned = population
+        self.beyond = np.zeros(n)
+        if not len(moved):
+            return population
+        repaired = repair(self.space, moved, self.home)
+        # a point on a side is not what was drawn: learned as if it were, many of them
+        # would widen the distribution across the box, and nothing would narrow it
+        beyond = np.linalg.norm(moved - np.clip(moved, -1.0, 1.0), axis=1)
+        self.beyond[len(population) :] = beyond
+        learned = np.where(beyond[:, None] > 0.0, moved, repaired)
+        self.learned = np.concatenate([population, learned])
+        return np.concatenate([population, repaired])
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
@@ -261,10 +270,15 @@ class CMAES:
         known = finite_costs(costs)
         mean = self.strategy.mean
         self.home = self.asked[known.argmin()]
+        # what lies beyond the box costs more than all that is in it, and the more the
+        # farther away it is
+        # HANSEN2016 (B.5)
+        ranked = np.where(self.beyond > 0.0, known.max() + self.beyond, known)
+        learned = self.learned
         # the mean goes on past the end of a circle, and so must what it learns from
         if self.space.periodic.any():
-            proposals = mean + displacement(self.space, mean, proposals)
-        self.strategy.learn(proposals, known)
+            learned = mean + displacement(self.space, mean, learned)
+        self.strategy.learn(learned, ranked)
         if self.strategy.generation % CHECKED == 0 and self.strategy.ended():
             self.population_size *= GROWTH  # AUGER2005 (restart)
             self._start(self.anywhere)

@@ -1,6 +1,6 @@
 """Poses moved until the contours of a body are those of masks, by least squares: one frame, or the sums for many."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
 
@@ -14,6 +14,7 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
+from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import (
     Mask,
     coarser_camera,
@@ -242,6 +243,7 @@ def fitted(
     places = start[1].copy()
     weights = precisions[np.append([0, 1, 2], 3 + angles)]
     for scale in scales:
+        count_poses(STEP_EVALUATIONS * len(views) * len(poses))
         hessians, gradients, *_ = contour_squares(body, views, poses, places, scale)
         off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
         np.einsum("nii->ni", hessians)[:] += weights  # on the diagonals
@@ -251,6 +253,69 @@ def fitted(
         places -= steps[:, :3]
         poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
     return poses, places
+
+
+# the steps of each round of a race, by their scales, and the share of the poses that
+# takes part in it, the cheapest ones
+ROUNDS: Sequence[tuple[Sequence[float], float]] = (
+    ((0.09, 0.065), 1.0),
+    ((0.065, 0.045, 0.045), 0.33),
+    ((0.033,) * 8, 0.1),
+)
+
+
+def race_count(evaluations: float) -> int:
+    """Return how many poses can race within so many evaluations, and have their costs at the end; 0 if not even one."""
+    count = 0
+    while _race_evaluations(count + 1) <= evaluations:
+        count += 1
+    return count
+
+
+def _race_evaluations(count: int) -> float:
+    total = float(count)
+    for scales, share in ROUNDS:
+        remaining = max(int(share * count), 1)
+        total += remaining * len(scales) * STEP_EVALUATIONS
+        total += count * (remaining < count)
+    return total
+
+
+def contour_race(
+    body: Body,
+    views: Sequence[MaskContours],
+    start: tuple[Array, Array],
+    weights: Array,
+    cost: Callable[[Array, Array], Array],
+) -> tuple[Array, Array, int]:
+    """Return poses (n, 66) and places (n, 3) fitted to the contours of a frame in rounds, the cheapest of them longest.
+
+    The right pose is seldom the cheapest before it is fitted, and a wrong one seldom becomes as cheap as the right one.
+
+    Args:
+        body: the person's.
+        views: the contours that each camera shows.
+        start: the poses and the places to begin with.
+        weights: the precisions (69,) of places and angles, see `precisions`.
+        cost: returns the costs (n,) of poses at places; each counts as an evaluation.
+
+    Returns:
+        All poses and places, and the evaluations, of which each step counts as 27.
+
+    """
+    poses, places = (array.copy() for array in start)
+    evaluations = 0
+    for scales, share in ROUNDS:
+        rows = np.arange(len(poses))
+        remaining = max(int(share * len(poses)), 1)
+        if remaining < len(poses):
+            costs = cost(poses, places)
+            evaluations += len(poses)
+            rows = np.argsort(costs, kind="stable")[:remaining]
+        here = poses[rows], places[rows]
+        poses[rows], places[rows] = fitted(body, views, here, here[0], weights, scales)
+        evaluations += int(remaining * len(scales) * STEP_EVALUATIONS)
+    return poses, places, evaluations
 
 
 def precisions(turn: float, shift: float) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
-from posefit.fitting.validation import BrokenRuleError, plugin_errors
+from posefit.fitting.validation import BrokenRuleError, FreeAxes, plugin_errors
 from posefit.reading import quoted
 from posefit.silhouette.cost import pose_costs
 from posefit.silhouette.drawn import PoseCount, uncounted
@@ -23,6 +23,7 @@ from posefit.silhouette.drawn import PoseCount, uncounted
 UNCOUNTED_POSES = 10
 # ours: costs are rounded where they are added up in another order
 COST_TOLERANCE = 1e-6
+NO_ANGLES = np.empty((0, 63))
 
 
 @dataclass(eq=False)
@@ -73,39 +74,61 @@ def drive(
     Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
     pose. An honest frame stays as it is. Raises BrokenRuleError where a frame is missing or wrong.
     """
-    reader = _Reader(observations)
+    waiting = deque[Observation]()  # taken, and without their frames
+    reading = np.zeros(2)  # the clocks of what is no time of the tracker
+    unreadable: Exception | None = None
+
+    def taken() -> Iterator[Observation]:
+        nonlocal unreadable
+        coming = iter(observations)
+        while True:
+            start = clocks()
+            try:
+                with uncounted():  # to render a motion is no evaluation
+                    observation = next(coming)
+            except StopIteration:
+                return
+            except Exception as error:
+                unreadable = error
+                raise
+            finally:
+                reading[:] += clocks() - start
+            waiting.append(observation)
+            yield observation
+
+    source = taken()
+    axes = FreeAxes(task.body.skeleton, task.angles if task.training else NO_ANGLES)
     drawn = PoseCount()
     frames: Iterator[Frame] | None = None
-    yielded = evaluations = 0
+    yielded = 0
+    evaluations = 0
+    passed = (InputError, ImportError, GeneratorExit)
     while True:
-        start = clocks() - reader.clocks
+        start = clocks() - reading
         try:
-            with (
-                drawn.counting(),
-                plugin_errors(
-                    audit.name, "it", passed=(InputError, ImportError, GeneratorExit)
-                ),
-            ):
-                frames = iter(tracker.track(reader, rng)) if frames is None else frames
+            with drawn.counting(), plugin_errors(audit.name, "track", passed):
+                if frames is None:
+                    frames = iter(tracker.track(source, rng))
                 frame = next(frames, None)
         except BrokenRuleError as broken:
-            if reader.error is not None and broken.__cause__ is reader.error:
+            if unreadable is not None and broken.__cause__ is unreadable:
                 # what could not be read is not the tracker's fault
-                raise reader.error from None
+                raise unreadable from None
             raise
         if frame is None:
             break
-        seconds, cpu_seconds = (clocks() - reader.clocks - start).tolist()
-        if not reader.waiting:
+        seconds, cpu_seconds = (clocks() - reading - start).tolist()
+        if not waiting:
             raise audit.broken(
                 f"track must yield a frame for each observation, got {yielded + 1} for {yielded}"
             )
-        observation = reader.waiting.popleft()
-        _check(frame, audit)
+        observation = waiting.popleft()
+        if rule := _broken(frame, axes):
+            raise audit.broken(rule)
         # it may have drawn poses for observations that it looks at ahead
-        ahead = task.evaluations * len(reader.waiting)
+        ahead = task.evaluations * len(waiting)
         counted = math.ceil(drawn.poses / len(task.cameras)) - evaluations - ahead
-        leeway = UNCOUNTED_POSES * (yielded + 1 + len(reader.waiting))
+        leeway = UNCOUNTED_POSES * (yielded + 1 + len(waiting))
         if counted > frame.evaluations + leeway:
             audit.note(
                 "evaluations",
@@ -123,38 +146,10 @@ def drive(
         yielded = yielded + 1
         evaluations = evaluations + frame.evaluations
         yield replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
-    if reader.waiting or next(reader, None) is not None:
+    if waiting or next(source, None) is not None:
         raise audit.broken(
             f"track must yield a frame for each observation, got {yielded} and then no more"
         )
-
-
-class _Reader:
-    """Observations as a tracker takes them: they wait for their frames, and the time that reading takes is its own."""
-
-    def __init__(self, observations: Iterable[Observation]) -> None:
-        self._rest = iter(observations)
-        self.waiting: deque[Observation] = deque()
-        self.clocks = np.zeros(2)  # seconds, and CPU seconds, see `clocks`
-        self.error: Exception | None = None  # why an observation could not be read
-
-    def __iter__(self) -> Iterator[Observation]:
-        return self
-
-    def __next__(self) -> Observation:
-        start = clocks()
-        try:
-            with uncounted():  # to render a motion is no evaluation
-                observation = next(self._rest)
-        except StopIteration:
-            raise
-        except Exception as error:
-            self.error = error
-            raise
-        finally:
-            self.clocks += clocks() - start
-        self.waiting.append(observation)
-        return observation
 
 
 def clocks() -> Array:
@@ -162,23 +157,23 @@ def clocks() -> Array:
     return np.array([time.perf_counter(), time.process_time()])
 
 
-def _check(frame: Frame, audit: Audit) -> None:
+def _broken(frame: object, axes: FreeAxes) -> str:
+    """Return the rule that a tracker's frame breaks, or ""."""
+    if not isinstance(frame, Frame):
+        return (
+            f"track must yield a Frame for each observation, got {type(frame).__name__}"
+        )
     if np.shape(frame.pose) != (66,) or not np.isfinite(frame.pose).all():
-        raise audit.broken(
-            f"a pose must be 66 finite angles, got shape {np.shape(frame.pose)}"
-        )
+        return f"a pose must be 66 finite angles, got shape {np.shape(frame.pose)}"
     if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
-        raise audit.broken(
-            f"a translation must be 3 finite metres, got {frame.translation}"
-        )
+        return f"a translation must be 3 finite metres, got {frame.translation}"
     if not isinstance(frame.evaluations, int | np.integer) or frame.evaluations < 0:
-        raise audit.broken(
-            f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}"
-        )
+        return f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}"
     if np.ndim(frame.trace) != 2 or np.shape(frame.trace)[1] != 2:
-        raise audit.broken(
-            f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}"
-        )
+        return f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}"
+    if rule := axes.broken(np.asarray(frame.pose)[None, 3:]):
+        return f"a pose must {rule}"
+    return ""
 
 
 def _with_true_cost(
@@ -189,9 +184,10 @@ def _with_true_cost(
     place = np.asarray(frame.translation, np.float64)[None]
     # without bits that it may change
     observed = [replace(silhouette) for silhouette in observation.silhouettes]
-    costs, counts = pose_costs(
-        task.body, task.cameras, observed, pose, place, audit.beta
-    )
+    with uncounted():  # to check a frame is no evaluation
+        costs, counts = pose_costs(
+            task.body, task.cameras, observed, pose, place, audit.beta
+        )
     true = counts[:, 0]
     if not np.array_equal(true, frame.areas):
         audit.note(

@@ -17,6 +17,7 @@ from pickle import PicklingError
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -89,7 +90,7 @@ def minimise(
             "factory(space, rng, evaluations=...) or iterations=...",
             stacklevel=2,
         )
-    return problem
+    return problem  # SAPSO A1.3
 
 
 @final
@@ -193,6 +194,7 @@ class Problem:
         A call does this itself; it is for those who have the costs already, of several problems in one call.
         """
         # nan is below nothing
+        # SAPSO (5)
         for k in np.flatnonzero(costs < self.best_cost):
             if costs[k] < self.best_cost:
                 self.best_cost = float(costs[k])
@@ -312,3 +314,40 @@ class Problem:
 
     def __repr__(self) -> str:
         return f"<{self.id}: {self.evaluations} evaluations, best {self.best_cost:.4g}>"
+
+
+@final
+class Problems:
+    """n problems side by side, a row each: they count and remember in arrays what one `Problem` does by itself.
+
+    Their proposals are evaluated together, in one compiled call, by whoever owns them, and then counted here.
+    """
+
+    def __init__(self, count: int, dimension: int) -> None:
+        self.evaluations = np.zeros(count, dtype=np.int64)
+        self.best_costs = np.full(count, np.inf)
+        self.best = np.zeros((count, dimension))
+        self._makers: dict[int, Callable[[], Problem]] = {}
+
+    def __len__(self) -> int:
+        return len(self.evaluations)
+
+    def __getitem__(self, row: int) -> Problem:
+        """Return the problem of a row for a search of its own: nothing of it is evaluated yet."""
+        return self._makers[range(len(self))[row]]()
+
+    def begin(self, row: int, make: Callable[[], Problem]) -> None:
+        """Let a row be another problem, of which nothing is evaluated yet; it is made when it is asked for."""
+        self._makers[row] = make
+        self.evaluations[row] = 0
+        self.best_costs[row] = np.inf
+
+    def count(self, rows: NDArray[np.int64], proposals: Array, costs: Array) -> None:
+        """Count the proposals (m, k, d) of some rows (m,), which cost (m, k), and remember the best of each."""
+        self.evaluations[rows] += costs.shape[1]
+        least = costs.min(axis=1)
+        better = np.flatnonzero(least < self.best_costs[rows])
+        if better.size:
+            lowest = costs[better].argmin(axis=1)
+            self.best_costs[rows[better]] = least[better]
+            self.best[rows[better]] = proposals[better, lowest]

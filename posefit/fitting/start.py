@@ -14,7 +14,8 @@ from posefit.arrays import Array
 from posefit.fitting.box import Start
 from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.space import SearchSpace
-from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
+from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, clusters_of, poses_apart
 
 MAX_MODES = 8
@@ -22,9 +23,15 @@ MAX_MODES = 8
 # that rough
 MODE_RADIUS = 0.2
 MODE_SPREAD = 0.08  # standard deviation of a mode, in half-ranges of the box
-MIN_SMALL_SIDE = 60  # pixels of the picture in which projected poses are compared
+# pixels of the picture in which projected poses are compared, and by how much it is
+# smaller at most
+MIN_SMALL_SIDE = 40
+MAX_FACTOR = 4
 TEMPERATURE = 2.0  # divides their costs
 INFEASIBLE_COST = 5.0  # added to the cost of a pose that the prior does not allow
+# metres along an axis, and radians, that the right one of searched poses is off
+JOINT_ERROR = 0.06
+ANGLE_ERROR = 0.25
 
 
 def modes_apart(
@@ -50,13 +57,22 @@ def modes_apart(
 
 
 def start_in(cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]) -> Start:
-    """Return the start of a search around modes of what it may show, the likeliest first.
+    """Return the start of a search around modes of what it may show, the likeliest first: see `starts_in`."""
+    first, *others = starts_in(cost, modes)
+    return replace(first, others=others)
+
+
+def starts_in(
+    cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]
+) -> list[Start]:
+    """Return a start around each mode of what a search may show, the likeliest first.
 
     Each mode is around that of its poses which, projected onto the latents, costs least in a small picture; these costs
     weigh the modes again, as a space that cannot show a pose need not be searched there.
     """
     space = cost.space
-    factor = max(min(cost.silhouettes[0].size) // MIN_SMALL_SIDE, 1)
+    side = min(cost.silhouettes[0].size)
+    factor = min(max(side // MIN_SMALL_SIDE, 1), MAX_FACTOR)
     projected = [
         space.proposals(coordinates_of(space, mode.poses, mode.translations))
         for _, mode in modes
@@ -73,8 +89,7 @@ def start_in(cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]) -> 
         Start(poses[each.argmin()], spread, velocity, weight)
         for poses, each, weight in zip(projected, costs, weights, strict=True)
     ]
-    starts.sort(key=lambda start: -start.weight)
-    return replace(starts[0], others=starts[1:])
+    return sorted(starts, key=lambda start: -start.weight)
 
 
 def coordinates_of(space: SearchSpace, poses: Array, translations: Array) -> Array:
@@ -86,3 +101,12 @@ def coordinates_of(space: SearchSpace, poses: Array, translations: Array) -> Arr
     if space.translation == "searched":
         parts.insert(1, translations)
     return np.hstack(parts)
+
+
+def posterior_of(poses: Array, places: Array, costs: Array) -> Posterior:
+    """Return what one frame may show, by the poses (n, 66) at which its searches ended: cheaper ones are likelier."""
+    errors = Recalibration(
+        np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR)
+    )
+    weights = np.exp((costs.min() - costs) / TEMPERATURE)
+    return Posterior(poses, places, weights, coherent=True, recalibration=errors)

@@ -1,5 +1,6 @@
 """Tracking by synthesis: predict, search, commit, frame by frame. SAPSO section 4."""
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, cast
@@ -9,18 +10,26 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
+from posefit.fitting.carried import (
+    CARRIED,
+    carried,
+    plugin_of,
+    revived,
+    with_carried,
+)
 from posefit.fitting.check import at_least, between, choices, one_of, positive, whole
 from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
 from posefit.fitting.prior import Latents, Tilt
 from posefit.fitting.problem import Problem, minimise
+from posefit.fitting.race import cheapest, race
 from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace, Translation
-from posefit.fitting.start import modes_apart, start_in
+from posefit.fitting.start import modes_apart, posterior_of, start_in
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, Areas
-from posefit.silhouette.drawn import uncounted
+from posefit.silhouette.drawn import PoseCount, uncounted
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
@@ -36,6 +45,8 @@ COORDINATES = "coordinates"
 # Interpretation S5: their floor, in half-ranges of the box, so that a still subject
 # keeps some spread
 FLOOR = 0.05
+# of a frame: with fewer, a guess would leave too few for a search. Ours
+MIN_GUESSED_EVALUATIONS = 100
 
 
 @dataclass(frozen=True)
@@ -111,6 +122,8 @@ class Task:
     start: "InitialiserFactory | None" = field(default=None, repr=False)
     # earlier ones, where an interrupted track goes on
     before: Sequence[Frame] = field(default=(), repr=False)
+    # whether frames hold what a filter carries, so that another process can go on
+    resumable: bool = False
     threads: int = 1
     # whether observations and training come in reverse, the last one first
     backwards: bool = False
@@ -161,8 +174,13 @@ InitialiserFactory = Callable[..., Initialiser]
 def guessed_modes(
     task: Task, observation: Observation
 ) -> Sequence[tuple[float, Posterior]]:
-    """Return the modes of what an observation may show; none where nothing guesses them, or the pose is known."""
+    """Return the modes of what an observation may show; none where nothing guesses them, or the pose is known.
+
+    A very small budget is for the search alone.
+    """
     if task.start is None or task.first_pose is not None or not observation.usable:
+        return ()
+    if task.evaluations < MIN_GUESSED_EVALUATIONS:
         return ()
     posterior = task.start(task).posterior(observation)
     return () if posterior is None else modes_apart(task.body.skeleton, posterior)
@@ -256,9 +274,11 @@ class Predictor:
         ]
         # coordinates of the latest gbest, the newest last
         self._latest: list[Array] = earlier[-HISTORY_FRAMES:]
+        self.guess_evaluations = 0  # that the guess of the latest start took
 
     def space(self, observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
+        self.guess_evaluations = 0
         self._space = (
             self._next_space(observation.translation)
             if self._latest
@@ -278,21 +298,37 @@ class Predictor:
         space = self._space
         if observation.translation is not None:
             space = space.around(space.centre, anchor=observation.translation)
-        if modes := task.modes or guessed_modes(task, observation):
-            cost = SilhouetteCost(
-                task.body,
-                task.cameras,
-                observation.silhouettes,
-                space,
-                beta=self._prediction.beta,
-                blank=True,
-            )
-            return replace(space, start=start_in(cost, modes))
+        start, self.guess_evaluations = self._guessed_start(space, observation)
+        if start is not None:
+            return replace(space, start=start)
         if task.first_pose is not None:
             return replace(
                 space, start=self._start_at_known_pose(space, task.first_pose)
             )
         return space
+
+    def _guessed_start(
+        self, space: SearchSpace, observation: Observation
+    ) -> tuple[Start | None, int]:
+        """Return the start around guessed modes, if there are any, and the evaluations that the guess took.
+
+        An initialiser is a plugin, and counts nothing: the poses that it draws are counted.
+        """
+        task = self._task
+        drawn = PoseCount()
+        start = None
+        with drawn.counting():
+            if modes := task.modes or guessed_modes(task, observation):
+                cost = SilhouetteCost(
+                    task.body,
+                    task.cameras,
+                    observation.silhouettes,
+                    space,
+                    beta=self._prediction.beta,
+                    blank=True,
+                )
+                start = start_in(cost, modes)
+        return start, math.ceil(drawn.poses / len(task.cameras))
 
     def _next_space(self, anchor: Array | None) -> SearchSpace:
         """Return the box around the last result, whose start is spread as wide as the last step."""
@@ -336,12 +372,13 @@ class Predictor:
 class SynthesisTracker:
     """Follows a person by a search a frame, started around a prediction. SAPSO section 4.
 
-    `make` builds an optimiser from a space and a generator; `next_frame` says what becomes of it in the next frame.
+    `make` builds an optimiser from a space and a generator, and from the evaluations of its search where these are not
+    the task's; `next_frame` says what becomes of it in the next frame.
     """
 
     task: Task
     prior: Latents
-    make: Callable[[Space, np.random.Generator], Optimiser]
+    make: Callable[..., Optimiser]
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
     # of the prior and the training, where it was learned before
@@ -361,20 +398,68 @@ class SynthesisTracker:
                 latest = self._held(latest, space, observation)
                 yield latest
                 continue
+            budget = task.evaluations - predictor.guess_evaluations
+            several = space.start is not None and len(space.start.others) > 0
+            if several and self.next_frame == "start":
+                searches = self._raced(space, observation, budget, rng)
+                best = cheapest(searches[0])
+                predictor.commit(best.best)
+                latest = _frame(best, searches, predictor.guess_evaluations)
+                yield latest
+                continue
+            if self.next_frame == "carry" and optimiser is None:
+                optimiser = self._revived(space, rng)
             if self.next_frame == "carry" and optimiser is not None:
                 cast(Filter, optimiser).advance(space)
             else:
-                optimiser = self.make(
-                    replace(space, start=None)
-                    if self.next_frame == "forget"
-                    else space,
-                    rng,
+                known = replace(space, start=None)
+                optimiser = self._made(
+                    known if self.next_frame == "forget" else space, rng, budget
                 )
-            problem = self.problem(space, observation)
+            problem = self.problem(space, observation, budget)
             minimise(problem, optimiser, budget_known=True)
             predictor.commit(problem.best)
-            latest = _frame(problem, space)
+            latest = _frame(problem, [[problem]], predictor.guess_evaluations)
+            if self.next_frame == "carry" and task.resumable:
+                state = carried(plugin_of(optimiser), space, rng)
+                latest = with_carried(latest, state)
             yield latest
+
+    def _revived(
+        self, space: SearchSpace, rng: np.random.Generator
+    ) -> Optimiser | None:
+        """Return the filter that the frames before this track held; None if they held none."""
+        for frame in reversed(self.task.before):
+            if state := frame.details.get(CARRIED):
+                return revived(state, space, rng, self.make)
+        return None
+
+    def _made(
+        self, space: Space, rng: np.random.Generator, evaluations: int
+    ) -> Optimiser:
+        """Return an optimiser of a search within so many evaluations."""
+        if evaluations == self.task.evaluations:
+            return self.make(space, rng)
+        return self.make(space, rng, evaluations)
+
+    def _raced(
+        self,
+        space: SearchSpace,
+        observation: Observation,
+        budget: int,
+        rng: np.random.Generator,
+    ) -> list[list[Problem]]:
+        """Return the searches from each of the modes that a frame may show, the best first."""
+        assert space.start is not None
+
+        def search(start: Start, evaluations: int) -> Problem:
+            around = replace(space, start=replace(start, others=()))
+            problem = self.problem(around, observation, evaluations)
+            optimiser = self._made(around, rng, evaluations)
+            return minimise(problem, optimiser, budget_known=True)
+
+        starts = [replace(space.start, others=()), *space.start.others]
+        return race(starts, search, budget)
 
     def _held(
         self, latest: Frame | None, space: SearchSpace, observation: Observation
@@ -386,13 +471,15 @@ class SynthesisTracker:
             places = latest.translation[None]
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
-        problem = self.problem(space, observation)
+        problem = self.problem(space, observation, self.task.evaluations)
         with uncounted():
             costs, areas = problem.cost_and_areas(poses, places)
         return Frame(poses[0], places[0], float(costs[0]), areas[:, 0], 0)
 
-    def problem(self, space: SearchSpace, observation: Observation) -> Problem:
-        """Return the problem that a frame is: its pose in a space, within the task's budget."""
+    def problem(
+        self, space: SearchSpace, observation: Observation, budget: int
+    ) -> Problem:
+        """Return the problem that a frame is: its pose in a space, within a budget."""
         task = self.task
         cost = SilhouetteCost(
             task.body,
@@ -403,20 +490,40 @@ class SynthesisTracker:
             threads=task.threads,
             blank=True,
         )
-        return Problem(cost, space, task.evaluations, id="a frame")
+        return Problem(cost, space, budget, id="a frame")
 
 
-def _frame(problem: Problem, space: SearchSpace) -> Frame:
-    best = problem.best
-    poses, translations = problem.decode(best[None])
+def _frame(
+    best: Problem, searches: Sequence[Sequence[Problem]], guess_evaluations: int
+) -> Frame:
+    """Return the frame of the best of some searches, with the evaluations of all and of the guess before them.
+
+    Several modes of what the frame may show are its posterior.
+    """
+    poses, translations = best.decode(best.best[None])
     with uncounted():  # its result drawn again is no evaluation
-        areas = problem.cost_and_areas(poses, translations)[1][:, 0]
+        areas = best.cost_and_areas(poses, translations)[1][:, 0]
+    problems = [problem for mode in searches for problem in mode]
+    evaluations = guess_evaluations + sum(each.evaluations for each in problems)
+    used, costs = best.trace
+    # the course of the best search, behind all that went on beside it
+    trace = np.column_stack([used + (evaluations - best.evaluations), costs])
     return Frame(
         poses[0],
         translations[0],
-        problem.best_cost,
+        best.best_cost,
         areas,
-        problem.evaluations,
-        np.column_stack(problem.trace),
-        details={COORDINATES: space.coordinates(best)},
+        evaluations,
+        trace,
+        posterior=_posterior(searches) if len(searches) > 1 else None,
+        details={COORDINATES: cast(SearchSpace, best.space).coordinates(best.best)},
     )
+
+
+def _posterior(searches: Sequence[Sequence[Problem]]) -> Posterior:
+    """Return what a frame may show, by the poses at which the searches of its modes ended."""
+    bests = [cheapest(problems) for problems in searches]
+    decoded = [best.decode(best.best[None]) for best in bests]
+    poses = np.concatenate([poses for poses, _ in decoded])
+    places = np.concatenate([places for _, places in decoded])
+    return posterior_of(poses, places, np.array([best.best_cost for best in bests]))

@@ -1,5 +1,6 @@
-"""Checks what optimisers and priors of plugins return: a broken rule ends the search, with one line that names them."""
+"""What plugins return in a run is checked once: a broken rule ends it, with one line that names plugin and call."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,12 +12,14 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import Optimiser
 from posefit.fitting.prior import Latents
 from posefit.fitting.problem import BudgetError
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton
 from posefit.silhouette.drawn import PoseCount
 
 FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
+JOINT_ANGLES = 63
+FIXED_TOLERANCE = 1e-9  # radians, as an .amc file is written
 POSEFIT = Path(__file__).parents[1]  # whose lines are not a plugin's
 
 
@@ -24,66 +27,94 @@ class BrokenRuleError(InputError):
     """A plugin broke one of the rules that its kind has to keep; it is shown in one line, as a user's mistake."""
 
 
-class CheckedOptimiser:
-    """An optimiser whose proposals are checked; errors name it by `name`.
+class Checked:
+    """An optimiser or a prior of a plugin, in a run: a call that fails, or an answer that breaks a rule, names both.
 
-    `evaluations` is the budget of a search, which has to hold the first population.
+    Of an optimiser, `space` is what it searches, and `evaluations` the budget of a search, which has to hold the first
+    population. All other rules of plugins stand in `posefit.testing`.
     """
 
     def __init__(
         self,
-        optimiser: Optimiser,
-        space: Space,
+        plugin: Any,
         name: str,
+        space: Space | None = None,
         evaluations: int | None = None,
     ) -> None:
-        self._optimiser = optimiser
+        self.plugin = plugin
+        self.name = name
         self._space = space
-        self._name = name
-        self._evaluations, self._first, self._drawn = evaluations, True, PoseCount()
+        self._evaluations = evaluations
+        self._first = True  # whether the next population is the first of a search
+        self._drawn = PoseCount()
+        if space is None:
+            self.low = np.asarray(plugin.low)
+            self.high = np.asarray(plugin.high)
 
     def ask(self) -> Array:
-        """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
-        with self._called("ask"):
-            proposals = self._optimiser.ask()
-        check_population(proposals, self._space, self._name)
-        count = len(proposals)
-        budget = self._evaluations
-        if self._first and not count:
-            raise self._broken(
-                "ask must return a first population of one proposal or more, got none"
-            )
-        if self._first and budget is not None and count > budget:
-            raise BudgetError(
-                f"{self._name}: evaluations must hold one population of {count}, got {budget}"
-            )
+        """Return the optimiser's next population (n, d)."""
+        proposals: Array = self._call("ask")
+        assert self._space is not None
+        check_population(proposals, self._space, self.name)
+        if self._first:
+            count = len(proposals)
+            if not count:
+                rule = "return a first population of one proposal or more, got none"
+                raise BrokenRuleError(f"{self.name}: ask must {rule}")
+            if self._evaluations is not None and count > self._evaluations:
+                rule = f"hold one population of {count}, got {self._evaluations}"
+                raise BudgetError(f"{self.name}: evaluations must {rule}")
         return proposals
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Pass the costs on."""
+        """Pass the costs (n,) on."""
         self._first = False
-        with self._called("tell"):
-            self._optimiser.tell(proposals, costs)
+        self._call("tell", proposals, costs)
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
         self._space = space
         self._first = True
-        with self._called("advance"):
-            self._optimiser.advance(space)  # type: ignore[attr-defined]
+        self._call("advance", space)
 
-    @contextmanager
-    def _called(self, what: str) -> Iterator[None]:
-        """Raise BrokenRuleError where the body fails, or draws poses: all evaluations are the search's."""
-        with self._drawn.counting(), plugin_errors(self._name, what):
-            yield
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        return self._rows("transform", angles, len(self.low))
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        return self._rows("inverse_transform", latents, JOINT_ANGLES)
+
+    def feasible(self, latents: Array) -> Any:
+        """Return which latents (n, m) are poses at all (n,)."""
+        return self._call("feasible", latents)
+
+    def _call(self, what: str, *arguments: Any) -> Any:
+        # not `plugin_errors`, which takes as long as a few poses
+        try:
+            answer = self._drawn.during(getattr(self.plugin, what), *arguments)
+        except BrokenRuleError:  # it names another plugin, which this one called
+            raise
+        except (Exception, SystemExit) as error:
+            raise _broken_by(self.name, what, error) from error
         if self._drawn.poses:
-            raise self._broken(
-                f"{what} must leave evaluations to the search, got {self._drawn.poses:g} of its own"
+            rule = (
+                f"leave evaluations to the search, got {self._drawn.poses:g} of its own"
             )
+            raise BrokenRuleError(f"{self.name}: {what} must {rule}")
+        return answer
 
-    def _broken(self, rule: str) -> BrokenRuleError:
-        return BrokenRuleError(f"{self._name}: {rule}")
+    def _rows(self, what: str, rows: Array, columns: int) -> Array:
+        answer: Array = self._call(what, rows)
+        shape = (len(rows), columns)
+        if np.shape(answer) != shape:
+            rule = f"return shape {shape}, got {np.shape(answer)}"
+            raise BrokenRuleError(f"{self.name}: {what} must {rule}")
+        # a sum is finite only where all of it is
+        if not math.isfinite(np.sum(answer)):
+            rule = "return finite numbers, got some that are not"
+            raise BrokenRuleError(f"{self.name}: {what} must {rule}")
+        return answer
 
 
 def check_population(proposals: Any, space: Space, name: str) -> None:
@@ -150,37 +181,32 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
     )
 
 
-class CheckedPrior:
-    """A prior that has learned; an error in it names it, whichever plugin called it."""
+class FreeAxes:
+    """The axes about which the joints of a skeleton turn. Angles about the others are 0, and cannot be written.
 
-    def __init__(self, prior: Latents, name: str) -> None:
-        self._prior = prior
-        self._name = name
-        self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
+    In training angles (T, 63) of another skeleton they may be others; then as far off 0 is allowed.
+    """
 
-    def transform(self, angles: Array) -> Any:
-        """Return the latents (n, m) of joint angles (n, 63)."""
-        return self._call("transform", angles)
+    def __init__(self, skeleton: Skeleton, training: Array) -> None:
+        self._fixed = np.flatnonzero(~skeleton.free[ANGLES - JOINT_ANGLES :])
+        least = np.full(len(self._fixed), FIXED_TOLERANCE)
+        self._reach = np.abs(training[:, self._fixed]).max(axis=0, initial=0.0) + least
 
-    def inverse_transform(self, latents: Array) -> Any:
-        """Return the joint angles (n, 63) of latents (n, m)."""
-        return self._call("inverse_transform", latents)
-
-    def feasible(self, latents: Array) -> Any:
-        """Return which latents (n, m) are poses at all (n,)."""
-        return self._call("feasible", latents)
-
-    def _call(self, method: str, *arguments: Any) -> Any:
-        try:  # not `plugin_errors`, which takes as long as a few poses
-            return getattr(self._prior, method)(*arguments)
-        except (Exception, SystemExit) as error:
-            raise _broken_by(self._name, method, error) from error
+    def broken(self, angles: Array) -> str:
+        """Return the rule that joint angles (n, 63) break, or ""."""
+        off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
+        if not (off > self._reach).any():
+            return ""
+        worst = int((off - self._reach).argmax())
+        joint, axis = divmod(int(self._fixed[worst]), 3)
+        place = f"the {'xyz'[axis]} axis of {JOINTS[INNER[joint]]}"
+        return f"turn joints about their free axes only, got {off[worst]:.3g} rad about {place}"
 
 
-def check_prior(prior: Latents, training: Array, name: str) -> None:
+def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) -> None:
     """Raise BrokenRuleError, which begins with `name`, where a prior's range or answers are wrong.
 
-    `training` (T, 63) are the joint angles that it has learned from.
+    `training` (T, 63) are the joint angles that it has learned from, of a person with this skeleton.
     """
 
     def broken(rule: str) -> BrokenRuleError:
@@ -219,6 +245,10 @@ def check_prior(prior: Latents, training: Array, name: str) -> None:
         )
     ]
     drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
+    axes = FreeAxes(skeleton, training)
+    for poses in (back, prior.inverse_transform(drawn)):
+        if rule := axes.broken(np.asarray(poses)):
+            raise broken(f"inverse_transform must {rule}")
     if not (
         np.any(feasible)
         or any(

@@ -27,6 +27,9 @@ RIVAL_AREA = 0.4
 # of the height of both: parts of a person that stand above each other are no farther
 # apart
 ABOVE_GAP = 0.3
+# of the person's area: the largest hole that is filled in a mask by itself. Between an
+# arm and the trunk it says where the arm is, and no other frame does
+MAX_HOLE_ALONE = 0.002
 # of the person's area: where the picture's edge leaves less of it, there is too little
 # to search
 CUT_SHOWN = 0.5
@@ -83,6 +86,8 @@ def cleaned(
             known[:] = 255
             masks = replace(masks, valid=known)
     others = people.others(parts)
+    if holes is None:
+        holes = MAX_HOLE_AREA if len(masks) > 1 else MAX_HOLE_ALONE
     areas = np.zeros(len(masks))
     cut = np.zeros(len(masks), dtype=bool)
     for k in range(len(masks)):
@@ -93,9 +98,7 @@ def cleaned(
             mask = people_in(silhouette)[0]
             if words:
                 mask, valid = planes_of(parts, others, k, silhouette.valid)
-            mask = (
-                without_holes(mask, MAX_HOLE_AREA if holes is None else holes) & valid
-            )
+            mask = without_holes(mask, holes) & valid
             usable[k], areas[k], cut[k] = mask.any(), mask.sum(), touches_border(mask)
         masks.masks[k] = np.packbits(mask)
         if words and masks.valid is not None:

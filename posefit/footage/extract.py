@@ -62,9 +62,9 @@ def extract(
             warnings = [*warnings, f"preview.mp4 is missing: {error}"]
         _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+            table = csv.DictWriter(file, list(rows[0]))
+            table.writeheader()
+            table.writerows(rows)
     return {
         "video": str(source),
         "method": how.name,

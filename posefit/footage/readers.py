@@ -65,6 +65,8 @@ SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
 NEAR_SCALE = 1.25
 # of the highest value: where the lowest is as far below 0, they are logits, not degrees
 SIGNED = 0.2
+# the same where the highest is no usual scale: resampling goes no farther beyond an edge
+RINGING = 0.1
 LISTED_LABELS = 6  # in a message
 
 # (height, width): grey levels, an alpha channel, indices of a palette, or colours
@@ -623,10 +625,10 @@ class ValueCounts:
             raise self._several(name, labels)
         threshold = float(labels[0] // 2) if labels else self._half[0]
         # what is far above the only label is no edge of it, as the 255 around the objects of PASCAL VOC
-        most = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
-        if self.highest > most:
-            return _between(threshold, most), [
-                f"{ends}: the person is above {threshold:g}, and what is above {most:g} is not"
+        limit = max(labels[0], NEAR_SCALE * labels[0]) if labels else self.highest
+        if self.highest > limit:
+            return _between(threshold, limit), [
+                f"{ends}: the person is above {threshold:g}, and what is above {limit:g} is not"
             ]
         return _above(threshold), [
             f"{ends}: the person is above {threshold:g}, what is between is an edge"
@@ -648,7 +650,7 @@ class ValueCounts:
         usual = any(
             0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
         )
-        if self.lowest < -SIGNED * self.highest or (self.lowest < 0.0 and not usual):
+        if self.lowest < -(SIGNED if usual else RINGING) * self.highest:
             return 0.0, "logits"
         if self.alpha and self.highest <= SCALES[1] // 2:
             return float(self.highest // 2), "translucent"

@@ -32,6 +32,10 @@ WRITTEN_RATES = 0.01, 60_000.0  # frames a second of a file that OpenCV writes
 # of the distance between frames: one that comes so much too early or too late is not in
 # its place
 UNEVEN = 0.75
+# seconds that the times of frames are rounded to in many files
+STAMP = 1e-3
+# by which share the length of a film may differ from its rate's without a word
+SAME_RATE = 5e-3
 # times the mean rate: frames are not taken more often, however short some of them are
 DENSEST = 4.0
 # posefit reports once what is wrong with a file; a user may set the variable to get FFmpeg's own messages
@@ -94,7 +98,8 @@ class Video:
         finally:
             capture.release()
         stated = np.isfinite(fps) and 0.0 < fps <= 1000.0
-        order, filmed, rate = _even(_moments(path), fps if stated else FPS)
+        moments = _moments(path)
+        order, filmed, rate = _even(moments, fps if stated else FPS)
         warnings = []
         if across > 0.0 < down and abs(across / down - 1.0) > SQUARE:
             aspect = f"{across / down:.3g} times as wide as high"
@@ -107,11 +112,17 @@ class Video:
                 f"{path}: its frames come at uneven times; it is sampled {rate:.3g} times a second, so that {held} of "
                 f"{len(order)} frames stand for moments without a filmed one, and are held"
             )
-        guesses = (
-            []
-            if stated
-            else [f"{path}: {FPS:g} frames a second, which the file does not state"]
-        )
+        guesses = []
+        by_stamps = rate != (fps if stated else FPS)
+        if not stated:
+            unsaid = (
+                "by its frames' times" if by_stamps else "which the file does not state"
+            )
+            guesses.append(f"{path}: {rate:.4g} frames a second, {unsaid}")
+        elif by_stamps and not uneven:
+            guesses.append(
+                f"{path}: {rate:.4g} frames a second by its frames' times, where its head says {fps:.4g}"
+            )
         size = image.shape[1], image.shape[0]
         video = cls(
             path,
@@ -122,10 +133,10 @@ class Video:
             _order=order,
             _filmed=filmed,
         )
-        # what a file says counts the frames as they were filmed
+        # what a file says counts the frames as they were filmed, often by its length and the rate in its head
         return (
             replace(video, claimed=int(claimed))
-            if 0.0 < claimed < 1e9 and not uneven
+            if 0.0 < claimed < 1e9 and not (uneven or by_stamps)
             else video
         )
 
@@ -287,8 +298,9 @@ def _even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
     if len(times) < 3 or not (apart > 0.0).all():  # a file that does not say
         return whole, whole >= 0, fps
     mean = float(apart.mean())
-    if np.abs(times - times[0] - mean * whole).max() <= UNEVEN * mean:
-        return whole, whole >= 0, fps
+    off = float(np.abs(times - times[0] - mean * whole).max())
+    if off <= UNEVEN * mean:
+        return whole, whole >= 0, _rate(times, off, fps)
     usual = max(float(np.median(apart)), mean / DENSEST)
     # stamps are rounded
     usual = float(apart.sum() / np.maximum(np.round(apart / usual), 1.0).sum())
@@ -310,6 +322,22 @@ def video_rate(fps: float) -> float:
     rate = float(np.clip(fps, *WRITTEN_RATES))
     digits = next(digits for digits in (3, 2, 1, 0) if rate * 10**digits <= MAX_TICKS)
     return round(rate, digits)
+
+
+def _rate(times: Array, off: float, stated: float) -> float:
+    """Return how many frames a second come at even times, which are `off` seconds off at most.
+
+    It is the stated rate where the times allow it, or else the nearest whole rate, or 1000 / 1001 of one, that they do.
+    """
+    intervals = len(times) - 1
+    lasted = float(times[-1] - times[0])
+    rate = intervals / lasted
+    # the first and the last may be off by as much
+    slack = max(STAMP + 2.0 * off, SAME_RATE * lasted)
+    for likely in (stated, float(round(rate)), round(rate * 1.001) / 1.001):
+        if likely > 0.0 and abs(intervals / likely - lasted) <= slack:
+            return likely
+    return rate
 
 
 class VideoWriter:

@@ -139,17 +139,18 @@ def clips(
 
     Raises InputError where one of them is not in the library, or where no one is left.
     """
-    only = tuple(only)
+    people = subjects()
+    only = tuple(only) or people
     without = tuple(without)
     for subject in (*only, *without):
-        if subject not in subjects():
+        if subject not in people:
             raise InputError(
-                f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}"
+                f"a subject of the library must be one of {', '.join(people)}, got {quoted(subject)}"
             )
     chosen = [
         clip
         for clip in _stored().values()
-        if clip.subject not in without and clip.subject in (only or subjects())
+        if clip.subject not in without and clip.subject in only
     ]
     if not chosen:
         raise InputError("the library must keep at least one person, got all left out")

@@ -107,16 +107,15 @@ class Content:
         return unseen(self.table)
 
     @cached_property
-    def columns(self) -> dict[str, Sequence[Any]]:
+    def columns(self) -> dict[str, Any]:
         """The columns (T,) of frames.csv: figures, activity, and joints, unknown ones as NaN."""
         points = self.motion.joints.reshape(len(self.frames), -1).T.copy()  # (81, T)
         points[:, np.isin(self.table["frame"], list(self.blank))] = np.nan
         names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
-        return {
-            **self.table,
-            "activity": [frame.activity for frame in self.frames],
-            **dict(zip(names, points, strict=True)),
-        }
+        columns: dict[str, Any] = dict(self.table)
+        columns["activity"] = [frame.activity for frame in self.frames]
+        columns.update(zip(names, points, strict=True))
+        return columns
 
     @cached_property
     def intervals(self) -> dict[str, Array]:

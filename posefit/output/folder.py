@@ -11,19 +11,28 @@ from typing import Any, Self
 
 from posefit.errors import InputError
 from posefit.files import MARK, Unfinished, opencv_name, other_entries
+from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.output.content import Content
 from posefit.output.files import FILES, video_warning, write_files
 from posefit.output.identity import Digest, difference
-from posefit.output.record import append_frame, read_frames
+from posefit.output.record import (
+    append_frame,
+    read_carried,
+    read_frames,
+    write_carried,
+)
 from posefit.progress import WARNING
 from posefit.reading import cut, parsed_json, read_text
 
 RECORD = "frames.jsonl"
 SUMMARY = "summary.json"
 MAX_SUMMARY_BYTES = 10_000_000
-_WRITTEN = (*FILES, RECORD)  # the names of what a track writes to its folder
+# what a filter carries from the latest frame, and from the one before it
+CARRIED_FILES = ("carried-0.npz", "carried-1.npz")
+# the names of what a track writes to its folder
+_WRITTEN = (*FILES, RECORD, *CARRIED_FILES)
 
 
 class Recorder:
@@ -67,6 +76,7 @@ class OutputFolder(Recorder):
     ) -> None:
         self.path, self._spec, self._log = Path(path), dict(spec), log
         self._recorded = 0
+        self._slot = 0  # of the carried files, the one that is written next
         self._force = force
         _check_target(self.path, force)
         self._unfinished = _interrupted(self.path, self._spec) if resume else None
@@ -86,6 +96,14 @@ class OutputFolder(Recorder):
             ) from None
         if damage:
             self._log(f"{WARNING}{damage}; tracked again from there")
+        latest = -1
+        for slot, name in enumerate(CARRIED_FILES):
+            kept = read_carried(self.building / name)
+            # one of a frame that was not recorded any more counts for nothing
+            if kept is not None and latest < kept[0] < len(frames):
+                latest = kept[0]
+                self._slot = 1 - slot
+                frames[latest] = with_carried(frames[latest], kept[1])
         self._earlier = (frames, state)
         self._recorded = len(frames)
         return self
@@ -103,7 +121,8 @@ class OutputFolder(Recorder):
                 raise InputError(
                     f"{self.path}: expected its name to be free, got {where}"
                 ) from None
-            (self.path / RECORD).unlink(missing_ok=True)
+            for name in (RECORD, *CARRIED_FILES):
+                (self.path / name).unlink(missing_ok=True)
             return
         notice = ""
         if self._recorded:
@@ -130,7 +149,13 @@ class OutputFolder(Recorder):
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
-        append_frame(self.building / RECORD, frame, state)
+        if (kept := frame.details.get(CARRIED)) is not None:
+            # the one before it stays until the frame is recorded
+            write_carried(
+                self.building / CARRIED_FILES[self._slot], self._recorded, kept
+            )
+            self._slot = 1 - self._slot
+        append_frame(self.building / RECORD, with_carried(frame, None), state)
         self._recorded += 1
 
     def begin(self, scene: Scene) -> None:

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Frame
 from posefit.reading import cut
 from posefit.uncertainty.modes import Posterior
+
+ARRAY = "number of an array"
 
 
 def append_frame(path: Path, frame: Frame, state: Mapping[str, Any]) -> None:
@@ -22,6 +25,40 @@ def append_frame(path: Path, frame: Frame, state: Mapping[str, Any]) -> None:
     ).encode()
     with path.open("ab") as file:
         file.write(b"%08x %s\n" % (zlib.crc32(text), text))
+
+
+def write_carried(path: Path, number: int, state: Mapping[str, Any]) -> None:
+    """Write what a filter carries from a frame, by its number: see `posefit.fitting.carried`."""
+    arrays: list[Array] = []
+
+    def apart(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            arrays.append(value)
+            return {ARRAY: len(arrays) - 1}
+        return value.item()  # a number of NumPy
+
+    text = json.dumps({"number": number, "state": state}, default=apart)
+    named = {f"array_{k}": array for k, array in enumerate(arrays)}
+    with path.open("wb") as file:
+        np.savez(file, text=np.array(text), **named)  # type: ignore[arg-type]
+
+
+def read_carried(path: Path) -> tuple[int, dict[str, Any]] | None:
+    """Return what a filter carried from a frame, and its number; None where a file holds no such thing."""
+    if not path.is_file() or path.is_symlink():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as file:
+
+            def whole(mapping: dict[str, Any]) -> Any:
+                if mapping.keys() == {ARRAY}:
+                    return file[f"array_{int(mapping[ARRAY])}"]
+                return mapping
+
+            read = json.loads(str(file["text"]), object_hook=whole)
+        return int(read["number"]), dict(read["state"])
+    except Exception:  # whatever a damaged file raises
+        return None
 
 
 def read_frames(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:

@@ -174,12 +174,20 @@ def _worth(measures: Measures) -> str:
 def _effort(track: Content) -> str:
     measures = track.measures
     setup = track.setup
-    used = measures.evaluations / setup.frames
-    budget = setup.evaluations_per_frame * max(len(track.log.hypotheses), 1)
     seconds = MEASURES["seconds_per_frame"].number(measures.seconds_per_frame)
-    # frames that are tracked again have more than one budget
-    of = f" of {budget:,}" if used <= budget else ""
-    return f"{_shown(measures, 'iou')}, {used:,.0f}{of} evaluations and {seconds} ms a frame"
+    budget = setup.evaluations_per_frame * max(len(track.log.hypotheses), 1)
+    effort = measures.effort or {"frames": measures.evaluations}
+    frame = effort["frames"] / setup.frames
+    # frames that are searched again have more than one budget
+    of = f" of {budget:,}" if frame <= budget else ""
+    others = [
+        f"{count:,} for the {stage.replace('_', ' ')}"
+        for stage, count in effort.items()
+        if stage != "frames"
+    ]
+    besides = f" (and {', '.join(others)})" if others else ""
+    evaluations = f"{frame:,.0f}{of} evaluations{besides}"
+    return f"{_shown(measures, 'iou')}, {evaluations} and {seconds} ms a frame"
 
 
 def _frames(count: int, of: str) -> str:

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from secrets import token_hex
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
 from posefit.errors import InputError
 from posefit.progress import interactive
@@ -23,8 +25,6 @@ from posefit.sweep.pool import Pool, cores
 if TYPE_CHECKING:
     import pandas as pd
 
-TEMPORARY = "posefit-"  # how the names of temporary folders begin
-
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -36,7 +36,11 @@ class Comparison:
 
     folder: Path
     tally: Tally
-    _temporary: TemporaryDirectory[str] | None = field(repr=False)
+    _is_temporary: bool = field(default=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self._is_temporary:
+            finalize(self, rmtree, self.folder.parent, ignore_errors=True)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return every finished row, as `Ledger.rows` yields them."""
@@ -56,18 +60,22 @@ class Comparison:
         return "\n".join(leaderboard_lines(write_report(str(self.folder), None)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        if self._temporary is None:
-            return Comparison, (self.folder, self.tally, None)
+        if not self._is_temporary:
+            return Comparison, (self.folder, self.tally)
         return _unpickled, (self.tally, (self.folder / FILE).read_bytes())
 
 
 def _unpickled(tally: Tally, ledger: bytes) -> Comparison:
     """Return a comparison whose temporary folder holds a ledger."""
-    temporary = TemporaryDirectory(prefix=TEMPORARY)
-    folder = Path(temporary.name) / "results"
+    folder = _temporary_folder()
     folder.mkdir()
     (folder / FILE).write_bytes(ledger)
-    return Comparison(folder, tally, temporary)
+    return Comparison(folder, tally, True)
+
+
+def _temporary_folder() -> Path:
+    """Return a folder that is not there yet, in a new temporary one."""
+    return Path(mkdtemp(prefix="posefit-")) / "results"
 
 
 def compare(
@@ -104,8 +112,7 @@ def compare(
     }
     grid = {"grid": lists.pop("grid")} if "grid" in lists else {}
     plan = Plan.of({"product": crossed, "defaults": lists, **grid})
-    temporary = TemporaryDirectory(prefix=TEMPORARY) if out is None else None
-    folder = Path(temporary.name) / "results" if temporary else Path(str(out))
+    folder = _temporary_folder() if out is None else Path(out)
     say = interactive().log
     if factories and folder.exists():
         names = ", ".join(factories)
@@ -119,7 +126,13 @@ def compare(
         run_cell,
         partial(register, factories),
     )
-    return Comparison(folder, swept(plan, folder, pool, say), temporary)
+    try:
+        tally = swept(plan, folder, pool, say)
+    except BaseException:
+        if out is None:
+            rmtree(folder.parent, ignore_errors=True)
+        raise
+    return Comparison(folder, tally, out is None)
 
 
 def _named(

@@ -17,13 +17,27 @@ SHADOW = 0.25  # how tall a shadow is at strength 1, as a share of the person
 EDGE = 0.02  # of the person's height: how far the edge wanders at strength 1
 
 
-def corrupted(mask: Mask, noise: Mapping[str, float], rng: np.random.Generator) -> Mask:
-    """Return a mask (height, width) with each corruption at its strength; one that would be empty stays as it was."""
+def corrupted(
+    mask: Mask,
+    noise: Mapping[str, float],
+    rng: np.random.Generator,
+    *,
+    shows: bool = True,
+) -> Mask:
+    """Return a mask (height, width) with each corruption at its strength; one that would be empty stays as it was.
+
+    A strength too small to change a pixel of this mask is doubled until it does, so that it `shows`.
+    """
     spoilt = mask
     for name, corrupt in CORRUPTIONS.items():
         strength = noise.get(name, 0.0)
         if strength > 0.0 and spoilt.any():
-            spoilt = corrupt(spoilt, strength, rng)
+            before = spoilt
+            spoilt = corrupt(before, strength, rng)
+            # otherwise a frame would count as damaged that is not
+            while shows and strength < 1.0 and np.array_equal(spoilt, before):
+                strength = min(2.0 * strength, 1.0)
+                spoilt = corrupt(before, strength, rng)
     return spoilt if spoilt.any() else mask
 
 

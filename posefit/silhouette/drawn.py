@@ -1,11 +1,14 @@
 """Counts of drawn poses, by which the evaluations that a plugin reports are checked."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import Any, TypeVar
 
 from posefit.silhouette.mask import Silhouette
+
+T = TypeVar("T")
 
 
 class PoseCount:
@@ -23,6 +26,14 @@ class PoseCount:
         """Count so many poses."""
         with self._lock:
             self.poses += poses
+
+    def during(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Return what a function returns, and count what it draws; unlike `counting` an outer count gets nothing."""
+        token = _current.set(self)
+        try:
+            return function(*arguments)
+        finally:
+            _current.reset(token)
 
     @contextmanager
     def counting(self) -> Iterator[None]:

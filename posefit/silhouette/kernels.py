@@ -18,6 +18,8 @@ from posefit.silhouette.rasteriser import (
 )
 from posefit.silhouette.spans import STRIP_PIXELS, popcount
 
+ONE_BIT = np.uint64(1)
+
 
 class Observed(NamedTuple):
     """A silhouette as the kernel wants it."""
@@ -55,14 +57,16 @@ def paint_bits(image, box, value, pixels):
         image.reshape(-1).view(np.uint32).reshape(image.shape[0], 2 * image.shape[1])
     )
     for y in range(2 * box[0], min(2 * box[1], height)):
-        for w in range(box[2], box[3] + 1):
-            x = STRIP_PIXELS * w
-            word = words[w, y]
-            while (word != 0) & (x < width):
-                if word & np.uint32(1):
+        for strip in range(box[2], box[3] + 1):
+            first = STRIP_PIXELS * strip
+            word = np.uint64(words[strip, y])
+            # from set bit to set bit: a branch at every pixel would be mispredicted at each border
+            while word != NONE:
+                lowest = word & (~word + ONE_BIT)
+                x = first + np.intp(popcount(lowest - ONE_BIT))
+                if x < width:
                     pixels[y, x] |= value
-                word >>= np.uint32(1)
-                x += 1
+                word ^= lowest
 
 
 @jit

@@ -250,6 +250,8 @@ def _noisy(draft: _Draft) -> SuiteInstance:
             mask,
             dict(zip(DAMAGES, rng.uniform(0.0, STRENGTH, len(DAMAGES)), strict=True)),
             rng,
+            # the instances of a published suite stay as they are
+            shows=False,
         )
         noisy.append(replace(made.frames[0], silhouettes=[Silhouette.of(damaged)]))
     return replace(made, noisy=noisy)

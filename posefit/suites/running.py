@@ -16,7 +16,7 @@ from posefit import settings
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.problem import BudgetError, Problem, minimise
-from posefit.fitting.validation import CheckedOptimiser, plugin_errors
+from posefit.fitting.validation import Checked, plugin_errors
 from posefit.registry import registry
 from posefit.statistics.profiles import expected_running_time, hits
 from posefit.suites.functions import suite_function
@@ -81,7 +81,7 @@ def run_on(
         optimiser = factory(
             space, rng, **settings.planned(factory, chosen, evaluations)
         )
-    guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", evaluations)
+    guarded = Checked(optimiser, f"optimiser {method}", space, evaluations)
     minimise(problem, guarded, budget_known=True)
     return run_of(problem, method, chosen, seed=seed, budget=evaluations)
 

@@ -16,9 +16,12 @@ from posefit.errors import InputError
 from posefit.sweep.cell import run_cell
 from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome, Run, text_of
 from posefit.sweep.pool import Pool
+from posefit.version import posefit_build
 
 CONNECT_TIMEOUT_SECONDS = 30.0  # seconds to wait for a scheduler, and for its workers
 CLOSE_SECONDS = 5.0
+# what a process answers, also without posefit, to which build it has
+_BUILD = "__import__('posefit.version', fromlist=['version']).posefit_build()"
 _thread = threading.local()
 
 
@@ -51,11 +54,32 @@ class Cluster:
                 scheduler, timeout=patience, set_as_default=False
             )  # type: ignore[no-untyped-call]
             self._client.wait_for_workers(1, timeout=patience)
+            self._check_versions()
+        except InputError:
+            self.close()
+            raise
         except (OSError, ValueError, TimeoutError) as error:
             self.close()
             cause = " ".join(str(error).split())
             raise InputError(
                 f"scheduler must be one with workers that answers, got {scheduler}: {cause}"
+            ) from None
+
+    def _check_versions(self) -> None:
+        """Raise InputError if a worker has another posefit or none, or if the scheduler cannot read a job.
+
+        Dask would end such a worker, or have each job fail by what looks like the job's own fault.
+        """
+        wanted = posefit_build()
+        for worker, found in self._client.run(eval, _BUILD, on_error="return").items():
+            if found != wanted:
+                came = found if isinstance(found, str) else f"none ({text_of(found)})"
+                raise InputError(f"the worker {worker} must have {wanted}, got {came}")
+        try:
+            self._client.run_on_scheduler(eval, _BUILD)
+        except ImportError as error:
+            raise InputError(
+                f"the scheduler {self._address} must have posefit, got none ({text_of(error)})"
             ) from None
 
     def window(self) -> int:

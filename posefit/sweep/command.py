@@ -19,6 +19,7 @@ from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS, Plan
 from posefit.sweep.pool import Pool, cores
 
+SHARDS = "ledger-*-of-*.sqlite"  # the names that `file_of` gives
 VALUES = 12  # of a field, that a preview lists
 
 
@@ -46,7 +47,8 @@ def swept(
                 say(
                     f"{counted(count, 'row')} in {out} are of another version, {cut(version)}, and do not count here"
                 )
-        ledger.plan(cells_of(plan, shard))
+        elsewhere = done_elsewhere(Path(out)) if shard is None else set()
+        ledger.plan(cells_of(plan, shard), elsewhere)
         if retry_quarantined:
             count = ledger.release_quarantined()
             say(
@@ -92,9 +94,23 @@ def file_of(shard: str | None) -> str:
 
 
 def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
-    """Return the cells of a plan, or each Nth of them, from the Ith, for a shard I/N."""
-    first, _, count = (shard or "1/1").partition("/")
-    return islice(plan, int(first) - 1, None, int(count))
+    """Return the cells of a plan, or of one shard I/N.
+
+    A cell's key decides its shard, so that it stays there, whatever is added to the plan.
+    """
+    if shard is None:
+        return iter(plan)
+    number, count = map(int, shard.split("/"))
+    return (cell for cell in plan if int(cell.key, 16) % count == number - 1)
+
+
+def done_elsewhere(out: Path) -> set[str]:
+    """Return the keys of the cells that shards in a folder have done: a run without shards does not repeat them."""
+    files = [file for file in sorted(out.glob(SHARDS)) if file.stat().st_size]
+    if not files:
+        return set()
+    with Ledger(*files) as ledger:
+        return ledger.done()
 
 
 def previewed(
@@ -103,11 +119,14 @@ def previewed(
     """Yield the cells of a plan or of a shard, and whether each is done."""
     name = file_of(shard)
     cells = cells_of(Plan.read(plan), shard)
-    if out is None or not (path := Path(out) / name).exists():
-        yield from ((cell, False) for cell in cells)
-        return
-    with Ledger(path) as ledger:
-        yield from ((cell, cell.key in ledger) for cell in cells)
+    done = set[str]()
+    if out is not None:
+        if shard is None:
+            done |= done_elsewhere(Path(out))
+        if (path := Path(out) / name).exists():
+            with Ledger(path) as ledger:
+                done |= ledger.done()
+    yield from ((cell, cell.key in done) for cell in cells)
 
 
 def preview_lines(cells: Iterable[tuple[Cell, bool]]) -> list[str]:

@@ -19,14 +19,14 @@ import sqlite3
 import stat
 import zipfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from posefit.errors import InputError
-from posefit.files import lock
+from posefit.files import lock, made_folders, remove_empty
 from posefit.reading import counted, cut, quoted
 from posefit.sweep.cell import Cell, CellResult, cell_from
 from posefit.sweep.check import checked_row
@@ -43,7 +43,6 @@ WAL = "-wal"  # of SQLite's log beside a file that is written
 DRIVER = ".driver"
 DRIVEN_BY = "process "  # how the content of a lock file begins
 NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # not on every operating system
-FORMAT = 1  # the file's user_version
 ATTEMPTS = 3  # that fail by a cell's own fault
 LOSSES = 50  # attempts that something outside ended
 # to wait for another program that locks a file: where it is opened, and in the middle of a sweep
@@ -54,23 +53,45 @@ MAX_VALUE_BYTES = 200_000_000  # of a value in a file
 MIN_FILE_BYTES = 512  # a page of SQLite, at least
 COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row", "arrays"}
 NAMES = ("key", "spec", "status")  # that a row has beside its figures
-SCHEMA = f"""
-PRAGMA journal_mode = WAL;
-BEGIN;
-CREATE TABLE IF NOT EXISTS cells (
-    key TEXT PRIMARY KEY, kind TEXT NOT NULL, spec TEXT NOT NULL, status TEXT NOT NULL DEFAULT 'planned',
-    faults TEXT NOT NULL DEFAULT '[]', losses INTEGER NOT NULL DEFAULT 0, row TEXT, arrays BLOB);
-CREATE INDEX IF NOT EXISTS by_status ON cells (status);
-CREATE VIEW IF NOT EXISTS runs AS SELECT key, kind, status, faults,
-    json_extract(spec, '$.method') AS method, json_extract(spec, '$.name') AS name,
-    json_extract(spec, '$.settings') AS settings, json_extract(spec, '$.motion') AS motion,
-    json_extract(spec, '$.function') AS function, json_extract(spec, '$.dimension') AS dimension,
-    json_extract(spec, '$.instance') AS instance, json_extract(spec, '$.seed') AS seed,
-    json_extract(row, '$.error_degrees.mean') AS error_degrees, json_extract(row, '$.mpjpe_mm') AS mpjpe_mm,
-    json_extract(row, '$.cost') AS cost, json_extract(row, '$.seconds') AS seconds FROM cells;
-PRAGMA user_version = {FORMAT};
-COMMIT;
-"""
+# What queries ask for most: where each stands, and its type. A view's expressions have no declared type, and a program
+# that asks for one, such as DuckDB, would take numbers for bytes: 10 would be less than 9. So the view begins with an
+# empty table, whose types SQLite takes for the view's.
+VIEWED = {
+    "method": ("spec", "$.method", "TEXT"),
+    "name": ("spec", "$.name", "TEXT"),
+    "settings": ("spec", "$.settings", "TEXT"),
+    "motion": ("spec", "$.motion", "TEXT"),
+    "function": ("spec", "$.function", "INTEGER"),
+    "dimension": ("spec", "$.dimension", "INTEGER"),
+    "instance": ("spec", "$.instance", "INTEGER"),
+    "seed": ("spec", "$.seed", "INTEGER"),
+    "error_degrees": ("row", "$.error_degrees.mean", "REAL"),
+    "mpjpe_mm": ("row", "$.mpjpe_mm", "REAL"),
+    "cost": ("row", "$.cost", "REAL"),
+    "seconds": ("row", "$.seconds", "REAL"),
+}
+_TYPES = ", ".join(f"{name} {kind}" for name, (_, _, kind) in VIEWED.items())
+_VALUES = ", ".join(
+    f"CAST(json_extract({column}, '{path}') AS {kind})"
+    for column, path, kind in VIEWED.values()
+)
+# What brings a file to a format, its user_version, from the one before. A row has been the same since the first.
+MIGRATIONS = {
+    1: """
+    CREATE TABLE cells (
+        key TEXT PRIMARY KEY, kind TEXT NOT NULL, spec TEXT NOT NULL, status TEXT NOT NULL DEFAULT 'planned',
+        faults TEXT NOT NULL DEFAULT '[]', losses INTEGER NOT NULL DEFAULT 0, row TEXT, arrays BLOB);
+    CREATE INDEX by_status ON cells (status);
+    """,
+    # the columns of the view have types
+    2: f"""
+    DROP VIEW IF EXISTS runs;
+    CREATE TABLE run_types (key TEXT, kind TEXT, status TEXT, faults TEXT, {_TYPES});
+    CREATE VIEW runs AS SELECT * FROM run_types
+        UNION ALL SELECT key, kind, status, faults, {_VALUES} FROM cells;
+    """,
+}
+FORMAT = max(MIGRATIONS)
 
 
 class Ledger:
@@ -114,6 +135,10 @@ class Ledger:
 
     def __contains__(self, key: str) -> bool:
         return self._places.get(key, (0, False))[1]
+
+    def done(self) -> set[str]:
+        """Return the keys of the finished cells."""
+        return {key for key, (_, done) in self._places.items() if done}
 
     @property
     def changed(self) -> float:
@@ -229,10 +254,12 @@ class Writer:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._elsewhere = 0  # cells of the plan that another file has done
         _check_place(self.path)
         with ExitStack() as opened:
             try:
-                opened.enter_context(_undone_folders(self.path.parent))
+                made = made_folders(self.path.parent)
+                opened.push(partial(_undo_folders, made))
                 # the lock is the last to be released
                 opened.enter_context(_locked(self.path))
                 if not self.path.exists():
@@ -251,11 +278,16 @@ class Writer:
 
     def _prepare(self) -> None:
         """Check the file, bring its tables to today's form, and have each write reach the disk."""
-        if _check_format(self.path, self._db):
+        form = _check_format(self.path, self._db)
+        if form:
             (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
-        self._db.executescript(SCHEMA)
+        self._db.executescript("PRAGMA journal_mode = WAL")
+        for later in range(form + 1, FORMAT + 1):
+            self._db.executescript(
+                f"BEGIN; {MIGRATIONS[later]} PRAGMA user_version = {later}; COMMIT;"
+            )
         # what is written survives the loss of power
         self._db.execute("PRAGMA synchronous = FULL")
         self._db.execute(f"PRAGMA busy_timeout = {1000 * BUSY_SECONDS:.0f}")
@@ -281,11 +313,19 @@ class Writer:
         except sqlite3.Error as error:
             raise _unwritable(self.path, error) from None
 
-    def plan(self, cells: Iterable[Cell]) -> None:
-        """Add the cells of a plan, which may be there already; `planned` and `counts` are of these."""
+    def plan(
+        self, cells: Iterable[Cell], elsewhere: Container[str] = frozenset()
+    ) -> None:
+        """Add the cells of a plan, which may be there already; `planned` and `counts` are of these.
+
+        Those with a key in `elsewhere` are done in another file: they are counted, and not added.
+        """
         with self.transaction():
             for cell in cells:
-                self.add(cell)
+                if cell.key in elsewhere:
+                    self._elsewhere += 1
+                else:
+                    self.add(cell)
 
     def add(self, cell: Cell) -> None:
         """Add one cell of a plan."""
@@ -309,7 +349,9 @@ class Writer:
     def counts(self) -> Counter[str]:
         """Return how many of the plan's cells are planned, done and quarantined."""
         query = "SELECT status, count(*) FROM planned JOIN cells USING (key) GROUP BY status"
-        return Counter(dict(self._db.execute(query).fetchall()))
+        counts = Counter(dict(self._db.execute(query).fetchall()))
+        counts["done"] += self._elsewhere
+        return +counts
 
     def cell(self, place: int) -> Cell:
         """Return the cell in a place."""
@@ -407,8 +449,8 @@ def _reader(file: Path) -> sqlite3.Connection:
     return database
 
 
-def _check_format(file: Path, database: sqlite3.Connection) -> bool:
-    """Return whether a file is a ledger, and not yet empty. Raises InputError where it is something else."""
+def _check_format(file: Path, database: sqlite3.Connection) -> int:
+    """Return the format of a ledger, 0 of one that is still empty. Raises InputError if it is something else."""
     tables = dict(database.execute("SELECT name, type FROM sqlite_master").fetchall())
     # which SQLite takes for an empty one
     if not tables and 0 < (size := file.stat().st_size) < MIN_FILE_BYTES:
@@ -420,12 +462,12 @@ def _check_format(file: Path, database: sqlite3.Connection) -> bool:
         raise InputError(
             f"{file}: expected a ledger that posefit sweep wrote, got another SQLite file"
         )
-    if (
-        tables
-        and (form := database.execute("PRAGMA user_version").fetchone()[0]) != FORMAT
-    ):
-        raise InputError(f"{file}: expected a ledger of format {FORMAT}, got {form}")
-    return bool(tables)
+    (form,) = database.execute("PRAGMA user_version").fetchone()
+    if tables and not 1 <= form <= FORMAT:
+        raise InputError(
+            f"{file}: expected a ledger of format 1 to {FORMAT}, got {form}: a newer posefit may read it"
+        )
+    return int(form) if tables else 0
 
 
 def _check_place(path: Path) -> None:
@@ -445,18 +487,10 @@ def _check_place(path: Path) -> None:
         )
 
 
-@contextmanager
-def _undone_folders(folder: Path) -> Iterator[None]:
-    """Create a folder, and its parents; if the body fails, remove the new ones that are empty."""
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        yield
-    except BaseException:
-        for one in missing:
-            with suppress(OSError):
-                one.rmdir()
-        raise
+def _undo_folders(made: Iterable[Path], error: object, *_: object) -> None:
+    """Remove new folders that are empty, if there was an error: the exit of a context."""
+    if error is not None:
+        remove_empty(made)
 
 
 def _undo_files(path: Path, error: object, *_: object) -> None:

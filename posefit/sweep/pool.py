@@ -17,7 +17,12 @@ from pebble import ProcessExpired, ProcessFuture, ProcessPool
 from posefit.errors import InputError
 from posefit.limits import memory
 from posefit.sweep.engine import Limits, Outcome, Run, text_of
-from posefit.sweep.worker import EXIT_ZERO_STATUS, Context, become_worker
+from posefit.sweep.worker import (
+    EXIT_ZERO_STATUS,
+    Context,
+    become_worker,
+    left_as_it_was,
+)
 
 # that a process may take to begin a job; twice as long after each time that none did
 START_SECONDS = 60.0
@@ -68,6 +73,7 @@ class Pool:
     def wait(self, seconds: float) -> list[Outcome]:
         """Return the jobs that ended."""
         done = wait(self._running, seconds, FIRST_COMPLETED).done
+        self._context.end_orphans()
         outcomes = [
             self._outcome(future) for future in tuple(self._running) if future in done
         ]
@@ -89,14 +95,16 @@ class Pool:
         """End all processes."""
         self._pool.stop()  # type: ignore[no-untyped-call]
         self._pool.join()
+        self._context.end_orphans()
 
     def _start(self) -> None:
         arguments = os.getpid(), sys.path, self._prepare
+        self._context = Context()
         self._pool = ProcessPool(
             self._workers,
             initializer=become_worker,
             initargs=arguments,
-            context=Context(),
+            context=self._context,
         )
 
     def _outcome(self, future: "ProcessFuture[bytes]") -> Outcome:
@@ -134,7 +142,7 @@ class Pool:
 def _call(run: bytes, job: bytes, gigabytes: float) -> bytes:
     """Return, pickled, what a function makes of a job; or None, and why."""
     try:
-        with memory(gigabytes):
+        with memory(gigabytes), left_as_it_was():
             result = pickle.loads(run)(pickle.loads(job))
         return cloudpickle.dumps((result, None))  # type: ignore[no-any-return]
     except MemoryError:

@@ -6,13 +6,18 @@
 
 import os
 import pickle
+import random
 import signal
 import sys
 import threading
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
+
+import numpy as np
 
 from posefit.errors import PluginWarning
 from posefit.limits import end_with_parent
@@ -20,6 +25,10 @@ from posefit.sweep.engine import single_thread
 
 EXIT_ZERO_STATUS = 64  # the status of a process that a job ended with 0
 _starting = threading.Lock()
+# which a process may handle
+_SIGNALS = signal.valid_signals() - {
+    getattr(signal, name, None) for name in ("SIGKILL", "SIGSTOP")
+}
 
 
 class _Process(SpawnProcess):
@@ -28,7 +37,7 @@ class _Process(SpawnProcess):
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802
         main = sys.modules["__main__"]
-        with _starting:
+        with _starting, _interrupts_blocked():
             before = {
                 name: getattr(main, name, None) for name in ("__file__", "__spec__")
             }
@@ -39,15 +48,88 @@ class _Process(SpawnProcess):
                 vars(main).update(before)
 
 
-class Context(SpawnContext):
-    """Starts such processes."""
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Start processes with Ctrl-C blocked, which they are deaf to only once they have imported what ignores it.
 
-    Process = _Process
+    A terminal sends it to all processes: in between it would end a worker with a traceback. For this process it waits.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # which would end with the interrupt unblocked, were it started with the first process
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class Context(SpawnContext):
+    """Starts such processes, and ends what they have started."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._started: list[_Process] = []
+
+    def Process(  # type: ignore[override]  # noqa: N802, as its class is called
+        self, *arguments: Any, **more: Any
+    ) -> _Process:
+        """Return a process that is to be started."""
+        process = _Process(*arguments, **more)
+        self._started.append(process)
+        return process
+
+    def end_orphans(self) -> None:
+        """End the processes whose worker has ended: those that a cell started are in the worker's group."""
+        for process in self._started.copy():
+            if process.pid is not None and not _exists(process.pid):
+                self._started.remove(process)
+                with suppress(OSError, AttributeError):
+                    os.killpg(process.pid, signal.SIGKILL)
+
+
+def _exists(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@contextmanager
+def left_as_it_was() -> Iterator[None]:
+    """Undo afterwards what the body does to this process: its folder, variables, paths, signals and random numbers.
+
+    A worker runs cells of all methods, and what one of them leaves behind would reach the others.
+    """
+    folder = os.getcwd()
+    variables = dict(os.environ)
+    path = sys.path[:]
+    numbers = random.getstate(), np.random.get_state()  # noqa: NPY002
+    handlers = {number: signal.getsignal(number) for number in _SIGNALS}
+    try:
+        yield
+    finally:
+        os.chdir(folder)
+        if dict(os.environ) != variables:
+            os.environ.clear()
+            os.environ.update(variables)
+        sys.path[:] = path
+        random.setstate(numbers[0])
+        np.random.set_state(numbers[1])  # noqa: NPY002
+        for number, handler in handlers.items():
+            if handler is not None and signal.getsignal(number) != handler:
+                signal.signal(number, handler)
 
 
 def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
     """Make this process a worker: one thread, deaf to Ctrl-C, which is the driver's, and ended with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # what a cell starts is not to inherit that it is blocked
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     # so that a kill from outside looks like one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     # a group of its own: what a terminal or a script sends to the driver is not for it

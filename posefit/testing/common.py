@@ -9,11 +9,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, get_origin
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit import hints
 from posefit.reading import quoted
 from posefit.settings import settings_of
 from posefit.testing.results import BrokenError, SkippedError, expect
@@ -73,6 +74,17 @@ def construction(case: PluginCase) -> None:
             raise BrokenError(
                 f"a setting must have a type, such as {setting.name}: {kind} = {setting.default}, got none"
             )
+        expect(
+            hints.checkable(setting.annotation),
+            f"the type of the setting {setting.name} must be {hints.KNOWN}, got {setting.type}",
+        )
+        if setting.default is not inspect.Parameter.empty:
+            try:
+                hints.fitted(setting.annotation, setting.default)
+            except hints.UnfitError:
+                raise BrokenError(
+                    f"the default of {setting.name} must be {setting.type}, got {setting.default!r}"
+                ) from None
     case.build()
 
 
@@ -113,7 +125,7 @@ def nonsense_settings(case: PluginCase, *, harmless: bool = False) -> str:
             if setting.annotation is not inspect.Parameter.empty
             else type(setting.default)
         )
-        choice = get_origin(kind) is Literal or setting.name == "variant"
+        choice = bool(hints.choices_of(kind)) or setting.name == "variant"
         if not choice and kind not in (int, float):
             continue
         nonsense: object = (

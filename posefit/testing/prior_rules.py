@@ -10,6 +10,7 @@ from posefit.arrays import Array
 from posefit.fitting.box import REDRAWS, draw_population
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
+from posefit.fitting.validation import FreeAxes
 from posefit.motion import built_in
 from posefit.testing import common
 from posefit.testing.common import (
@@ -147,6 +148,15 @@ def inverse(case: Case) -> None:
             np.asarray(prior.inverse_transform(latents)),
             (len(latents), 63),
         )
+
+
+def fixed_axes(case: Case) -> None:
+    """Joints turn about their free axes only: other angles of a pose are 0, in all of the range."""
+    prior = case.fitted
+    axes = FreeAxes(built_in.average_skeleton(), walking_angles())
+    for latents in (prior.transform(walking_angles()), case.latents):
+        broken = axes.broken(np.asarray(prior.inverse_transform(latents)))
+        expect(not broken, f"inverse_transform must {broken}")
 
 
 def training_in_range(case: Case) -> None:
@@ -305,6 +315,7 @@ RULES = [
     ranges,
     transform,
     inverse,
+    fixed_axes,
     training_in_range,
     training_feasible,
     same_bits,

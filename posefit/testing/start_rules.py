@@ -13,12 +13,11 @@ from posefit.fitting.space import SearchSpace
 from posefit.fitting.start import modes_apart, start_in
 from posefit.fitting.tracker import Initialiser, Observation, Task
 from posefit.geometry.camera import Camera
-from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import common
 from posefit.testing.common import PluginCase, check_speed, unchanged
-from posefit.testing.problem import SIZE, walking_angles
+from posefit.testing.problem import SIZE, principal, walking_angles
 from posefit.testing.results import SkippedError, expect
 from posefit.testing.tracker_rules import scene
 from posefit.uncertainty.modes import Posterior
@@ -132,7 +131,7 @@ def inputs(case: Case) -> None:
 def gain(case: Case) -> str:
     """The best of a population drawn from its modes costs less than that of one from anywhere."""
     task, observations = images()
-    prior = registry().prior("pca")().fit(walking_angles())
+    prior = principal(walking_angles())
     space = SearchSpace(
         prior, np.zeros(3), np.radians([180.0, 15.0, 15.0]), task.anchor, "aligned"
     )

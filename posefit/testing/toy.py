@@ -35,6 +35,11 @@ def sphere(proposals: Array) -> Array:
     return np.asarray(50.0 * ((proposals - TARGET) ** 2).mean(axis=1))
 
 
+def slope(proposals: Array) -> Array:
+    """Return costs (n,) of proposals (n, d) that fall towards a corner of the box, from 100 to 0."""
+    return np.asarray(50.0 * (1.0 + proposals.mean(axis=1)))
+
+
 @dataclass(frozen=True, eq=False)
 class Toy:
     """A box of `dimensions` in which `rule` says what is allowed; the first `wrapping` coordinates are periodic."""

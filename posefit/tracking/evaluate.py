@@ -1,6 +1,6 @@
 """The last step: errors or signs of trust of a track, and what a user should know before they trust it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,11 +31,13 @@ def evaluate(
     task: Task,
     options: TrackOptions,
     clock: Array,
+    effort: Mapping[str, int],
 ) -> Track:
     """Return a track with errors against the truth where it is known, else signs of trust.
 
     `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took,
-    from the first mask that was read. The build is that of `scene`; that of `task` is from before smoothing.
+    from the first mask that was read, and `effort` the evaluations of each stage. The build is that of `scene`; that
+    of `task` is from before smoothing.
     """
     skeleton = scene.body.skeleton
     posteriors = [
@@ -49,7 +51,7 @@ def evaluate(
     ]
     training = None if scene.truth is None else task.angles
     table, measures = evaluated(
-        scene, frames, method.prior, training, method.audit.beta, clock
+        scene, frames, method.prior, training, method.audit.beta, clock, effort
     )
     trust = None
     if scene.truth is None:

@@ -1,8 +1,8 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,11 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import ANGLES
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
-from posefit.settings import POPULATION_SIZE
-from posefit.silhouette.cost import BETA
+from posefit.silhouette.cost import BETA, pose_costs
+from posefit.silhouette.drawn import PoseCount, uncounted
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import (
@@ -31,7 +32,6 @@ from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility
 
 MIN_BODY_FRAMES = 5
-WARM_UP_POPULATIONS = 8
 # ours: within which a walker hardly turns farther than a search reaches, 45 degrees
 NEAR_SECONDS = 0.5
 
@@ -59,22 +59,33 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
     )
 
 
+class Initialised(NamedTuple):
+    """What is known before the first frame."""
+
+    task: Task  # with the first pose, if it was searched
+    shape: Shape | None  # the person's build, if it was fitted
+    # (2,) see `posefit.fitting.driving.clocks`, when what draws was compiled
+    start: Array
+    effort: dict[str, int]  # evaluations of each stage
+
+
 def initialise(
     scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress
-) -> tuple[Task, Shape | None, Array]:
-    """Return a task with its first pose, where it is searched, and the person's build, where it is fitted.
-
-    Also the clocks (2,), see `posefit.fitting.driving.clocks`, at the moment when everything was compiled.
-    """
+) -> Initialised:
+    """Return a task with its first pose, where it is searched, and the person's build, where it is fitted."""
     if task.yaw is None:
         task = replace(task, start=method.start)
-    _warm_up(method, task, scene)
+    compile_for(scene, task)
     start = clocks()
     shape = None
-    body_frames = (options.body_frames or 0) if scene.count > 1 else 0
+    if scene.count == 1:  # it is one search, by the tracker itself
+        return Initialised(task, None, start, {})
+    effort = dict[str, int]()
+    body_frames = options.body_frames or 0
     if options.restarts:
         searched = scene.observations, method.follow, options.restarts, options.seed
-        task, _ = best_restart(task, *searched, log=progress.log)
+        task, tried = best_restart(task, *searched, log=progress.log)
+        effort["first_pose"] = sum(frame.evaluations for frame in tried)
     count = len(usable_observations(scene.observations, body_frames))
     if body_frames and count < MIN_BODY_FRAMES:
         few = (
@@ -89,11 +100,14 @@ def initialise(
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = options.height or (task.body.stature if alone else None)
         fitted = scene, method.follow, body_frames, height, options.seed
-        shape, cameras = fitted_build(
-            task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0
-        )
+        drawn = PoseCount()
+        with drawn.counting():
+            shape, cameras = fitted_build(
+                task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0
+            )
+        effort["build"] = round(drawn.poses / len(scene.cameras))
         task = replace(task, body=shape.body, cameras=cameras)
-    return task, shape, start
+    return Initialised(task, shape, start, effort)
 
 
 def fitted_build(
@@ -168,18 +182,14 @@ def fitted_build(
     return shape, task.cameras
 
 
-def _warm_up(method: Method, task: Task, scene: Scene) -> None:
-    """Search a few populations of the first frame, so that everything is compiled."""
-    population_size = method.settings.get("optimiser", {}).get(
-        "population_size", POPULATION_SIZE
-    )
-    few = replace(
-        task, evaluations=min(task.evaluations, WARM_UP_POPULATIONS * population_size)
-    )
-    # what fails for want of evaluations is reported where it fails with all of them
-    with suppress(ValueError):
-        next(
-            method.follow(
-                few, [next(iter(scene.observations))], np.random.default_rng(0)
-            )
+def compile_for(scene: Scene, task: Task) -> None:
+    """Compute the cost of one pose, so that what draws is compiled before the clocks start."""
+    observation = next(iter(scene.observations))
+    with uncounted():
+        pose_costs(
+            task.body,
+            task.cameras,
+            observation.silhouettes,
+            np.zeros((1, ANGLES)),
+            task.anchor[None],
         )

@@ -103,7 +103,7 @@ def track_live(
     with threadpool_limits(1):
         task = task_of(scene, chosen, training)
         method = prepare(chosen, task)
-        task, _, _ = initialise(scene, method, task, chosen, progress)
+        task = initialise(scene, method, task, chosen, progress).task
         hypothesis = Hypothesis(SEARCHED, task, np.random.default_rng(chosen.seed))
         for frame in track_hypothesis(
             hypothesis, method, coming(), method.relocalise_gap
@@ -175,7 +175,8 @@ def write_live(
     """Return a summary of a live track, followed until its stream ends or Ctrl-C.
 
     With `out`, a new folder gets frames.jsonl, a line a frame as it comes, and at the end poses.npz, also where the
-    stream breaks off. Raises InputError then, after both are written.
+    stream breaks off. Raises InputError then, after both are written; where it breaks off before the first pose, there
+    is no folder.
     """
     folder = None if out is None else Path(out)
     latencies = list[float]()
@@ -195,6 +196,13 @@ def write_live(
                     on_frame(live)
     except KeyboardInterrupt:
         pass
+    except BaseException:
+        if folder is not None and not latencies:
+            # a start that failed leaves nothing, so that the command can be given again
+            (folder / FRAMES_FILE).unlink(missing_ok=True)
+            folder.rmdir()
+            folder = None
+        raise
     finally:
         if folder is not None:
             rows = [

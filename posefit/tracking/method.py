@@ -25,8 +25,7 @@ from posefit.fitting.tracker import (
     Tracker,
 )
 from posefit.fitting.validation import (
-    CheckedOptimiser,
-    CheckedPrior,
+    Checked,
     check_prior,
     plugin_errors,
 )
@@ -137,23 +136,26 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         [optimiser] if prior is None else [optimiser, prior], options.settings
     )
     plugin_settings.setdefault("prior", {})
-    planned = settings.planned(
-        optimiser.factory, plugin_settings["optimiser"], task.evaluations
-    )
+    stated = plugin_settings["optimiser"]
+    planned = settings.planned(optimiser.factory, stated, task.evaluations)
     plugin_settings["optimiser"] = settings.check(
         optimiser.name, optimiser.factory, planned
     )
     if prior is not None:
-        with _rules(prior):
-            learned = prior.factory(**plugin_settings["prior"]).fit(
-                task.angles, task.body.skeleton
-            )
-            check_prior(learned, task.angles, prior.label)
-        learned = CheckedPrior(learned, prior.label)
         name = prior.name
+        label = prior.label
+        with _rules(prior):
+            learned = prior.factory(**plugin_settings["prior"])
+        with _rules(prior, "fit"):
+            learned = learned.fit(task.angles, task.body.skeleton)
     else:
-        learned = prior_choice
         name = type(prior_choice).__name__
+        label = f"prior {name}"
+        learned = prior_choice
+    with plugin_errors(label, "the range, low and high,"):
+        learned = Checked(learned, label)
+    if task.training:
+        check_prior(learned, task.angles, task.body.skeleton, label)
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
     prediction = Prediction(
         **{
@@ -164,10 +166,14 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     tilt = prediction.tilted(learned, task.training)
 
     def build(task: Task) -> Tracker:
-        def optimiser_of(space: Space, rng: np.random.Generator) -> Optimiser:
+        def optimiser_of(
+            space: Space, rng: np.random.Generator, evaluations: int = task.evaluations
+        ) -> Optimiser:
+            # schedules follow the budget
+            values = settings.planned(optimiser.factory, stated, evaluations)
             with _rules(optimiser):
-                made = optimiser.factory(space, rng, **plugin_settings["optimiser"])
-            return CheckedOptimiser(made, space, optimiser.label, task.evaluations)
+                made = optimiser.factory(space, rng, **values)
+            return Checked(made, optimiser.label, space, evaluations)
 
         return SynthesisTracker(
             task, learned, optimiser_of, optimiser.next_frame, prediction, tilt
@@ -291,9 +297,9 @@ def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> 
     )
 
 
-def _rules(offer: Offer) -> AbstractContextManager[None]:
-    """Return a context that passes ValueErrors on, and blames the plugin for whatever else it raises."""
-    return plugin_errors(offer.label, "it", passed=(ValueError, ImportError))
+def _rules(offer: Offer, what: str = "construction") -> AbstractContextManager[None]:
+    """Return a context that passes ValueErrors on, and blames the plugin for whatever else a call raises."""
+    return plugin_errors(offer.label, what, passed=(ValueError, ImportError))
 
 
 def _offered(kind: Kind, chosen: str | Callable[..., Any]) -> Offer:

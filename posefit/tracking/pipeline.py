@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, on_device
@@ -26,10 +27,12 @@ from posefit.geometry.rotation import geodesic
 from posefit.motion.motion import Motion
 from posefit.output.folder import Recorder
 from posefit.progress import QUIET, Progress
+from posefit.silhouette.drawn import PoseCount, uncounted
 from posefit.tracking.evaluate import evaluate
 from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import Method, prepare
 from posefit.tracking.options import TrackOptions
+from posefit.tracking.polish import polish_evaluations, polished
 from posefit.tracking.restarts import (
     SEARCHED,
     after,
@@ -118,8 +121,10 @@ def track_scene(
         method = prepare(options, task)
         passes = _passes(scene, method, task.evaluations, bool(options.smooth))
         task = replace(task, evaluations=task.evaluations // passes)
+        polishing = _polish_evaluations(scene, method, task.evaluations, options)
+        task = replace(task, evaluations=task.evaluations - polishing)
         with progress.phase("build"):
-            task, shape, start_clocks = initialise(
+            task, shape, start_clocks, effort = initialise(
                 scene, method, task, options, progress
             )
             scene = replace(scene, body=task.body, cameras=task.cameras)
@@ -129,6 +134,7 @@ def track_scene(
                 scene, task, method, options, recorder or Recorder(), progress
             )
             tracked = cheapest(scene, hypotheses, task.training)
+            effort["frames"] = _evaluations(tracked.frames)
             if scene.truth is None and method.looks_ahead:
                 tracked = retrack_spins(
                     task, scene.observations, tracked, method.follow, options.seed
@@ -139,11 +145,14 @@ def track_scene(
                     )
                     progress.log(f"the body turned faster than a person can: {outside}")
         frames = tracked.frames
-        if scene.count == 1 and task.before and frames[0].posterior is None:
-            frames = [replace(frames[0], posterior=task.before[-1].posterior)]
+        if polishing:
+            shown = next(iter(scene.observations))
+            frames = [polished(task, frames[0], shown, polishing, method.audit.beta)]
+            effort["frames"] = _evaluations(frames)
         smoothed = Smoothed(scene, frames, shape)
-        if options.smooth:
-            with progress.phase("smooth"):
+        smoothing = PoseCount()
+        if options.smooth and scene.count > 1:
+            with progress.phase("smooth"), smoothing.counting():
                 smoothed = smooth(*smoothed, method.audit.beta)
                 usable = sum(observation.usable for observation in scene.observations)
                 if (
@@ -159,17 +168,23 @@ def track_scene(
                             f"legs exchanged in {exchanged.sum()} frames, where smooth ones then fit better"
                         )
         if passes > 1:
+            again = passes, options.seed, progress
             tracked, smoothed = _cheapest_pass(
-                task, method, tracked, smoothed, passes, options.seed, progress
+                task, method, tracked, smoothed, smoothing, *again
             )
         scene, frames, shape = smoothed
+        later = _evaluations(frames) - effort["frames"]
+        later += round(smoothing.poses / len(scene.cameras))
+        if later:
+            effort["later_passes"] = later
         scene = with_turns(scene, given.cameras)
         for guess in scene.guesses[len(given.guesses) :]:
             progress.log(guess)
-        with progress.phase("evaluate"):
+        # what a track is compared with is no effort of the method
+        with progress.phase("evaluate"), uncounted():
             clock = clocks() - start_clocks + scene.reading_seconds
             track = evaluate(
-                scene, frames, tracked, shape, method, task, options, clock
+                scene, frames, tracked, shape, method, task, options, clock, effort
             )
     for warning in track.log.warnings[len(scene.warnings) :]:
         progress.warn(warning)
@@ -201,6 +216,11 @@ def track_hypotheses(
             frames = list(hypothesis.frames)
             of_several = f" of {which}, {hypothesis.guess}" if total > 1 else ""
             progress.log(f"going on from frame {done} of {count}{of_several}")
+            if _starts_anew(method, frames):
+                progress.warn(
+                    f"{method.name} starts anew at frame {done}: the frames from there on may be "
+                    "others than those of a track that was not interrupted"
+                )
         elif not done and total > 1:
             progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
@@ -215,7 +235,7 @@ def track_hypotheses(
                 track_hypothesis(hypothesis, method, ahead, gap, behind), count - done
             ):
                 recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
-                frames.append(frame)
+                frames.append(with_carried(frame, None))
         tracked.append(replace(hypothesis, frames=frames))
     return tracked
 
@@ -234,6 +254,7 @@ def track_hypothesis(
     back and again from there; its frame has the effort of both.
     """
     task = after(hypothesis.task, behind[0]) if behind else hypothesis.task
+    task = replace(task, resumable=True)
     frames = relocalised(task, method.follow, ahead, hypothesis.rng, gap)
     if behind:
         pivot = next(frames)
@@ -247,6 +268,7 @@ def _cheapest_pass(
     method: Method,
     tracked: Tracked,
     smoothed: Smoothed,
+    smoothing: PoseCount,
     passes: int,
     seed: int,
     progress: Progress,
@@ -269,7 +291,7 @@ def _cheapest_pass(
             again = tracked_again(
                 latest, scene.observations, frames, follow, number, seed
             )
-        with progress.phase("smooth"):
+        with progress.phase("smooth"), smoothing.counting():
             other, others, build = smooth(scene, again, shape, method.audit.beta)
         better = mean_cost(others, usable) < mean_cost(frames, usable)
         frames = with_total_effort([frames, others], int(better))
@@ -289,6 +311,20 @@ def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> i
         if method.looks_ahead and smoothed
         else 1
     )
+
+
+def _evaluations(frames: Sequence[Frame]) -> int:
+    return sum(frame.evaluations for frame in frames)
+
+
+def _polish_evaluations(
+    scene: Scene, method: Method, evaluations: int, options: TrackOptions
+) -> int:
+    """Return how many of the evaluations of one picture are for polishing what a search by an optimiser leaves open."""
+    alone = scene.count == 1 and scene.truth is None and options.smooth
+    if not alone or method.prior is None or not next(iter(scene.observations)).usable:
+        return 0
+    return polish_evaluations(evaluations)
 
 
 def _pivot(scene: Scene, task: Task, method: Method) -> int:
@@ -340,6 +376,12 @@ def _hypothesis(
         number, first, scene.yaw, options.first_pose == "given", estimate
     )
     return Hypothesis(guess, task, stream(options.seed, "hypothesis", number))
+
+
+def _starts_anew(method: Method, recorded: Sequence[Frame]) -> bool:
+    """Return whether what a method knew after recorded frames is lost: it is a tracker, or a filter of other values."""
+    kept = [frame.details[CARRIED] for frame in recorded if CARRIED in frame.details]
+    return method.prior is None or (bool(kept) and not kept[-1])
 
 
 def _resumed(

@@ -9,6 +9,7 @@
 | footage by several cameras | `tracked_again`: back, then onward, from what the pass before found | the cheapest |
 """
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import deepcopy
@@ -20,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.carried import with_carried
+from posefit.fitting.driving import with_evaluations
 from posefit.fitting.space import ROOT_RANGE_DEGREES
-from posefit.fitting.start import TEMPERATURE
 from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
+from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import (
     exchanged_limbs,
     facing,
@@ -35,6 +37,7 @@ from posefit.geometry.symmetry import (
 )
 from posefit.motion.steadiness import runs
 from posefit.reading import counted
+from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.trajectory import (
     Tracked,
@@ -43,16 +46,12 @@ from posefit.tracking.trajectory import (
     with_effort_of,
     with_total_effort,
 )
-from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 
 # part of the seed of what is tracked again
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902, "pass": 1965}
 RESTARTS = 8  # searches of the first frame, at most
 MIN_WEIGHT = 0.05  # of a mode of the first frame that is tried
-# metres along an axis, and radians, that the right one of searched poses is off
-JOINT_ERROR = 0.06
-ANGLE_ERROR = 0.25
 TRIAL_FRAMES = 10  # by which a restart is judged
 TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
 TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
@@ -140,9 +139,9 @@ def best_restart(
     Each searches the first usable frame around a mode of what it may show, as many as are likely; or, where nothing is
     guessed, anywhere, at all yaws where none is known. It then follows the person through a few more frames. The least
     mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution, and the first
-    frame is then searched once more in the whole one, around the best. Where there is only one frame, it has the
-    posterior of where all searches ended. The `continuation` of a track is followed beside the restarts, and returned
-    where none of them is better. `log` gets a line that says where they search.
+    frame is then searched once more in the whole one, around the best. The `continuation` of a track is followed beside
+    the restarts, and returned where none of them is better. The evaluations of the guess are those of the first search.
+    `log` gets a line that says where they search.
     """
     chosen = usable_observations(
         observations, TRIAL_FRAMES, TRIAL_STRIDE
@@ -176,11 +175,11 @@ def best_restart(
             compared_task, compared, np.random.default_rng([*prefix, restarts + 1])
         )
         least = _trial_cost(tried)
-    modes = [
-        mode
-        for weight, mode in guessed_modes(task, chosen[0])[:restarts]
-        if weight >= MIN_WEIGHT
-    ]
+    drawn = PoseCount()
+    with drawn.counting():
+        guessed = guessed_modes(task, chosen[0])[:restarts]
+    guess_evaluations = math.ceil(drawn.poses / len(task.cameras))
+    modes = [mode for weight, mode in guessed if weight >= MIN_WEIGHT]
     where = (
         f"around {counted(len(modes), 'pose')} with such a silhouette"
         if modes
@@ -191,18 +190,18 @@ def best_restart(
         [around(trial, mode) for mode in modes] or [trial] * restarts
     ):
         frames = list(follow(start, compared, np.random.default_rng([*prefix, k])))
+        if not k:
+            used = frames[0].evaluations + guess_evaluations
+            frames[0] = with_evaluations(frames[0], used)
         tried += frames
         if (cost := _trial_cost(frames)) < least:
             best = after(task, frames[0])
             least = cost
-    posterior = posterior_of(tried) if len(chosen) == 1 else None
     if factor > 1 and best is not (continuation or task):
         tried.append(
             next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts])))
         )
         best = after(task, tried[-1])
-    if posterior is not None and best.before:
-        best = after(task, replace(best.before[-1], posterior=posterior))
     return best, tried
 
 
@@ -216,18 +215,6 @@ def _trial_cost(frames: Sequence[Frame]) -> float:
     return float(np.mean([frame.cost for frame in frames])) * (
         BACKWARDS_PENALTY if backwards else 1.0
     )
-
-
-def posterior_of(trials: Sequence[Frame]) -> Posterior:
-    """Return what one frame may show, by the poses at which its searches ended: cheaper ones are likelier."""
-    poses = np.array([trial.pose for trial in trials])
-    places = np.array([trial.translation for trial in trials])
-    costs = np.array([trial.cost for trial in trials])
-    errors = Recalibration(
-        np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR)
-    )
-    weights = np.exp((costs.min() - costs) / TEMPERATURE)
-    return Posterior(poses, places, weights, coherent=True, recalibration=errors)
 
 
 def around(task: Task, mode: Posterior) -> Task:
@@ -248,7 +235,8 @@ def after(task: Task, frame: Frame) -> Task:
         first_pose=frame.pose[3:],
         modes=(),
     )
-    return replace(first, before=(frame,))
+    # the filter that goes on from it is a new one
+    return replace(first, before=(with_carried(frame, None),))
 
 
 # While a track goes on.

@@ -12,15 +12,15 @@ from posefit import Problem, Start, minimise
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import drive, drive_each, track_reference
-from posefit_envs.instance import first_episode, world_of
 from posefit_envs.policies import rollout
+from posefit_envs.world import first_problem, world_of
 from tests.cases import each
 
 
 def alone(name: str, number: int, seed: int, evaluations: int) -> Any:
     """Return the problem minimised by the library without an environment."""
-    cost = first_episode(world_of(), number, evaluations).problem.cost
-    problem = Problem(cost, cost.space, evaluations)
+    problem = first_problem(world_of(), number)
+    problem.budget = evaluations
     factory = registry().optimiser(name)
     optimiser = factory(
         problem.space, np.random.default_rng(seed), **planned(factory, {}, evaluations)
@@ -59,9 +59,9 @@ def test_a_search_starts_from_the_proposals_of_a_policy() -> None:
     episode = rollout(env, lambda _, step: truth * step / 7.0, 3, seed=0)
     assert episode["actions"].shape == (8, 9)
     best = episode["actions"][episode["rewards"].argmax()]
-    assert env.unwrapped.problem(best) == episode["best_cost"]
+    assert env.unwrapped.problem.cost(best[None])[0] == episode["best_cost"]
     start = Start(best, np.full(9, 1e-3), np.zeros(9))
-    space = replace(env.unwrapped.problem.space, start=start)
+    space = replace(env.unwrapped.space, start=start)
     search = registry().optimiser("cma")(space, np.random.default_rng(0))
     problem = Problem(env.unwrapped.problem.cost, space, 10)
     assert minimise(problem, search).best_cost < 2.0 * episode["best_cost"]

@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import posefit_envs  # noqa: F401, registers them
 from posefit import SynthesisTracker
-from posefit_envs.instance import instance
+from posefit_envs.world import instance
 from tests.cases import each
 
 SEARCHES = tuple(f"posefit/{name}-v0" for name in ("FitImage", "Track", "Race"))
@@ -266,7 +266,7 @@ def test_wrong_arguments_are_named(
 def test_unknown_arguments_and_modes_are_named() -> None:
     with pytest.raises(
         TypeError,
-        match="an argument must be one of motion, .*, got 'nois'; did you mean 'noise'",
+        match="an unexpected keyword argument: it must be one of motion, .*, got 'nois'; did you mean 'noise'",
     ):
         gym.make("posefit/Track-v0", nois={"holes": 0.3})
     with pytest.raises(

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit import Camera, project
+from posefit import Camera, Problem, project
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
-from posefit_envs.instance import SPLITS, Episode, first_episode, instance, world_of
-from posefit_envs.stage import Stage, values_of
+from posefit_envs.stage import Stage, first_scene
+from posefit_envs.world import SPLITS, FirstFrame, instance, world_of
 from tests.cases import each
 
 
@@ -61,13 +61,13 @@ def test_what_is_drawn_besides_changes_neither_the_motion_nor_the_cameras():
 
 
 def test_the_test_split_is_held_out_by_number():
-    for split, (first, last) in SPLITS.items():
+    for split, numbers_of in SPLITS.items():
         world = world_of(split=split)
         rng = np.random.default_rng(0)
         numbers = {world.next_instance(rng) for _ in range(20)}
         assert len(numbers) > 15
-        assert all(first <= number < last for number in numbers)
-    assert SPLITS["train"] == (0, SPLITS["test"][0])
+        assert all(number in numbers_of for number in numbers)
+    assert SPLITS["train"][-1] + 1 == SPLITS["test"][0]
 
 
 @each("name", CORRUPTIONS)
@@ -75,10 +75,7 @@ def test_each_corruption_changes_the_silhouette_more_the_stronger_it_is(name):
     def masks(noise):
         world = world_of(noise=noise, size=(160, 120))
         return np.stack(
-            [
-                first_episode(world, number, 10).problem.silhouettes[0].mask
-                for number in range(12)
-            ]
+            [FirstFrame(world, number).silhouettes[0].mask for number in range(12)]
         )
 
     clean = masks(None)
@@ -106,28 +103,27 @@ WORLDS: list[dict[str, Any]] = [
 ]
 
 
-def staged(numbers: tuple[int, ...], **arguments: Any) -> tuple[Stage, list[Episode]]:
+def staged(
+    numbers: tuple[int, ...], **arguments: Any
+) -> tuple[Stage, list[FirstFrame]]:
     world = world_of(**arguments)
     stage = Stage(world, len(numbers))
-    episodes = [first_episode(world, number, 10) for number in numbers]
-    for row, episode in enumerate(episodes):
-        stage.set_values(row, values_of(episode.problem))
-    return stage, episodes
+    for row, number in enumerate(numbers):
+        stage.set_scene(row, first_scene(world, number))
+    return stage, [FirstFrame(world, number) for number in numbers]
 
 
 @each("arguments", WORLDS)
 def test_scenes_together_are_what_the_library_computes_of_each_alone(
     arguments: dict[str, Any],
 ) -> None:
-    stage, episodes = staged((3, 17, 17, 9_000), **arguments)
+    stage, frames = staged((3, 17, 17, 9_000), **arguments)
     rng = np.random.default_rng(0)
-    proposals = rng.uniform(
-        -1.0, 1.0, (len(episodes), 5, episodes[0].problem.space.dimensions)
-    )
+    proposals = rng.uniform(-1.0, 1.0, (len(frames), 5, frames[0].space.dimensions))
     costs = stage.costs(proposals, stage.all_rows)
-    evaluation = stage.evaluate(proposals[:, 0], stage.all_rows)
-    for row, episode in enumerate(episodes):
-        problem = episode.problem
+    evaluation = stage.draw(proposals[:, 0], stage.all_rows)
+    for row, frame in enumerate(frames):
+        problem = Problem(frame, frame.space)
         np.testing.assert_array_equal(costs[row], problem(proposals[row]))
         poses, places = problem.decode(proposals[row, :1])
         np.testing.assert_array_equal(evaluation.poses[row], poses[0])
@@ -148,10 +144,10 @@ def test_scenes_together_are_what_the_library_computes_of_each_alone(
 
 @pytest.mark.pure
 def test_rows_that_are_left_out_show_nothing_proposed() -> None:
-    stage, episodes = staged((3, 17))
+    stage, frames = staged((3, 17))
     for rows in (np.array([1]), np.array([], dtype=np.int64)):
-        evaluation = stage.evaluate(np.zeros((2, 9)), rows)
-        mask = episodes[0].problem.silhouettes[0].mask
+        evaluation = stage.draw(np.zeros((2, 9)), rows)
+        mask = frames[0].silhouettes[0].mask
         np.testing.assert_array_equal(
             evaluation.pictures[0], np.stack([255 * mask, 0 * mask], axis=-1)
         )
@@ -180,9 +176,9 @@ def test_held_out_people_are_in_no_training_instance_and_not_in_the_prior():
 
 def test_the_truth_is_the_proposal_that_decodes_to_the_true_pose():
     for arguments in ({}, {"yaw": "unknown", "translation": "searched"}):
-        problem = first_episode(world_of(prior="full", **arguments), 17, 10)
-        poses, places = problem.problem.decode(problem.truth[None])
-        truth = problem.instance.truth
+        frame = FirstFrame(world_of(prior="full", **arguments), 17)
+        poses, places = frame.decode(frame.truth[None])
+        truth = frame.instance.truth
         np.testing.assert_allclose(np.cos(poses[0] - truth.poses[0]), 1.0, atol=1e-6)
         np.testing.assert_allclose(places[0], truth.translations[0], atol=1e-9)
 
@@ -193,17 +189,15 @@ def test_an_unknown_yaw_is_anywhere_about_the_camera_and_a_searched_place_is_not
     turns = []
     places = []
     for number in range(40):
-        episode = first_episode(unknown, number, 10)
-        from_camera = episode.problem.space.root_centre[0] - azimuth(
-            episode.problem.cameras[0]
-        )
+        frame = FirstFrame(unknown, number)
+        from_camera = frame.space.root_centre[0] - azimuth(frame.cameras[0])
         assert np.cos(from_camera) == pytest.approx(1.0, abs=1e-9)
         assert (
-            episode.instance.truth.poses.tobytes()
-            == first_episode(plain, number, 10).instance.truth.poses.tobytes()
+            frame.instance.truth.poses.tobytes()
+            == FirstFrame(plain, number).instance.truth.poses.tobytes()
         )
-        turns.append(episode.truth[0])
-        places.append(episode.truth[3:6])
+        turns.append(frame.truth[0])
+        places.append(frame.truth[3:6])
     assert min(turns) < -0.7 < 0.7 < max(turns)
     # half a metre is 1, and guesses are up to a quarter of it off
     assert 0.1 < np.abs(places).mean() < 0.4

@@ -49,7 +49,7 @@ def test_another_search_begins_in_the_place_of_the_worst_and_the_best_is_kept() 
         assert after[worst, 3] == pytest.approx(1.0 / 20.0)
         assert common[0] <= before[:, 0].min()
     # the best of all outlives its search: both others are replaced until none is as good
-    env._vector._costs[0, :] = 90.0
+    env.races.costs[0, :] = 90.0
     _, _, _, _, later = env.step(race_action(2, 2))
     assert later["best_cost"] <= info["best_cost"]
 
@@ -68,9 +68,9 @@ def test_a_search_is_its_optimiser_by_ask_and_tell(
         translation="searched",
     )
     env.reset(seed=4)
-    expected = copy.deepcopy(env._vector._searches[0][1])
-    problem = env._vector.episodes[0].problem
-    best = env._vector._costs[0, 1]
+    expected = copy.deepcopy(env.races._optimisers[0][1])
+    problem = env.problem
+    best = env.races.costs[0, 1]
     for _ in range(6):
         asked = expected.ask()
         assert asked.shape == (population_size, problem.space.dimensions)
@@ -99,13 +99,13 @@ def test_the_bests_of_all_particles_are_feasible_and_the_best_is_what_it_costs()
     env.reset(seed=1)
     env.action_space.seed(1)
     total = 0.0
-    first = env._vector._best[0]
+    first = env.races.problems.best_costs[0]
     for _ in range(60):
         _, reward, ended, _, info = env.step(env.action_space.sample())
         total += reward
-        assert env.problem.space.feasible(env._vector._bests.reshape(-1, 9)).all()
+        assert env.problem.space.feasible(env.races.bests.reshape(-1, 9)).all()
     assert ended
-    problem = env._vector.episodes[0].problem
+    problem = env.problem
     assert info["best_cost"] == problem(info["proposal"][None])[0]
     assert info["evaluations"] == 8 * (4 + 60)
     assert total == pytest.approx(math.log((1.0 + first) / (1.0 + info["best_cost"])))
@@ -119,14 +119,14 @@ def test_costs_slopes_and_spreads_are_observed_on_their_scales() -> None:
     env = made()
     env.reset(seed=2)
     slope = 0.1
-    cost = env._vector._costs[0, 3]
+    cost = env.races.costs[0, 3]
     for _ in range(5):
         observation, _, _, _, _ = env.step(race_action(3, 4))
-        new = env._vector._best_costs[0, 3].min()
+        new = env.races.best_costs[0, 3].min()
         slope = 0.8 * slope + 0.2 * math.log((1.0 + cost) / (1.0 + new))
         cost = new
         features, common = race_features(observation)
-        spread = env._vector._bests[0, 3].std(axis=0).mean()
+        spread = env.races.bests[0, 3].std(axis=0).mean()
         # the logarithm of 0.001 to 1 is three powers of ten
         expected = [
             math.log1p(cost) / LOG_101,
@@ -134,7 +134,9 @@ def test_costs_slopes_and_spreads_are_observed_on_their_scales() -> None:
             1.0 + math.log10(spread) / 3.0,
         ]
         np.testing.assert_allclose(features[3, :3], expected, rtol=1e-6)
-        assert common[0] == pytest.approx(math.log1p(env._vector._best[0]) / LOG_101)
+        assert common[0] == pytest.approx(
+            math.log1p(env.races.problems.best_costs[0]) / LOG_101
+        )
 
 
 def test_the_budget_is_drawn_from_the_generations_and_ends_the_episode() -> None:

@@ -7,7 +7,7 @@ from cmaes import CMA
 from posefit.errors import InputError
 from posefit.fitting.cma import CMAES, Strategy
 from posefit.plugin import Array, Start, displacement
-from posefit.testing.toy import Toy, shell
+from posefit.testing.toy import Toy, shell, slope
 from tests.cases import each
 
 
@@ -107,3 +107,38 @@ def test_an_eigenvalue_that_rounding_makes_negative_becomes_a_small_one() -> Non
     np.testing.assert_allclose(
         strategy.covariance, np.diag([1.0, 1.0, 1e-8]), atol=1e-15
     )
+
+
+@each("dimensions", [1, 4, 9])
+def test_a_best_in_a_corner_or_beyond_the_box_is_reached(dimensions: int) -> None:
+    # every face of the box is reached, and the step size falls there as it does inside
+    def beyond(proposals: Array) -> Array:
+        return np.asarray(((proposals - 1.5) ** 2).mean(axis=1) - 0.25)
+
+    for cost in (slope, beyond):
+        gaps = []
+        for seed in range(3):
+            optimiser = CMAES(Toy(dimensions), np.random.default_rng(seed))
+            lowest = np.inf
+            for _ in range(500):
+                proposals = optimiser.ask()
+                costs = cost(proposals)
+                lowest = min(lowest, float(costs.min()))
+                optimiser.tell(proposals, costs)
+            gaps.append(lowest)
+        assert max(gaps) < 1e-3, (cost, gaps)
+
+
+def test_what_is_drawn_beyond_the_box_is_learned_where_it_was_drawn() -> None:
+    # in a corner of nine sides one draw of 2^9 is inside: nearly all of these are moved
+    start = Start(np.full(9, 1.0), np.full(9, 0.1), np.zeros(9))
+    optimiser = CMAES(Toy(9, start=start), np.random.default_rng(0), population_size=40)
+    asked = optimiser.ask()
+    assert (np.abs(asked) <= 1.0).all()
+    beyond = np.linalg.norm(optimiser.learned - asked, axis=1)
+    np.testing.assert_allclose(beyond, optimiser.beyond)
+    assert np.count_nonzero(beyond) > 30
+    np.testing.assert_array_equal(np.minimum(optimiser.learned, 1.0), asked)
+    # whatever they cost, those inside count as the best ones: the mean moves inwards
+    optimiser.tell(asked, -asked.sum(axis=1))
+    assert (optimiser.strategy.mean < 1.0).all()

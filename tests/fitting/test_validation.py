@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit import Problem, minimise
-from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
+from posefit.fitting.validation import BrokenRuleError, Checked
 from posefit.silhouette.drawn import count_poses
 from posefit.testing.toy import Toy, sphere
 
@@ -72,9 +72,7 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
         (exits, "ask must not end the program, got SystemExit: 0"),
     ]
     for answer, rule in rows:
-        checked = CheckedOptimiser(
-            Answers(answer), Toy(9), "optimiser 'bad' of posefit-bad 1.0"
-        )
+        checked = Checked(Answers(answer), "optimiser 'bad' of posefit-bad 1.0", Toy(9))
         with pytest.raises(
             BrokenRuleError, match=rf"^optimiser 'bad' of posefit-bad 1.0: {rule}$"
         ):
@@ -82,7 +80,7 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
     with pytest.raises(
         BrokenRuleError, match="advance must not fail, got AttributeError"
     ):
-        CheckedOptimiser(Answers(np.zeros((4, 9))), Toy(9), "it").advance(Toy(9))
+        Checked(Answers(np.zeros((4, 9))), "it", Toy(9)).advance(Toy(9))
 
 
 def test_an_empty_population_ends_a_search_and_is_a_mistake_where_it_is_the_first_of_a_frame() -> (
@@ -92,12 +90,12 @@ def test_an_empty_population_ends_a_search_and_is_a_mistake_where_it_is_the_firs
         def advance(self, space: Any) -> None: ...
 
     answers = Filter(np.zeros((4, 9)))
-    checked = CheckedOptimiser(answers, Toy(9), "it")
+    checked = Checked(answers, "it", Toy(9))
     checked.tell(checked.ask(), np.zeros(4))
     answers.answer = np.empty((0, 9))
     assert checked.ask().shape == (0, 9)
     checked.advance(Toy(9))
-    for first in (checked, CheckedOptimiser(answers, Toy(9), "it")):
+    for first in (checked, Checked(answers, "it", Toy(9))):
         with pytest.raises(
             BrokenRuleError,
             match="it: ask must return a first population of one proposal or more",

@@ -19,9 +19,16 @@ def _number(identity: int, value: int) -> bytes:
 
 
 def write_matroska(
-    path: Path, images: Sequence[Any], milliseconds: Sequence[int], wide: int = 0
+    path: Path,
+    images: Sequence[Any],
+    milliseconds: Sequence[int],
+    wide: int = 0,
+    stated: int = 0,
 ) -> Path:
-    """Return the file, in which image k is shown from `milliseconds[k]` on, and stretched to be so many pixels wide."""
+    """Return the file, in which image k is shown from `milliseconds[k]` on, and stretched to be so many pixels wide.
+
+    Its head has the duration of a frame at `stated` frames a second, where that is given.
+    """
     height, width = images[0].shape[:2]
     head = _element(0x4282, b"matroska") + _number(0x4287, 4) + _number(0x4285, 2)
     info = (
@@ -32,6 +39,7 @@ def write_matroska(
     picture = _number(0xB0, width) + _number(0xBA, height)
     picture += _number(0x54B0, wide) + _number(0x54BA, height) if wide else b""
     track = _number(0xD7, 1) + _number(0x73C5, 1) + _number(0x83, 1)
+    track += _number(0x23E383, round(1e9 / stated)) if stated else b""
     track += _element(0x86, b"V_MJPEG") + _element(0xE0, picture)
     clusters = b""
     for image, time in zip(images, milliseconds, strict=True):

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage.cameras import unit_of_heights
+from posefit.footage.cameras import calibrated, order_by_name, unit_of_heights
 from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
+from posefit.geometry.calibration import Calibration
 from posefit.geometry.units import METRES, UNIT_NAMES
 from posefit.silhouette.cost import project
 from tests.cases import each
@@ -208,3 +209,65 @@ def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
         ValueError, match="camera 'bare' must be of 160x120, got a centre of 79.5x259.5"
     ):
         scene_of([source], camera=[bare])
+
+
+def _named(name: str) -> Calibration:
+    return Calibration(
+        name,
+        (160, 120),
+        np.array([[200.0, 0.0, 79.5], [0.0, 200.0, 59.5], [0.0, 0.0, 1.0]]),
+        np.zeros(4),
+        np.eye(3),
+        np.zeros(3),
+    )
+
+
+@each(
+    ("sources", "cameras", "order"),
+    [
+        (["a.npz", "b.npz"], ["a", "b"], [0, 1]),
+        (["a.npz", "b.npz"], ["b", "a"], [1, 0]),
+        (["x/A.mp4", "x/B.mp4"], ["b", "a"], [1, 0]),
+        # as text sorts them, and as people do
+        (["7.mp4", "9.mp4", "11.mp4"], ["11", "7", "9"], [1, 2, 0]),
+        (["cam7.mp4", "cam9.mp4", "cam11.mp4"], ["11", "7", "9"], [1, 2, 0]),
+        (["walk-a.mp4", "walk-b.mp4"], ["cam_b", "cam_a"], [1, 0]),
+        (["cam1.mp4", "cam2.mp4"], ["cam02", "cam01"], [1, 0]),
+        (["left/masks.npz", "right/masks.npz"], ["right", "left"], [1, 0]),
+        (["out/left/m.npz", "out/right/m.npz"], ["right", "left"], [1, 0]),
+        (["run_21985.avi", "run_22001.avi"], ["22001", "21985"], [1, 0]),
+        (["take2_Miqus_1_21985.avi", "take2_Miqus_3_22001.avi"], ["22001", "21985"], [1, 0]),
+        # names that say nothing, or not the same
+        (["x.npz", "y.npz"], ["b", "a"], [0, 1]),
+        (["1.npz", "2.npz"], ["1", "0"], [0, 1]),
+        (["m.npz", "m.npz"], ["b", "a"], [0, 1]),
+    ],
+)  # fmt: skip
+def test_cameras_go_with_the_sources_of_their_names_or_else_in_order(
+    sources: list[str], cameras: list[str], order: list[int]
+) -> None:
+    known = [_named(name) for name in cameras]
+    assert order_by_name(known, sources) == order
+    paired = calibrated(known, [None] * len(known), sources)
+    assert [each.name for each in paired] == [cameras[k] for k in order]
+
+
+def test_names_that_fit_two_orders_are_refused() -> None:
+    with pytest.raises(ValueError, match="names that only fit one order"):
+        order_by_name([_named("a"), _named("b")], ["b/a.npz", "a/b.npz"])
+
+
+def test_the_order_of_a_calibration_file_does_not_matter_where_names_tell(
+    tmp_path: Path,
+) -> None:
+    path = calibration(tmp_path / "two.toml", 1.0)
+    first, second = (
+        path.read_text().replace("cam0", "a").replace("cam1", "b").split("[b]")
+    )
+    texts = {"ab.toml": f"{first}[b]{second}", "ba.toml": f"[b]{second}{first}"}
+    scenes = []
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+        scenes.append(scene_of(views(tmp_path), camera=[tmp_path / name], up="y"))
+    for one, other in zip(scenes[0].cameras, scenes[1].cameras, strict=True):
+        np.testing.assert_array_equal(one.position, other.position)

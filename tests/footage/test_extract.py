@@ -339,6 +339,44 @@ def test_even_times_leave_a_video_as_it_was(tmp_path: Path) -> None:
         assert video.fps == pytest.approx(1e3 * 5 / milliseconds[-1], rel=0.03)
 
 
+@each(
+    ("stated", "milliseconds", "rate"),
+    [
+        # a webcam that falls to half its rate, and films under other rates
+        (30, [round(1e3 * k / 15) for k in range(30)], 15.0),
+        (25, [round(1e3 * k / 120) for k in range(30)], 120.0),
+        (60, [round(1e3 * k / 25) for k in range(30)], 25.0),
+        (30, [round(1e3 * k / 24) for k in range(12)], 24.0),
+        (25, [round(1e3 * k / 59.94) for k in range(30)], 60 / 1.001),
+        (30, [round(1e3 * k / 7.5) for k in range(12)], 7.5),
+        # the head is right, where stamps are rounded or shake
+        (30, [round(1e3 * k / 30) for k in range(30)], 30.0),
+        (30, [33 * k + (7, -5, 0)[k % 3] for k in range(30)], 30.0),
+        (30, [0, 33, 67], 30.0),
+    ],
+)
+def test_a_rate_in_the_head_yields_to_even_time_stamps(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    stated: int,
+    milliseconds: list[int],
+    rate: float,
+) -> None:
+    images = [np.full((48, 64, 3), 4 * k, np.uint8) for k in range(len(milliseconds))]
+    milliseconds = [time - milliseconds[0] for time in milliseconds]
+    path = write_matroska(tmp_path / "a.mkv", images, milliseconds, stated=stated)
+    video = Video.of(path)
+    assert video.fps == pytest.approx(rate, rel=1e-3)
+    assert video.count() == len(milliseconds)
+    assert video.warnings == []
+    assert bool(video.guesses) == (video.fps != stated)
+    if video.guesses:
+        (guess,) = video.guesses
+        assert f"{video.fps:.4g} frames a second by its frames' times" in guess
+        assert f"where its head says {stated}" in guess
+        assert video.claimed == 0  # counted by the head's rate
+
+
 def test_a_very_short_frame_does_not_make_thousands(tmp_path: Path) -> None:
     video = grey(tmp_path / "a.mkv", [0, 1, 2, 3, 400, 800, 1200])
     assert video.count() <= 4 * 7
@@ -426,3 +464,24 @@ def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_ther
         BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"
     ):
         Segmentation(Video.of(filmed[0]), how, (0, 3)).read()
+
+
+def test_pictures_are_extracted_and_masks_and_motions_are_not(
+    filmed: Film, tmp_path: Path
+) -> None:
+    (tmp_path / "film").mkdir()
+    for k, image in enumerate(Video.of(filmed[0]).frames(0, 30, SIZE)):
+        cv2.imwrite(str(tmp_path / "film" / f"{k + 1:03d}.png"), image)
+    words = ["--background", "0:10", "--frames", "10:25"]
+    result = run("extract", tmp_path / "film", *words, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    masks = read_masks(tmp_path / "out" / "masks.npz", ALL)
+    assert (masks.first, len(masks)) == (10, 15)
+    (tmp_path / "masks").mkdir()
+    for k, mask in enumerate(filmed[1][EMPTY : EMPTY + 3]):
+        cv2.imwrite(str(tmp_path / "masks" / f"{k}.png"), 255 * mask.astype(np.uint8))
+    for source in (tmp_path / "masks", tmp_path / "out" / "masks.npz"):
+        error = error_of("extract", source, "--out", tmp_path / "new")
+        assert "source must be a film to extract masks from, got" in error
+    with pytest.raises(ValueError, match="source must be one film, got 2"):
+        extract([filmed[0], filmed[0]], tmp_path / "new")

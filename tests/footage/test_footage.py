@@ -360,3 +360,30 @@ def test_a_mistake_with_footage_leaves_one_line(
         "track", *(names.get(word, word) for word in words), "--out", tmp_path / "out"
     )
     assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
+@each(
+    ("name", "content", "message"),
+    [
+        ("walk.trc", "PathFileType", "motions of .trc are not read; .amc and .bvh are"),
+        ("walk.C3D", "x", "motions of .c3d are not read; .amc and .bvh are"),
+        ("walk.fbx", "x", "motions of .fbx are not read; .amc and .bvh are"),
+        ("rle.json", "{}", "masks and motions of .json are not read; masks as images"),
+        ("poses.pkl", "x", "masks and motions of .pkl are not read; masks as images"),
+        ("noext", "x", "a name that ends in what the file is, such as .mp4"),
+        ("missing.trc", None, "expected a file, got nothing of that name"),
+    ],
+)
+def test_a_file_of_no_source_is_called_what_it_is(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    content: str | None,
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if content is not None:
+        Path(name).write_text(content)
+    for source in (name, f"./{name}", tmp_path / name):
+        assert message in error_of("track", source, "--out", "out")
+    assert not Path("out").exists()

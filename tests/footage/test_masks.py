@@ -601,3 +601,112 @@ def test_masks_that_unpack_to_too_much_are_refused_by_shape(
         match="masks: expected at most 50 million pixels a frame, got 10000x6000",
     ):
         read_masks(np.broadcast_to(np.False_, (1, 6_000, 10_000)), ALL)
+
+
+def transparent(path: Path, numbers: Sequence[Any], alpha: int = 255) -> Path:
+    """Write labels in the colours of a palette, 0 transparent and the others of an alpha."""
+    path.mkdir()
+    for k, image in enumerate(numbers):
+        colours = np.array(PALETTE, dtype=np.uint8)[image]
+        shown = np.where(image > 0, alpha, 0).astype(np.uint8)[..., None]
+        file = str(path / f"{k}.png")
+        assert cv2.imwrite(file, np.concatenate([colours[..., ::-1], shown], axis=2))
+    return path
+
+
+@each("kind", ["palette", "colours", "translucent"])
+def test_labels_before_a_transparent_background_are_labels(
+    walk: list[Any], tmp_path: Path, kind: str
+) -> None:
+    several = labelled(walk)
+    one = [np.where(image == 2, 2, 0) for image in several]
+    for name, written in (("several", several), ("one", one)):
+        path = tmp_path / name
+        if kind == "palette":
+            path.mkdir()
+            for k, numbers in enumerate(written):
+                indexed(path / f"{k}.png", numbers, PALETTE, transparency=0)
+        else:
+            transparent(path, written, 255 if kind == "colours" else 90)
+        if name == "one":
+            check(path, walk)
+        else:
+            with pytest.raises(ValueError, match="got the labels .*--label N chooses"):
+                read_masks(path, ALL)
+    label = 2 if kind == "palette" else 0x008000
+    check(tmp_path / "several", walk, label)
+
+
+@each("alpha", [40, 89, 127, 128, 153, 254])
+def test_a_translucent_colour_is_the_person(
+    walk: list[Any], tmp_path: Path, alpha: int
+) -> None:
+    colour = (30, 144, 255)
+    sharp = [
+        np.dstack([*(np.full(mask.shape, c) for c in colour), alpha * mask])
+        for mask in walk
+    ]
+    check(folder(tmp_path / "sharp", [image.astype(np.uint8) for image in sharp]), walk)
+    # with an edge that is softer still
+    soft = [
+        np.dstack([image[..., :3], softened(mask) * alpha]).astype(np.uint8)
+        for image, mask in zip(sharp, walk, strict=True)
+    ]
+    highest = max(int(image[..., 3].max()) for image in soft)
+    half = highest // 2 if highest <= 127 else 127
+    wanted = [image[..., 3] > half for image in soft]
+    check(folder(tmp_path / "soft", soft), wanted)
+
+
+@each("kind", [np.uint8, np.uint16, np.int32])
+@each("count", [20, 70, 200])
+def test_labels_are_asked_for_however_many_there_are(
+    walk: list[Any], tmp_path: Path, kind: Any, count: int
+) -> None:
+    images = []
+    for mask in walk:
+        # squares of a label each, as a panoptic map has them
+        rows, columns = np.indices(mask.shape) // 8
+        numbers = 1 + (rows * (mask.shape[1] // 8) + columns) % count
+        numbers[mask] = 250
+        images.append(numbers.astype(kind))
+    path = stack(tmp_path / "a.npz", images)
+    with pytest.raises(ValueError, match="got the labels .*--label N chooses one"):
+        read_masks(path, ALL)
+    check(path, walk, 250)
+
+
+def test_degrees_of_many_values_are_no_labels(walk: list[Any], tmp_path: Path) -> None:
+    for full, kind in ((255, np.uint8), (255, np.int32), (1000, np.int32)):
+        soft = [(softened(mask) * full).astype(kind) for mask in walk]
+        masks = read_masks(stack(tmp_path / "a.npz", soft), ALL)
+        assert "are degrees" in masks.guesses[0]
+
+
+@each("label", [1, 15])
+@each("wide", [1, 3])
+def test_a_void_border_is_not_the_person(
+    walk: list[Any], tmp_path: Path, label: int, wide: int
+) -> None:
+    # 255 around each object, as PASCAL VOC has it
+    images = []
+    for mask in walk:
+        grown = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3)), iterations=wide)
+        image = np.where(grown > 0, 255, 0).astype(np.uint8)
+        image[mask] = label
+        images.append(image)
+    path = stack(tmp_path / "a.npz", images)
+    if wide > 1:  # it may be a thing as well
+        with pytest.raises(ValueError, match="got the labels .*--label N chooses one"):
+            read_masks(path, ALL)
+    check(path, walk, label if wide > 1 else None)
+
+
+@each(("lowest", "highest"), [(-3.0, 20.0), (-20.0, 3.0), (-8.0, 60.0), (-40.0, 70.0)])
+def test_logits_are_cut_at_zero_however_high_they_go(
+    walk: list[Any], tmp_path: Path, lowest: float, highest: float
+) -> None:
+    soft = np.array([cv2.GaussianBlur(m.astype(np.float32), (0, 0), 1.5) for m in walk])
+    logits = lowest + (highest - lowest) * soft
+    np.save(tmp_path / "a.npy", logits)
+    check(tmp_path / "a.npy", list(logits > 0.0))

@@ -1,7 +1,7 @@
 """Whether masks from a video are a person's: one who is always in the picture is refused; and which way they face."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,8 +13,9 @@ import pytest
 
 from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError
+from posefit.footage import source
 from posefit.footage.cameras import yaws_of
-from posefit.footage.quality import FrameQuality, verdict
+from posefit.footage.quality import FrameQuality, Verdict, verdict
 from posefit.footage.segmentation import (
     Extraction,
     Segmentation,
@@ -24,6 +25,7 @@ from posefit.footage.segmentation import (
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.camera import Camera
+from posefit.progress import QUIET
 from posefit.registry import Registry, registry
 from posefit.silhouette.foreground import Image, Person
 from tests.cases import each
@@ -525,3 +527,39 @@ def test_mediapipe_reports_the_facing_of_shoulders_and_hips() -> None:
     assert _facing(landmarks(0.0, 0.2)) == pytest.approx(np.pi / 2)
     assert abs(_facing(landmarks(-0.2, 0.0))) == pytest.approx(np.pi)
     assert np.isnan(_facing(None))
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What a way to take the person out gave."""
+
+    name: str
+    warnings: tuple[str, ...] = ()
+
+
+@each(
+    ("doubts", "used"),
+    [
+        ((None,), "first"),
+        ((Verdict("jumpy; more", False), None), "second"),
+        ((Verdict("empty; more", True), None), "second"),
+        ((Verdict("jumpy; more", False), Verdict("jumpy", False)), "first"),
+        ((Verdict("empty; more", True), Verdict("jumpy", False)), "second"),
+        ((Verdict("jumpy; more", False), Verdict("empty", True)), "first"),
+    ],
+)
+def test_the_way_that_is_doubted_least_takes_the_person_out(
+    doubts: tuple[Verdict | None, ...], used: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ways = [SimpleNamespace(name=name) for name in ("first", "second")]
+    how = SimpleNamespace(ways=lambda cameras: ways)
+    results = iter(
+        (None if doubt is not None and doubt.refused else Taken(way.name), doubt)
+        for way, doubt in zip(ways, doubts, strict=False)
+    )
+    monkeypatch.setattr(source, "Segmentation", lambda *_: None)
+    monkeypatch.setattr(source, "_taken_out", lambda *_: next(results))
+    taken = source._filmed([None], [], how, (None, None), QUIET, None)
+    assert taken.name == used
+    assert bool(taken.warnings) == (used == "second")
+    assert next(results, None) is None  # all that had to be tried were

@@ -411,3 +411,248 @@ def test_up_that_is_named_holds_for_our_own_cameras_and_a_guess_is_reported(
     )
     with pytest.raises(ValueError, match="up must be one of x, y, z, got 'w'"):
         upright([one], "w")  # type: ignore[arg-type]
+
+
+@each("key", ["p3", "s1", "s4", "b1", "b2", "tau_x", "skew", "thin_prism", "alpha_c"])
+def test_every_number_of_a_lens_that_is_not_read_is_named(
+    tmp_path: Path, key: str
+) -> None:
+    path = tmp_path / "a.yml"
+    path.write_text(f"{FINE}k1: 0.1\n{key}: 0.0\n")
+    assert read_calibrations(path)[0].distorted
+    path.write_text(f"{FINE}k1: 0.1\n{key}: 0.02\n")
+    with pytest.raises(ValueError, match=f"the lens key '{key}' of 'a'"):
+        read_calibrations(path)
+    path.write_text(json.dumps({"K": K, "dist": {"k1": 0.1, key: 0.02}}))
+    with pytest.raises(ValueError, match=f"the lens key '{key}' of 'a'"):
+        read_calibrations(path)
+
+
+def test_a_skewed_matrix_is_refused(tmp_path: Path) -> None:
+    for skew, refused in ((0.1, False), (5.0, True)):
+        matrix = [[500.0, skew, 319.5], *K[1:]]
+        path = tmp_path / "a.json"
+        path.write_text(json.dumps({"K": matrix, "image_size": [640, 480]}))
+        if refused:
+            with pytest.raises(ValueError, match="a skew of 5 pixels"):
+                read_calibrations(path)
+        else:
+            assert len(read_calibrations(path)) == 1
+
+
+# sizes of common films of which one is made smaller for the other, and the centres of a good lens
+@each(
+    ("size", "centre", "fits"),
+    [
+        ((640, 480), (319.5, 239.5), True),
+        ((640, 480), (300.0, 260.0), True),
+        ((1920, 1080), (990.0, 500.0), True),
+        # of 1920x1080, 1280x720, 2704x1520
+        ((640, 480), (959.5, 539.5), False),
+        ((1280, 720), (950.0, 535.0), False),
+        ((1920, 1080), (639.5, 359.5), False),
+        ((1920, 1080), (1351.5, 759.5), False),
+        ((320, 240), (319.5, 239.5), False),
+    ],
+)
+def test_a_size_that_contradicts_the_centre_is_refused(
+    tmp_path: Path, size: tuple[int, int], centre: tuple[float, float], fits: bool
+) -> None:
+    focal = 0.9 * size[0]
+    matrix = [[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]]
+    for name, text in (
+        ("a.json", json.dumps({"K": matrix, "image_size": size})),
+        ("a.toml", f"[a]\nmatrix = {matrix}\nsize = {list(size)}\n"),
+        ("a.yml", f"w: {size[0]}\nh: {size[1]}\nK: {matrix}\n"),
+    ):
+        (tmp_path / name).write_text(text)
+        if fits:
+            assert read_calibrations(tmp_path / name)[0].size == size
+            continue
+        with pytest.raises(ValueError, match=f"in pictures of {size[0]}x{size[1]}: "):
+            read_calibrations(tmp_path / name)
+    # without a size it is the pictures' own that has to fit
+    (tmp_path / "b.json").write_text(json.dumps({"K": matrix}))
+    (one,) = read_calibrations(tmp_path / "b.json")
+    assert (one.padded(size) is not None) == fits
+
+
+REGION = "roi: {x_offset: 100, y_offset: 60, height: 240, width: 320}\n"
+
+
+@each(
+    ("more", "size", "focal", "centre"),
+    [
+        ("", (640, 480), (500.0, 510.0), (320.0, 240.0)),
+        ("binning_x: 0\nbinning_y: 0\n", (640, 480), (500.0, 510.0), (320.0, 240.0)),
+        ("binning_x: 2\nbinning_y: 2\n", (320, 240), (250.0, 255.0), (160.0, 120.0)),
+        (REGION, (320, 240), (500.0, 510.0), (220.0, 180.0)),
+        (
+            f"{REGION}binning_x: 2\nbinning_y: 4\n",
+            (160, 60),
+            (250.0, 127.5),
+            (110.0, 45.0),
+        ),
+        (
+            "roi: {x_offset: 0, y_offset: 0, height: 0, width: 0}\n",
+            (640, 480),
+            (500.0, 510.0),
+            (320.0, 240.0),
+        ),
+    ],
+)
+def test_a_part_of_ros_sensor_has_the_camera_of_that_part(
+    tmp_path: Path, more: str, size: object, focal: object, centre: object
+) -> None:
+    # sensor_msgs/CameraInfo: K and the size are those of the whole sensor; of the part, the offset is taken off, and
+    # the pixels of a bin are one
+    path = tmp_path / "a.yaml"
+    path.write_text(
+        f"width: 640\nheight: 480\ndistortion_model: plumb_bob\nD: [0, 0, 0, 0, 0]\n"
+        f"K: {np.ravel(K).tolist()}\nP: {np.ravel(np.eye(3, 4)).tolist()}\n{more}"
+    )
+    (one,) = read_calibrations(path)
+    assert one.size == size
+    camera = one.camera(one.size, np.eye(3))
+    np.testing.assert_allclose(camera.focal, focal)
+    np.testing.assert_allclose(camera.centre, centre)
+
+
+@each(
+    ("rotation", "fits"),
+    [
+        ([0.0, 0.0, 0.0], True),
+        ([3.6, 0.0, 0.0], True),
+        ([6.2, 0.5, 0.0], True),
+        ([180.0, 0.0, 0.0], False),
+        ([0.0, 45.0, 90.0], False),
+        ([6.3, 0.0, 0.0], False),
+    ],
+)
+def test_a_rotation_beyond_a_full_turn_is_refused(
+    tmp_path: Path, rotation: list[float], fits: bool
+) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps({"K": K, "rvec": rotation, "tvec": [0, 1, 4]}))
+    if fits:
+        turn = cv2.Rodrigues(np.array(rotation))[0]
+        np.testing.assert_allclose(read_calibrations(path)[0].rotation, turn)
+        return
+    with pytest.raises(ValueError, match="more than a full turn: are .* degrees"):
+        read_calibrations(path)
+
+
+PLACE = np.vstack(
+    [np.column_stack([np.eye(3), [0.1, 0.2, 3.0]]), [0, 0, 0, 1]]
+).tolist()
+
+
+@each(
+    "key",
+    [
+        *("camera_to_world", "cam2world", "c2w", "world_to_camera", "w2c", "T_wc"),
+        *("extrinsics", "extrinsic", "extrinsicMatrix", "transform_matrix", "pose"),
+        *("camera_pose", "RT", "qvec", "position", "matrix_world"),
+    ],
+)
+def test_a_place_under_a_name_that_is_not_read_is_refused_by_it(
+    tmp_path: Path, key: str
+) -> None:
+    path = tmp_path / "a.json"
+    for value in (PLACE, {"R": np.eye(3).tolist(), "t": [0, 0, 3]}):
+        path.write_text(json.dumps({"cameras": {"b": {"K": K, key: value}}}))
+        with pytest.raises(ValueError, match=f"the key '{key}' of 'b'"):
+            read_calibrations(path)
+    # beside a place that is read, it does no harm
+    placed = {"R": np.eye(3).tolist(), "t": [0.1, 0.2, 3.0]}
+    path.write_text(json.dumps({"K": K, key: PLACE, **placed}))
+    np.testing.assert_allclose(read_calibrations(path)[0].translation, [0.1, 0.2, 3.0])
+
+
+def test_transforms_of_nerf_are_refused_by_their_key(tmp_path: Path) -> None:
+    frame = {"file_path": "a.png", "transform_matrix": PLACE}
+    for more in ({}, {"K": K}):
+        values = {"fl_x": 500.0, "w": 640, "frames": [{**frame, **more}]}
+        (tmp_path / "transforms.json").write_text(json.dumps(values))
+        with pytest.raises(ValueError, match="'transform_matrix' is not read"):
+            read_calibrations(tmp_path / "transforms.json")
+
+
+def test_the_pose_of_one_board_places_the_camera_and_many_do_not(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.json"
+    one = {"rvecs": [[0.1], [0.2], [-0.3]], "tvecs": [[[1.0], [2.0], [5.0]]]}
+    path.write_text(json.dumps({"mtx": K, **one}))
+    (camera,) = read_calibrations(path)
+    np.testing.assert_allclose(camera.translation, [1.0, 2.0, 5.0])
+    turn = cv2.Rodrigues(np.array([0.1, 0.2, -0.3]))[0]
+    np.testing.assert_allclose(camera.rotation, turn)
+    boards = {"rvecs": np.ones((9, 3)).tolist(), "tvecs": np.ones((9, 3)).tolist()}
+    path.write_text(json.dumps({"mtx": K, **boards}))
+    assert read_calibrations(path)[0].rotation is None
+
+
+def test_kalibrs_chain_places_each_camera_from_the_one_before(tmp_path: Path) -> None:
+    quarter = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    steps = [
+        np.vstack([np.column_stack([quarter, place]), [0, 0, 0, 1]])
+        for place in ([-4.0, 0.0, 4.0], [1.0, 0.5, 0.0])
+    ]
+    intrinsics = "  intrinsics: [500, 510, 319.5, 239.5]\n  resolution: [640, 480]\n"
+    text = f"cam0:\n{intrinsics}"
+    for number, step in enumerate(steps, 1):
+        text += f"cam{number}:\n  T_cn_cnm1: {step.tolist()}\n{intrinsics}"
+    (tmp_path / "camchain.yaml").write_text(text)
+    first, second, third = read_calibrations(tmp_path / "camchain.yaml")
+    point = np.array([0.3, 0.2, 2.0, 1.0])
+    for camera, matrix in (
+        (first, np.eye(4)),
+        (second, steps[0]),
+        (third, steps[1] @ steps[0]),
+    ):
+        seen = camera.rotation @ point[:3] + camera.translation
+        np.testing.assert_allclose(seen, (matrix @ point)[:3], atol=1e-12)
+
+
+@each("names", ["ABCD", "KMRD", "TWHK", "rtdk"])
+def test_cameras_may_have_the_names_of_keys(tmp_path: Path, names: str) -> None:
+    table = {"matrix": K, "size": [640, 480], "rotation": [0, 0, 0]}
+    texts = {"a.toml": "", "a.json": {}}
+    for number, name in enumerate(names):
+        place = {**table, "translation": [0.0, 0.0, float(number)]}
+        texts["a.json"][name] = place
+        lines = "\n".join(f"{key} = {value}" for key, value in place.items())
+        texts["a.toml"] += f"[{name}]\n{lines}\n"
+    for file, text in texts.items():
+        path = tmp_path / file
+        path.write_text(text if isinstance(text, str) else json.dumps(text))
+        read = read_calibrations(path)
+        assert [one.name for one in read] == list(names)
+        assert [one.translation[2] for one in read] == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_a_list_of_cameras_is_read(tmp_path: Path) -> None:
+    table = {"name": "c01", "size": [640, 480], "matrix": K, "rotation": [0.1, 0, 0]}
+    tables = [{**table, "translation": [0, 0, 4], "distCoef": LENS}]
+    for name in ("a.json", "a.yml"):
+        (tmp_path / name).write_text(json.dumps(tables))
+        (one,) = read_calibrations(tmp_path / name)
+        assert (one.name, one.distorted, one.size) == ("c01", True, (640, 480))
+
+
+@each(
+    ("text", "what"),
+    [
+        ("<document><chunk/></document>", "Metashape's XML"),
+        ("<Cameras><Camera/></Cameras>", "Vicon's XML"),
+        ("<svg/>", "XML of 'svg'"),
+    ],
+)
+def test_xml_of_another_program_is_called_that(
+    tmp_path: Path, text: str, what: str
+) -> None:
+    for name in ("a.xml", "a.xcp"):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(ValueError, match=f"got {what}, which is not read"):
+            read_calibrations(tmp_path / name)

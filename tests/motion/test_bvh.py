@@ -413,3 +413,26 @@ def test_what_comes_out_of_a_file_has_a_limit(
         ValueError, match="a.bvh:.*: expected at most 20 joints and ends, got more"
     ):
         read_bvh(path)
+
+
+@each("below", ["roots", "one root"])
+def test_the_other_people_of_a_file_are_named(tmp_path: Path, below: str) -> None:
+    write_bvh(tmp_path / "one.bvh", built_in.motion("walk", frames=3))
+    text = (tmp_path / "one.bvh").read_text()
+    hierarchy, motion = text.split("MOTION\n")
+    tree = hierarchy.removeprefix("HIERARCHY\n")
+    other = re.sub(r"(ROOT|JOINT) (\w+)", r"\1 Partner_\2", tree)
+    rows = motion.splitlines()
+    if below == "roots":
+        hierarchy = f"HIERARCHY\n{tree}{other}"
+        rows[2:] = [f"{row} {row}" for row in rows[2:]]
+    else:
+        inner = (tree + other).replace("ROOT", "JOINT")
+        hierarchy = f"HIERARCHY\nROOT Scene\n{{\nOFFSET 0 0 0\nCHANNELS 0\n{inner}}}\n"
+        rows[2:] = [f"{row} {row}" for row in rows[2:]]
+    (tmp_path / "two.bvh").write_text(hierarchy + "\n".join(["MOTION", *rows, ""]))
+    one, two = (read_bvh(tmp_path / name) for name in ("one.bvh", "two.bvh"))
+    np.testing.assert_allclose(two.joints, one.joints, atol=1e-6)
+    assert not any("left out" in note for note in one.notes)
+    (note,) = [note for note in two.notes if "left out" in note]
+    assert "the person of 'Hips' is read; 'Partner_Hips' left out" in note

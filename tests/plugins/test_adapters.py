@@ -19,6 +19,7 @@ import pytest
 import posefit
 from posefit import Problem, minimise
 from posefit.arrays import Array
+from posefit.fitting.box import Start
 from posefit.registry import Registry, load, registry
 from posefit.testing.toy import Toy, ball, sphere
 from posefit_bridges.optimisers import Bridge, GlobalRandom, called_back
@@ -124,6 +125,42 @@ def test_a_borrowed_global_generator_is_put_back() -> None:
     assert draws(other) == first
     assert draws(one) != first  # it goes on
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+
+
+@each("dimensions", [1, 3])
+def test_pycma_gets_the_box_and_a_spread_for_each_coordinate(dimensions: int) -> None:
+    cma = pytest.importorskip("cma")
+    made: list[tuple[Any, ...]] = []
+
+    class Noted(cma.CMAEvolutionStrategy):  # type: ignore[misc]
+        """pycma's strategy, which notes what it is made of."""
+
+        def __init__(self, *given: Any) -> None:
+            made.append(given)
+            super().__init__(*given)
+
+    spreads = np.linspace(0.1, 0.4, dimensions)
+    start = Start(np.zeros(dimensions), spreads, np.zeros(dimensions))
+    for space, expected in (
+        (Toy(dimensions), np.full(dimensions, 0.3)),
+        (replace(Toy(dimensions), start=start), spreads),
+    ):
+        rng = np.random.default_rng(0)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(cma, "CMAEvolutionStrategy", Noted)
+            optimiser = posefit.optimiser("pycma")(
+                space, rng, population_size=6, spread=0.3
+            )
+            assert optimiser.ask().shape == (6, dimensions)
+        mean, step, options = made.pop()
+        # a search of one dimension has a spare one, as wide as one without a prediction
+        spare = [0.3] * (dimensions == 1)
+        assert len(mean) == dimensions + len(spare)
+        assert step == 1.0
+        assert options["bounds"] == [-1, 1]
+        np.testing.assert_array_equal(options["CMA_stds"], [*expected, *spare])
+        assert options["popsize"] == 6
+        assert options["verbose"] < 0  # says nothing
 
 
 LIBRARIES = {

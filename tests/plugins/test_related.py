@@ -19,6 +19,7 @@ from posefit.plugin import (
 from posefit.registry import registry
 from posefit.testing.tracker_rules import scene
 from posefit_related.frames import costs_of, frame_of, place_of
+from posefit_related.isomap import IsomapPrior
 from tests.cases import each
 
 METHODS = [
@@ -137,3 +138,21 @@ def test_a_mask_says_where_the_root_is() -> None:
     moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])
     assert np.linalg.norm(moved - place) < 0.08  # a pixel of 120 rows is 3 cm
     assert drawn == 1
+
+
+def test_a_latent_is_feasible_within_reach_of_the_nearest_training_pose() -> None:
+    prior = IsomapPrior()
+    prior.centres = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])
+    prior.reach = 2.0
+    # distances by hand: 1.1 sqrt(3) = 1.905, 1.2 sqrt(3) = 2.078, on both sides
+    for latent, near in (
+        ([1.1, 1.1, 1.1], True),
+        ([-1.1, -1.1, -1.1], True),
+        ([1.2, 1.2, 1.2], False),
+        ([-1.2, -1.2, -1.2], False),
+        ([2.0, 0.0, 0.0], True),
+        ([5.0, 0.0, 0.0], False),
+        ([8.5, 0.0, 0.0], True),
+        ([11.2, -1.2, 1.2], False),
+    ):
+        assert prior.feasible(np.array([latent])).tolist() == [near], latent

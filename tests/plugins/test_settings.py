@@ -3,16 +3,19 @@
 import functools
 import inspect
 import re
+from functools import partial
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
 
+import posefit
 from posefit.errors import InputError
 from posefit.fitting.check import choices
 from posefit.fitting.tracker import Prediction
 from posefit.hooks import PROJECT
-from posefit.registry import registry
+from posefit.registry import register, registry
 from posefit.settings import (
     check,
     check_hints,
@@ -23,6 +26,8 @@ from posefit.settings import (
     settings_of,
     without_settings,
 )
+from posefit.suites.running import run_on
+from posefit.sweep.plan import Plan
 from posefit_filters.particle import Particle
 from posefit_swarm.sapso import SAPSO
 from tests.cases import each
@@ -281,6 +286,56 @@ def test_choices_are_checked_in_a_module_with_postponed_annotations() -> None:
         choices(settings, {"kind": "b"})
         with pytest.raises(InputError, match="kind must be one of a, b, got 'c'"):
             choices(settings, {"kind": "c"})
+
+
+HUGE = 1_000_000_000  # proposals: more than memory holds
+
+
+class Hungry:
+    """An optimiser that draws its population when it is made."""
+
+    def __init__(self, space: Any, rng: Any, *, population_size: int = 40) -> None:
+        raise AssertionError(f"drawn: {population_size}")
+
+
+def test_a_population_that_no_budget_holds_is_refused_before_it_is_drawn(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    message = f"evaluations must hold one population of {HUGE}, got 100"
+    sized = [
+        offer
+        for offer in registry().offers["optimiser"].values()
+        if any(setting.name == "population_size" for setting in offer.settings)
+    ]
+    assert len(sized) > 3
+    for offer in sized:
+        with pytest.raises(InputError, match=message):
+            planned(offer.factory, {"population_size": HUGE}, 100)
+    monkeypatch.setattr("posefit.registry._own", {})
+    register({"hungry": (Hungry, "")})
+    try:
+        setting = [f"hungry.population_size={HUGE}"]
+        small = {"frames": 1, "size": (80, 60), "evaluations": 100}
+        track = partial(posefit.track, "walk", method="hungry", settings=setting)
+        mask = np.zeros((60, 80), dtype=bool)
+        mask[20:40, 30:40] = True
+        plan = {"defaults": small | {"settings": {"hungry.population_size": HUGE}}}
+        plan["product"] = {"methods": ["hungry"], "motions": ["walk"], "seeds": 1}
+        problem = posefit.suite(instance=10_000)
+        for run in (
+            partial(track, **{**small, "frames": (0, 1)}),
+            partial(
+                posefit.fit, mask, method="hungry", settings=setting, evaluations=100
+            ),
+            partial(
+                run_on, problem, "hungry", {"population_size": HUGE}, evaluations=100
+            ),
+            partial(Plan.of, plan),
+        ):
+            with pytest.raises(InputError, match=message):
+                run()
+    finally:
+        registry.cache_clear()
 
 
 def test_a_budget_becomes_iterations_or_evaluations_whichever_an_optimiser_plans_with() -> (

@@ -1,16 +1,22 @@
 """What `posefit report` writes and prints, and one line for every mistake."""
 
+import csv
 import json
 import re
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from posefit.page.document import embedded, plain
+from posefit.report.content import data_of
+from posefit.report.kind import Contest
 from posefit.report.page import MARK
+from posefit.report.runs import runs_of
+from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import write_csv
 from tests.commands import error_of, run
 from tests.files import csv_rows
@@ -36,6 +42,45 @@ def results(tmp_path: Path) -> Path:
         for (method, i, s), error in full({"random@pca": 2.0, "sapso@pca": 1.0}).items()
     ]
     return ledger(tmp_path / "results", made, LOST)
+
+
+def header_of(made: Path) -> dict[str, Any]:
+    """Return the header of the page about a ledger."""
+    with Ledger(made) as opened:
+        header: dict[str, Any] = data_of(opened, runs_of(opened))["header"]
+    return header
+
+
+def test_the_header_counts_runs_methods_and_failures(
+    results: Path, tmp_path: Path
+) -> None:
+    one = ledger(tmp_path / "one", [result(FIRST, 1.0)])
+    assert header_of(one)["summary"] == "1 track by 1 method; no cell failed."
+    assert header_of(results)["summary"] == "8 tracks by 2 methods; 1 cell failed."
+
+
+def test_fewer_resamples_than_usual_are_said(
+    results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def said() -> list[str]:
+        return [note for note in header_of(results)["notes"] if "resamples" in note]
+
+    for count, notes in (
+        (2000, []),
+        (1999, ["So many runs have 1999 bootstrap resamples instead of 2,000."]),
+    ):
+        monkeypatch.setattr(Contest, "resamples", lambda *_, count=count: count)
+        assert said() == notes
+
+
+@pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t", "\r"])
+def test_no_name_is_a_formula_of_a_spreadsheet(sign: str, tmp_path: Path) -> None:
+    write_csv(
+        [{"name": f"{sign}1+1", "value": -1.5, "kind": "a=b"}], tmp_path / "rows.csv"
+    )
+    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert row == {"name": f"'{sign}1+1", "value": "-1.5", "kind": "a=b"}
 
 
 def test_the_report_is_one_file_that_links_to_nothing_but_itself(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.fitting.box import Start
 from posefit.fitting.cma import CMAES, Strategy, constants, default_population_size
 from posefit.testing.toy import Toy, sphere
 
@@ -373,3 +374,19 @@ def test_a_search_that_stagnates_starts_again_with_twice_the_population() -> Non
     assert sizes[0] == 7
     assert set(sizes) >= {7, 14, 28}
     assert sorted(sizes) == sizes
+
+
+# HANSEN2016 (B.5)
+def test_b_5_what_lies_beyond_the_box_ranks_behind_all_that_is_in_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    start = Start(np.array([1.0, 0.0]), np.array([0.3, 0.01]), np.zeros(2))
+    optimiser = CMAES(Toy(2, start=start), np.random.default_rng(0), population_size=9)
+    optimiser.beyond = np.array([0, 0, 0.3, 0, 0.1, 0, 0, 0.2, 0])
+    ranked: list[Array] = []
+    monkeypatch.setattr(
+        optimiser.strategy, "learn", lambda _, costs: ranked.append(costs)
+    )
+    optimiser.tell(optimiser.ask(), np.arange(9.0, 0.0, -1.0))
+    # 9 is the highest cost: 9 + 0.3, 9 + 0.1 and 9 + 0.2 by hand
+    np.testing.assert_allclose(ranked, [[9, 8, 9.3, 6, 9.1, 4, 3, 9.2, 1]])

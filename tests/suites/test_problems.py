@@ -313,6 +313,10 @@ def test_a_copy_of_a_problem_counts_for_itself(
             "dimension must be one of 9, 10, 16, 20, 24, 40, 66, got 11",
         ),
         (
+            lambda: posefit.Suite()[0:2],
+            r"index must be the number of one problem, got slice\(0, 2, None\)",
+        ),
+        (
             lambda: posefit.Suite(functions=9),
             "functions must be a list of numbers, got 9",
         ),  # type: ignore[arg-type]

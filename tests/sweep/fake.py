@@ -4,8 +4,11 @@
 does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
+import json
 import os
+import random
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
     from posefit.sweep.engine import Engine
 
 STARTS = "POSEFIT_STARTS"
+LEFT = "POSEFIT_LEFT"
 SLOW_SECONDS = "POSEFIT_SLOW_SECONDS"
 SEGFAULT = 1001
 ENDLESS = 1002
@@ -35,6 +39,7 @@ LEAVE = 1008
 KILLED = 1009
 EXIT = 1010
 COMPILE = 1011
+LEAVE_BEHIND = 1012
 
 
 def cells(count: int, frames: int = 60) -> list[TrackCell]:
@@ -66,6 +71,8 @@ def behave(cell: TrackCell) -> CellResult:
             sys.exit(0)
         case n if n == KILLED:  # as if from outside
             os.kill(os.getpid(), (signal.SIGKILL, signal.SIGTERM)[cell.seed % 2])
+        case n if n == LEAVE_BEHIND:
+            leave_behind()
         case n if n == COMPILE:
             compiled()
         case n if n == TOGETHER:
@@ -78,6 +85,29 @@ def behave(cell: TrackCell) -> CellResult:
         case _:
             time.sleep(0.05)
     return result(cell)
+
+
+def state() -> list[Any]:
+    """Return what a cell may find changed by an earlier one."""
+    return [
+        os.getcwd(),
+        os.environ.get("LEFT"),
+        "left" in sys.path,
+        signal.getsignal(signal.SIGUSR1) is signal.SIG_DFL,
+    ]
+
+
+def leave_behind() -> None:
+    """Note the state of this process and the number of another that sleeps, and change all of it."""
+    sleeps = [sys.executable, "-c", "import time; time.sleep(600)"]
+    process = subprocess.Popen(sleeps, cwd="/")
+    with open(os.environ[LEFT], "a", encoding="utf-8") as file:
+        file.write(json.dumps([process.pid, *state(), random.random()]) + "\n")
+    os.chdir("/")
+    os.environ["LEFT"] = "left"
+    sys.path.append("left")
+    signal.signal(signal.SIGUSR1, lambda *_: None)
+    random.seed(1)
 
 
 def compiled() -> int:

@@ -1,6 +1,8 @@
 """A ledger keeps every row, whatever becomes of the process that writes it; a strange file is one line."""
 
 import json
+import os
+import re
 import signal
 import sqlite3
 import subprocess
@@ -14,17 +16,28 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit.errors import InputError
 from posefit.registry import registry
 from posefit.sweep.cell import other_version
-from posefit.sweep.command import swept
-from posefit.sweep.ledger import ATTEMPTS, FILE, LOSSES, Ledger, Writer
+from posefit.sweep.command import cells_of, swept
+from posefit.sweep.ledger import (
+    ATTEMPTS,
+    FILE,
+    FORMAT,
+    LOSSES,
+    MIGRATIONS,
+    Ledger,
+    Writer,
+)
 from posefit.version import posefit_build
 from tests.cases import each
 from tests.report.contests import runs_in
+from tests.report.searched import searched
 from tests.sweep import fake
 from tests.sweep.fake import Instant, cells, filled, quarantined_in, result, rows_in
 
 ROOT = Path(__file__).parents[2]
+CONNECT = sqlite3.connect
 
 
 def changed(folder: Path, query: str, *values: Any) -> None:
@@ -116,6 +129,15 @@ SPEC = cells(1)[0].spec
             {"mode_reliability": [[1, -1.0, 0.5]]},
             "the probability of mode_reliability must lie in 0 to 1",
         ),
+        ("row", {"iou": {"mean": 0.9}}, "iou must be a number that a cell can measure"),
+        ("row", {"iou": [0.9]}, "iou must be a number that a cell can measure"),
+        ("row", {"error_degrees": 2.0}, "error_degrees must be what posefit writes"),
+        ("row", {"skill": [2.0]}, "skill must be what posefit writes"),
+        (
+            "row",
+            {"skill": {"nearest": {"a": 1.0}}},
+            "skill must be what posefit writes",
+        ),
         ("spec", {"seed": "0\nEND\nrm -r x"}, "seed must be"),
         ("spec", {"frames": 10**7}, "frames must lie in 1 to 100000"),
         ("spec", {"settings": {"a": {}}}, "settings must be"),
@@ -179,6 +201,158 @@ def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(
             assert caught.match(reason)
 
 
+def test_a_search_has_no_joints_and_a_key_must_be_there(tmp_path: Path) -> None:
+    folder = searched(tmp_path / "results", {"cma": 3}, [(1, 9, 10_000)])
+    key = rows_in(folder)[0]["key"]
+    with Ledger(folder) as ledger:
+        with pytest.raises(
+            ValueError, match=f"cell {key[:8]} is a search, which has no joints"
+        ):
+            ledger.joints(key)
+        with pytest.raises(
+            ValueError, match="expected the key of a finished cell, got 'no'"
+        ):
+            ledger.joints("no")
+    with pytest.raises(ValueError, match="expected an open ledger, got a closed one"):
+        list(ledger.rows())
+
+
+def test_a_ledgers_name_may_hold_what_is_a_pattern_elsewhere(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "results", 2)
+    for name in ("a[1].sqlite", "*.sqlite", "?.sqlite", "{a,b}.sqlite"):
+        copy = tmp_path / name
+        copy.write_bytes((folder / FILE).read_bytes())
+        with Ledger(copy) as ledger:
+            assert len(ledger) == 2
+            assert ledger.changed == copy.stat().st_mtime
+
+
+@each(
+    ("name", "reason", "reads", "writes"),
+    [
+        ("", "database is locked", "one in use", "one in use"),
+        ("", "locking protocol", "one on a disk that SQLite cannot share", "a local folder"),
+        ("SQLITE_IOERR_SHMMAP", "disk I/O error", "one on a disk that SQLite cannot share", "a local folder"),
+        ("SQLITE_IOERR_READ", "disk I/O error", "one that cannot be opened here", "got disk I/O error"),
+        ("SQLITE_CANTOPEN", "unable to open database file", "one that cannot be opened here", "got unable"),
+    ],
+)  # fmt: skip
+def test_only_damage_is_called_damage(
+    name: str, reason: str, reads: str, writes: str, tmp_path: Path
+) -> None:
+    folder = filled(tmp_path / "results", 2)
+
+    class Refused(sqlite3.Connection):
+        """A connection to a file that SQLite cannot use here."""
+
+        def execute(self, *_: Any) -> Any:
+            error = sqlite3.OperationalError(reason)
+            if name:
+                error.sqlite_errorname = name
+            raise error
+
+    def connect(*args: Any, **more: Any) -> sqlite3.Connection:
+        return CONNECT(*args, **more, factory=Refused)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sqlite3, "connect", connect)
+        for opened, came in ((Ledger, reads), (Writer, writes)):
+            with pytest.raises(InputError, match=re.escape(came)) as caught:
+                opened(folder / FILE)
+            assert reason in str(caught.value)
+            assert "recover" not in str(caught.value)
+    filled(folder, 3)
+
+
+def test_a_ledger_that_another_program_locks_is_in_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.sweep.ledger.OPEN_SECONDS", 0.01)
+    folder = filled(tmp_path / "results", 2)
+    with closing(sqlite3.connect(folder / FILE, isolation_level=None)) as other:
+        # so that readers have to wait, too
+        other.execute("PRAGMA journal_mode = DELETE")
+        other.execute("BEGIN EXCLUSIVE")
+        for opened in (Ledger, Writer):
+            with pytest.raises(
+                ValueError, match=r"got one in use \(database is locked\)"
+            ):
+                opened(folder / FILE)
+    filled(folder, 3)
+
+
+@each("kind", ["link", "hard link", "file", "pipe", "folder"])
+def test_a_lock_file_that_is_not_posefits_stays_as_it_is(
+    kind: str, tmp_path: Path
+) -> None:
+    mine = tmp_path / "mine.txt"
+    mine.write_text("mine")
+    folder = tmp_path / "results"
+    folder.mkdir()
+    name = folder / f"{FILE}.driver"
+    if kind == "link":
+        name.symlink_to(mine)
+    elif kind == "hard link":
+        name.hardlink_to(mine)
+    elif kind == "file":
+        name.write_text("mine")
+    elif kind == "pipe":
+        os.mkfifo(name)
+    else:
+        name.mkdir()
+    with pytest.raises(
+        ValueError, match="driver: expected|expected a file that can be"
+    ):
+        Writer(folder / FILE)
+    assert mine.read_text() == "mine"
+    assert [path.name for path in folder.iterdir()] == [name.name]
+    if kind == "file":
+        assert name.read_text() == "mine"
+
+
+def test_a_ledger_is_not_made_through_a_link_that_leads_nowhere(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    folder.mkdir()
+    (folder / FILE).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(ValueError, match="got a link that leads nowhere"):
+        Writer(folder / FILE)
+    assert not (tmp_path / "elsewhere").exists()
+
+
+def test_what_is_refused_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise sqlite3.OperationalError("locking protocol")
+
+    monkeypatch.setattr(Writer, "_prepare", refuse)
+    with pytest.raises(ValueError, match="locking protocol"):
+        Writer(tmp_path / "o" / "p" / "q" / FILE)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_ledger_of_the_first_format_is_read_and_brought_to_todays(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "results"
+    folder.mkdir()
+    with closing(sqlite3.connect(folder / FILE)) as old:
+        old.executescript(
+            f"{MIGRATIONS[1]} CREATE VIEW runs AS SELECT key FROM cells; PRAGMA user_version = 1;"
+        )
+        old.execute(
+            "INSERT INTO cells (key, kind, spec, status, row) VALUES (?, 'track', ?, 'done', ?)",
+            [cells(1)[0].key, json.dumps(SPEC), json.dumps(ROW)],
+        )
+        old.commit()
+    assert len(rows_in(folder)) == 1
+    filled(folder, 2)
+    assert len(rows_in(folder)) == 2
+    with closing(sqlite3.connect(folder / FILE)) as database:
+        assert database.execute("PRAGMA user_version").fetchone() == (FORMAT,)
+        assert database.execute("SELECT sum(seed) FROM runs").fetchone() == (1,)
+
+
 def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
     other, short, empty = (
         tmp_path / f"{name}.sqlite" for name in ("other", "short", "empty")
@@ -213,7 +387,7 @@ def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
             short,
             "a whole SQLite file, got a file of 1 byte, too short to be one: take it",
         ),
-        (folder / FILE, "expected a ledger of format 1, got 9"),
+        (folder / FILE, "expected a ledger of format 1 to 2, got 9"),
     ):
         for opened in (Ledger, Writer):
             with pytest.raises(ValueError, match=message):
@@ -264,10 +438,11 @@ def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
         ledger._db.execute(f"PRAGMA max_page_count = {pages + 2}")
         with pytest.raises(
             ValueError,
-            match=r"got database or disk is full; \d+ of 50 cells are done and safe",
-        ):
+            match=r"got database or disk is full; (\d+) of 50 cells are done and safe",
+        ) as caught:
             drive(ledger, Instant(), print)
-    assert 3 <= len(rows_in(folder)) < 50
+    safe = re.search(r"(\d+) of 50", str(caught.value))
+    assert 3 <= len(rows_in(folder)) == int(safe[1]) < 50
     filled(folder, 50)
 
 
@@ -336,6 +511,29 @@ def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(
         assert len(merged) == 5
         assert seeds == [0, 1, 2, 3, 4]
         assert joints["truth"][0, 0, 0] == 4.0
+
+
+def test_a_plan_that_grows_and_a_run_without_shards_repeat_nothing(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "results"
+    shards = [f"{k}/3" for k in (1, 2, 3)]
+    ran = 0
+    for count in (20, 30):
+        parts = [list(cells_of(cells(count), shard)) for shard in shards]
+        assert all(parts)
+        together = sorted(cell.seed for part in parts for cell in part)
+        assert together == list(range(count))
+        for shard in shards:
+            ran += swept(cells(count), folder, Instant(), print, shard=shard).ran
+        assert ran == count
+    # all in one, after a shard that was ended before it wrote anything
+    (folder / "ledger-1-of-4.sqlite").touch()
+    tally = swept(cells(32), folder, Instant(), print)
+    assert (tally.cells, tally.done, tally.ran) == (32, 32, 2)
+    assert swept(cells(32), folder, Instant(), print).ran == 0
+    (folder / "ledger-1-of-4.sqlite").unlink()
+    assert len(rows_in(folder)) == 32
 
 
 def test_a_name_changes_no_key_and_the_latest_plans_name_counts(tmp_path: Path) -> None:

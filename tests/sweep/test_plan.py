@@ -201,21 +201,48 @@ def test_a_digest_changes_with_every_file_that_results_depend_on(
     tmp_path: Path, monkeypatch: Any
 ) -> None:
     package = tmp_path / "package"
-    (package / "report").mkdir(parents=True)
-    (package / "__init__.py").write_text("")
+    elsewhere = tmp_path / "elsewhere"
+    for folder in ("report", "data", ".git", "__pycache__"):
+        (package / folder).mkdir(parents=True)
+    elsewhere.mkdir()
+    # a link to a folder of weights, and one that leads back
+    (package / "linked").symlink_to(elsewhere)
+    (package / "data" / "loop").symlink_to(package)
+    # without __init__.py, as a namespace; __path__ is what Python sets
     monkeypatch.setitem(
-        sys.modules, "package", SimpleNamespace(__file__=str(package / "__init__.py"))
+        sys.modules, "package", SimpleNamespace(__path__=[str(package)], __file__=None)
     )
-    digests = [source_digest.__wrapped__("package", ("report",))]
-    for name, counts in (
-        ("search.py", True),
-        ("model.npz", True),
-        ("notes.txt", False),
-        ("report/page.py", False),
-    ):
+
+    def digest() -> str:
+        return str(source_digest.__wrapped__("package", ("report",)))
+
+    assert digest() == ""
+    data = [f"data/weights{suffix}" for suffix in (".npy", ".npz", ".pt", ".onnx", ".so", ".csv", ".pkl", ".txt", "")]  # fmt: skip
+    for name in ("__init__.py", "search.py", *data, "linked/weights.bin"):
+        for content in ("1", "2"):
+            before = digest()
+            (package / name).write_text(content)
+            assert digest() != before, (name, content)
+    before = digest()
+    (package / "data" / "weights.npy").rename(package / "data" / "others.npy")
+    assert digest() != before
+    before = digest()
+    for name in ("report/page.py", ".git/index", ".hidden", "__pycache__/a.pyc"):
         (package / name).write_text("1")
-        digests.append(source_digest.__wrapped__("package", ("report",)))
-        assert (digests[-1] != digests[-2]) == counts, name
+        assert digest() == before, name
+
+
+def test_a_plugin_of_one_file_has_the_digest_of_it(
+    tmp_path: Path, monkeypatch: Any
+) -> None:
+    module = tmp_path / "alone.py"
+    monkeypatch.setitem(sys.modules, "alone", SimpleNamespace(__file__=str(module)))
+    digests = set()
+    for content in ("1", "2"):
+        module.write_text(content)
+        (tmp_path / "strange.py").write_text(content)
+        digests.add(source_digest.__wrapped__("alone"))
+    assert len(digests) == 2
 
 
 def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -> None:

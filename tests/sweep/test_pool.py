@@ -2,15 +2,18 @@
 
 import json
 import os
+import pickle
 import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -23,6 +26,9 @@ from posefit.sweep.engine import Engine, Limits, Outcome
 from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
+from posefit.sweep.worker import Context, become_worker
+from posefit.version import posefit_build
+from tests.cases import each
 from tests.sweep import fake
 from tests.sweep.fake import behave, cells, quarantined_in, rows_in, swept
 
@@ -202,6 +208,59 @@ assert compiled() == 1
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
+def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted = tmp_path / "left"
+    monkeypatch.setenv(fake.LEFT, str(noted))
+    tally = swept(tmp_path / "r", cells(3, fake.LEAVE_BEHIND), Pool(1, LIMITS, behave))
+    assert tally.done == 3
+    found = [json.loads(line) for line in noted.read_text().splitlines()]
+    assert [states[1:-1] for states in found] == [[os.getcwd(), None, False, True]] * 3
+    # the random numbers go on as if no cell had set their seed: none takes any itself
+    assert len({states[-1] for states in found}) == 1
+    wait_until(lambda: not any(is_running(states[0]) for states in found))
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    """Wait until something is true; the limit of a test ends it otherwise."""
+    while not true():
+        time.sleep(0.02)
+
+
+def is_running(process: int) -> bool:
+    """Return whether there is a process that has not ended; who has ended may wait to be noticed."""
+    state = Path(f"/proc/{process}/stat")
+    try:
+        return state.read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def interrupts() -> list[Any]:
+    """Return whether Ctrl-C is blocked in this process, and what it does."""
+    return [
+        signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []),
+        signal.getsignal(signal.SIGINT),
+    ]
+
+
+def starts_deaf(path: list[str]) -> None:
+    """End with status 0 where this process was deaf to Ctrl-C before it became a worker, and is afterwards."""
+    before = interrupts()
+    become_worker(os.getppid(), path, pickle.dumps(None))
+    deaf = before[0] and interrupts() == [False, signal.SIG_IGN]
+    sys.exit(not deaf)
+
+
+def test_a_worker_is_deaf_to_ctrl_c_from_its_first_moment() -> None:
+    process = Context().Process(target=starts_deaf, args=(sys.path,))
+    process.start()
+    process.join(60.0)
+    assert process.exitcode == 0
+    assert not interrupts()[0]
+
+
 def test_a_script_may_compare_without_a_guard(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(
@@ -305,6 +364,33 @@ def test_a_scheduler_that_is_not_there_is_named() -> None:
         match=f"scheduler must be one with workers that answers, got {address}",
     ):
         cluster(address, LIMITS, patience=1.0)
+
+
+@each(
+    ("worker", "scheduler", "message"),
+    [
+        (ModuleNotFoundError("No module named 'posefit'"), None, "the worker tcp://b must have posefit .*, got none .*No module"),
+        ("posefit 0.0.9 a1", None, "the worker tcp://b must have posefit .*, got posefit 0.0.9 a1"),
+        (posefit_build(), ModuleNotFoundError("No module named 'posefit'"), "the scheduler tcp://s must have posefit, got none"),
+        (posefit_build(), None, None),
+    ],
+)  # fmt: skip
+def test_dask_workers_without_this_posefit_are_refused_before_a_cell_is_lost(
+    worker: Any, scheduler: Exception | None, message: str | None
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    client = Mock(status="running")
+    client.run.return_value = {"tcp://a": posefit_build(), "tcp://b": worker}
+    client.run_on_scheduler.side_effect = scheduler
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(distributed, "Client", lambda *_, **__: client)
+        if message is None:
+            cluster("tcp://s", LIMITS)
+            return
+        with pytest.raises(InputError, match=message):
+            cluster("tcp://s", LIMITS)
+    client.submit.assert_not_called()
+    client.close.assert_called_once()
 
 
 @pytest.mark.slow

@@ -122,6 +122,35 @@ class AsksForMore(Sound, breaks="budget"):
         self.population = np.tile(self.population[:1], (1000, 1))
 
 
+class FailsLate(Sound, breaks="late"):
+    """Has room for 25 populations."""
+
+    count = 0
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        self.count += 1
+        np.zeros(25)[self.count]
+
+
+class LeavesTheBoxLate(Sound, breaks="late"):
+    count = 0
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        self.count += 1
+        if self.count > 20:
+            self.population[0, 0] = 1.5
+
+
+class KeepsOffTheSides(Sound, breaks="sides"):
+    """Never proposes what is near a side of the box."""
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        self.population = np.clip(self.population, -0.6, 0.6)
+
+
 class DrawsInSecret(Sound, breaks="evaluations"):
     """Draws poses of its own in every tell, which no budget counts."""
 
@@ -368,6 +397,13 @@ class ReturnsNone(Learned, breaks="fit"):
         super().fit(angles)
 
 
+class MovesFixedAxes(Learned, breaks="fixed_axes"):
+    """Adds 0.01 radians to all angles, also to those about axes that a joint has not."""
+
+    def inverse_transform(self, latents: Array) -> Array:
+        return super().inverse_transform(latents) + 0.01
+
+
 class TakesNan(Learned, breaks="bad_input"):
     def fit(self, angles: Array, skeleton: Any = None) -> Any:
         return super().fit(np.nan_to_num(np.asarray(angles)))
@@ -463,12 +499,23 @@ class ExitsInTrack(Holds, breaks="one_frame_each"):
         sys.exit(0)
 
 
+class YieldsADict(Holds, breaks="one_frame_each"):
+    def frame(self, observation: Any) -> Any:
+        return vars(super().frame(observation))
+
+
+class MovesFixedAxesOfAPose(Holds, breaks="one_frame_each"):
+    def frame(self, observation: Any) -> Frame:
+        return replace(super().frame(observation), pose=self.pose + 0.01)
+
+
 class Remembers(Holds, breaks="used_twice"):
     count = 0
 
     def track(self, observations: Any, rng: Any) -> Any:
         self.count += 1
-        self.pose = self.pose + 0.01 * self.count
+        self.pose = self.pose.copy()
+        self.pose[0] += 0.01 * self.count
         yield from super().track(observations, rng)
 
 

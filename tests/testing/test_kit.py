@@ -1,13 +1,18 @@
 """The kit passes what is right and fails what is wrong, for the reason that was planted."""
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from posefit.arrays import Array
+from posefit.cli.template import write_plugin
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
 from posefit.testing import (
@@ -182,6 +187,56 @@ def test_settings_by_position_are_named() -> None:
             if check.name == "construction"
         )
         assert re.fullmatch(f"{wanted}{came}", check.run().detail)
+
+
+def test_a_setting_has_a_type_that_is_checked_and_a_default_of_it() -> None:
+    def unknown(space: Any, rng: Any, *, table: dict[str, int] | None = None) -> Any:
+        return planted.Sound(space, rng)
+
+    def unfit(space: Any, rng: Any, *, sizes: tuple[int, ...] = (1.5,)) -> Any:  # type: ignore[assignment]
+        return planted.Sound(space, rng)
+
+    for factory, wanted in (
+        (
+            unknown,
+            r"the type of the setting table must be int, .*, got dict\[str, int\] \| none",
+        ),
+        (unfit, r"the default of sizes must be tuple\[int, \.\.\.\], got \(1\.5,\)"),
+    ):
+        check = checks_of("optimiser", factory)[0]
+        assert check.name == "construction"
+        assert re.fullmatch(wanted, check.run().detail)
+
+
+ALONE = """
+import importlib.util, sys
+from posefit import testing
+from posefit.registry import registry
+assert not any(registry().offers.values())
+for kind in ("optimiser", "prior", "tracker"):
+    path = f"{sys.argv[1]}/{kind}/posefit_own.py"
+    spec = importlib.util.spec_from_file_location(f"posefit_own_{kind}", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    report = getattr(testing, f"check_{kind}")(module.Own)
+    assert report, str(report)
+    assert not [r for r in report.of("skipped") if "not run" in r.detail], str(report)
+others = {name.partition(".")[0] for name in sys.modules if name.startswith("posefit_")}
+assert others == {f"posefit_own_{kind}" for kind in ("optimiser", "prior", "tracker")}, others
+"""
+
+
+def test_it_needs_no_plugin(tmp_path: Path) -> None:
+    for kind in ("optimiser", "prior", "tracker"):
+        write_plugin("own", kind, tmp_path / kind)
+    ran = subprocess.run(
+        [sys.executable, "-c", ALONE, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "POSEFIT_BLOCK_PLUGINS": "posefit"},
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
 
 
 def test_a_traceback_begins_in_the_plugins_own_code_and_is_there_once_a_cause() -> None:

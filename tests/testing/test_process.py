@@ -124,12 +124,14 @@ def test_what_a_plugin_prints_is_in_no_result() -> None:
 def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
     for kind, name, what in (
         ("optimiser", "exits-in-tell", "tell"),
-        ("tracker", "exits-in-track", "it"),
+        ("tracker", "exits-in-track", "track"),
     ):
         ran = posefit(*TRACK, name)
         assert (ran.returncode, ran.stdout) == (2, "")
         (line,) = [
-            line for line in ran.stderr.splitlines() if line.startswith("posefit: ")
+            line
+            for line in ran.stderr.splitlines()
+            if line.startswith(f"posefit: {kind} ")
         ]
         blame = f"posefit: {kind} '{name}' of posefit-sabotage 1.0: {what}"
         assert line.startswith(f"{blame} must not end the program, got SystemExit: 0")

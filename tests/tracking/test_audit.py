@@ -135,7 +135,7 @@ def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:
         ),
         (
             planted.ChangesTheMask,
-            "it must not fail, got ValueError: assignment destination is read-only",
+            "track must not fail, got ValueError: assignment destination is read-only",
         ),
         (
             reporting(evaluations=1.5),

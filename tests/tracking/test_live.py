@@ -360,3 +360,20 @@ def test_a_pipe_that_pauses_ends_the_process_with_one_line_and_keeps_its_frames(
     assert "Traceback" not in errors
     rows = (out / "frames.jsonl").read_text().splitlines()
     assert len(arrays(out / "poses.npz")["poses"]) == len(rows) > 0
+
+
+@each(
+    ("content", "message"),
+    [
+        (b"", "expected frames, got none"),
+        (b"GIF89a", "expected binary PGM or PPM images"),
+        (pgm(np.zeros((120, 160), dtype=bool)) * 40, "expected a person in the first"),
+    ],
+)
+def test_a_start_that_fails_leaves_no_folder(content, message, monkeypatch, tmp_path):
+    out = tmp_path / "out"
+    for _ in range(2):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+        with pytest.raises(InputError, match=message):
+            write_live(track_live(**QUICK), out)
+        assert list(tmp_path.iterdir()) == []

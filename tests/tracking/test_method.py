@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -21,6 +22,8 @@ from posefit.testing.toy import Toy, sphere
 from posefit.tracking import defaults, method
 from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
+from posefit_envs import instance
+from posefit_swarm.sapso import SAPSO
 from tests.cases import each
 from tests.testing import planted
 from tests.tracking.scenes import masks_of
@@ -86,7 +89,7 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
     installed: Any,
 ) -> None:
     installed("optimiser", planted.WrongSignature)
-    rule = "it must not fail, got TypeError: .*"
+    rule = "construction must not fail, got TypeError: .*"
     with pytest.raises(
         BrokenRuleError, match=f"^optimiser 'bad' of posefit-bad 1.0: {rule}$"
     ):
@@ -112,7 +115,15 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
         ({"feasible": lambda z: True}, r"feasible must return shape \(3,\), got \(\)"),
         (
             {"transform": lambda angles: 1 / 0},
-            "it must not fail, got ZeroDivisionError",
+            "transform must not fail, got ZeroDivisionError",
+        ),
+        (
+            {"transform": lambda angles: angles @ np.zeros((60, 6))},
+            r"transform must not fail, got ValueError: matmul: .* \(test_method.py:[0-9]+\)",
+        ),
+        (
+            {"inverse_transform": lambda z: np.full((len(z), 63), 0.01)},
+            "inverse_transform must turn joints about their free axes only, got 0.01 rad about the [xyz] axis of [a-z]+",
         ),
         (
             {"low": np.full(6, 9.0)},
@@ -138,6 +149,29 @@ def test_a_broken_prior_is_named(
         BrokenRuleError, match=f"prior 'bad' of posefit-bad 1.0: {rule}"
     ):
         posefit.track("walk", method="@bad", **QUICK)
+
+
+def test_a_prior_that_moves_fixed_axes_is_refused_wherever_it_is_used(
+    installed: Any, monkeypatch: Any, tmp_path: Path
+) -> None:
+    rule = (
+        r"inverse_transform must turn joints about their free axes only, got 0.01 rad"
+    )
+    installed("prior", planted.MovesFixedAxes)
+    monkeypatch.setattr(instance, "registry", method.registry)
+    motion = built_in.motion("walk", frames=1)
+    scene = synthetic(motion, [45.0], (120, 90), [], (None, None))
+    out = tmp_path / "out"
+    learned = planted.MovesFixedAxes().fit(built_in.motion("walk-a").poses[:, 3:])
+    for refused in (
+        lambda: posefit.track("walk", method="@bad", out=out, **QUICK),
+        lambda: posefit.track("walk", method=(SAPSO, learned), **QUICK),
+        lambda: posefit.fit(masks_of(scene)[0], method="@bad", height=1.75),
+        lambda: gymnasium.make("posefit/FitImage-v0", prior="bad").reset(seed=0),
+    ):
+        with pytest.raises((BrokenRuleError, gymnasium.error.Error), match=rule):
+            refused()
+    assert not list(tmp_path.iterdir())
 
 
 @each("method", ["inverse_transform", "feasible"])

@@ -157,6 +157,41 @@ def test_the_worst_sign_is_named_and_the_others_are_counted(
     assert sentence(figures, signs_against(figures)) == f"Trust: {words}."
 
 
+# docs/howto/trust.md: from where on a sign makes a track doubtful, and from where on it is not to be used
+LIMITS: dict[str, tuple[tuple[float, float | None], ...]] = {
+    "size_ratio": ((1.08, 1.30), (0.92, 0.70)),
+    "depth_scatter": ((0.04, 0.20),),
+    "foot_share": ((0.20, None),),
+    "stance_spread_m": ((0.15, 0.60),),
+    "explained": ((0.70, 0.40),),
+    "lost": ((0.15, 0.50),),
+    "unknown": ((0.20, None),),
+    "training_mm": ((60.0, 200.0),),
+    "cropped": ((0.25, 0.60),),
+    "frontal": ((0.50, None),),
+    "held": ((0.25, 0.60),),
+    "iou": ((0.65, 0.45),),
+    "acceleration": ((14.0, 60.0),),
+}
+
+
+def test_a_sign_speaks_against_a_track_from_the_pages_limits_on() -> None:
+    assert LIMITS.keys() == {name for name, sign in SIGNS.items() if sign.limits}
+    for name, limits in LIMITS.items():
+        best = FINE[name]
+        for doubtful, useless in limits:
+            for limit, before, after in (
+                (doubtful, "good", "doubtful"),
+                (useless, "doubtful", "do not use"),
+            ):
+                if limit is None:
+                    continue
+                for share, word in ((0.98, before), (1.02, after)):
+                    figures = FINE | {name: best + share * (limit - best)}
+                    words = sentence(figures, signs_against(figures))
+                    assert words.startswith(f"Trust: {word}"), (name, limit, share)
+
+
 def test_a_track_without_a_sign_against_it_is_good() -> None:
     assert signs_against(FINE) == []
     assert sentence(FINE, []).startswith(

@@ -1,6 +1,6 @@
-"""Instances, numbered as in other benchmarks: a number and an environment's arguments are a person and its images.
+"""The arguments of environments, and what an instance is to them: a person, their motion and its silhouettes.
 
-The motion, its speed and phase, and the camera's azimuth are those of a sweep's instance of that number.
+See `posefit.motion.instances` for the numbers.
 """
 
 import sys
@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from gymnasium import error, logger
 from numpy.typing import NDArray
-from posefit.motion.instance import motion_of_instance, variation
 
 from posefit import (
     Body,
@@ -29,18 +28,26 @@ from posefit.arrays import Array
 from posefit.fitting.check import between, finite_number, one_of, pair
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
+from posefit.fitting.validation import check_prior
 from posefit.geometry.body import varied
 from posefit.motion import built_in
 from posefit.motion.clips import load_motion
+from posefit.motion.instances import (
+    HELD_OUT,
+    TRAINING,
+    generator,
+    instance_number,
+    motion_of_instance,
+    variation,
+)
 from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
+from posefit.silhouette.drawn import uncounted
 
-# instance numbers; those of the test split are held out
-SPLITS = {"train": (0, 10_000), "test": (10_000, 20_000)}
+SPLITS = {"train": TRAINING, "test": HELD_OUT}
 YAWS = ("guessed", "unknown")
-RNG_STREAM = 2012  # part of the seed of noise, yaw, place and build of an instance
 FPS = 30.0
 # largest difference between the middle of the searched yaw and the truth
 YAW_DEGREES = 20.0
@@ -118,15 +125,14 @@ class World:
         if not self.held_out_people:
             return motion
         *others, last = built_in.other_styles(motion)
-        return last if is_held_out(number) else others[turn % len(others)]
+        return last if number in HELD_OUT else others[turn % len(others)]
 
-    def next_instance(self, generator: np.random.Generator) -> int:
+    def next_instance(self, rng: np.random.Generator) -> int:
         """Return the number of the next instance: the fixed one, or a random one of the split."""
-        return (
-            int(generator.integers(*SPLITS[self.split]))
-            if self.instance is None
-            else self.instance
-        )
+        if self.instance is not None:
+            return self.instance
+        split = SPLITS[self.split]
+        return int(rng.integers(split.start, split.stop))
 
 
 def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
@@ -138,8 +144,10 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     for name in arguments:
         if name not in known:
             every = *known, *own
+            # libraries that pass on arguments read these words
             raise TypeError(
-                f"an argument must be one of {', '.join(every)}, got {quoted(name)}{suggestion(name, every)}"
+                "an unexpected keyword argument: it must be one of "
+                f"{', '.join(every)}, got {quoted(name)}{suggestion(name, every)}"
             )
     world = World(**arguments)
     checked(one_of, "split", world.split, SPLITS)
@@ -166,7 +174,9 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
         world,
         motion=_motions(world.motion, held_out_people),
         held_out_people=held_out_people,
-        instance=None if world.instance is None else instance_number(world.instance),
+        instance=None
+        if world.instance is None
+        else checked(instance_number, world.instance),
         view_degrees=_views(world.view_degrees),
         train=tuple(world.train or ()),
         size=(int(sides[0]), int(sides[1])),
@@ -250,25 +260,6 @@ def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(strengths.items()))
 
 
-def instance_number(number: Any) -> int:
-    """Return the number of an instance as an int. Raises ArgumentError where there is no such instance."""
-    last = SPLITS["test"][1] - 1
-    if isinstance(number, bool) or not isinstance(number, int | np.integer):
-        raise ArgumentError(
-            f"instance must be a whole number from 0 to {last}, got {quoted(number)}"
-        )
-    if not 0 <= number <= last:
-        raise ArgumentError(
-            f"instance must lie in 0 to {last}, got {quoted(int(number))}"
-        )
-    return int(number)
-
-
-def is_held_out(number: int) -> bool:
-    """Return whether an instance is of the test split."""
-    return number >= SPLITS["test"][0]
-
-
 @lru_cache(maxsize=32)
 def _source(motion: str) -> Motion:
     source = load_motion(motion, FPS)
@@ -289,7 +280,9 @@ def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
     angles = np.concatenate(
         [load_motion(name, FPS).about_axes_of(skeleton).poses[:, 3:] for name in train]
     )
-    fitted: Prior = registry().prior(prior)().fit(angles, skeleton)
+    offer = registry().offer("prior", prior)
+    fitted: Prior = offer.factory().fit(angles, skeleton)
+    check_prior(fitted, angles, skeleton, offer.label)
     return fitted
 
 
@@ -302,13 +295,19 @@ class Instance:
     truth: Motion
     observations: Sequence[Observation] = field(repr=False)
 
-    def episode(self, frame: int, space: SearchSpace) -> "Episode":
-        """Return the search for the pose of a frame in a space."""
+    def cost(self, frame: int, space: SearchSpace) -> SilhouetteCost:
+        """Return the cost of proposals for a frame in a space."""
+        task = self.task
         silhouettes = self.observations[frame].silhouettes
-        cost = SilhouetteCost(
-            self.task.body, self.task.cameras, silhouettes, space, blank=True
-        )
-        return Episode(self, frame, Problem(cost, space))
+        return SilhouetteCost(task.body, task.cameras, silhouettes, space, blank=True)
+
+    def true_proposal(self, frame: int, space: SearchSpace) -> Array:
+        """Return the proposal (d,) nearest to the true pose: projected onto the prior, clipped to the box."""
+        pose = self.truth.poses[frame]
+        place = self.truth.translations[frame]
+        searched = place if space.translation == "searched" else place[:0]
+        latents = space.prior.transform(pose[None, 3:])[0]
+        return space.proposals(np.concatenate([pose[:3], searched, latents]))
 
     @cached_property
     def joints(self) -> Array:
@@ -317,38 +316,56 @@ class Instance:
 
 
 @dataclass(frozen=True, eq=False)
-class Episode:
-    """What one environment searches now: the pose in a frame of an instance."""
+class FirstFrame:
+    """The cost of proposals for an instance's first frame, which is made when it is first needed."""
 
-    instance: Instance
-    frame: int
-    problem: Problem
+    world: World
+    number: int
 
-    @property
+    def __call__(self, proposals: Array) -> Array:
+        """Return the costs (n,) of proposals (n, d)."""
+        return self.cost(proposals)
+
+    @cached_property
+    def instance(self) -> Instance:
+        """The instance: its task, its truth and its observations."""
+        return instance(self.world, self.number)
+
+    @cached_property
+    def cost(self) -> SilhouetteCost:
+        """The cost function itself."""
+        return self.instance.cost(0, first_space(self.world, self.instance))
+
+    @cached_property
     def truth(self) -> Array:
-        """The proposal (d,) of the truth, the nearest in the box: what its prior cannot say is lost."""
-        pose = self.instance.truth.poses[self.frame]
-        place = self.instance.truth.translations[self.frame]
-        space = self.problem.space
-        searched = place if space.translation == "searched" else place[:0]
-        latents = space.prior.transform(pose[None, 3:])[0]
-        return space.proposals(np.concatenate([pose[:3], searched, latents]))
+        """The proposal (d,) nearest to the true pose."""
+        return self.instance.true_proposal(0, self.cost.space)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self.cost, name)
 
 
-def first_episode(world: World, number: int, evaluations: int) -> Episode:
-    """Return the search for the first frame's pose of an instance."""
-    made = instance(world, number, 1, evaluations)
+def first_problem(world: World, number: int) -> Problem:
+    """Return the problem of an instance's first frame."""
+    frame = FirstFrame(world, number)
+    return Problem(frame, frame.cost.space)
+
+
+def first_space(world: World, made: Instance) -> SearchSpace:
+    """Return the box around the first frame's pose of an instance."""
     task = made.task
     centre = np.array([task.yaw, 0.0, 0.0])
-    reach = np.radians(
-        ROOT_RANGE_DEGREES if world.yaw == "guessed" else ANY_YAW_DEGREES
-    )
-    space = SearchSpace(world.learned, centre, reach, task.anchor, task.translation)
-    return made.episode(0, space)
+    guessed = world.yaw == "guessed"
+    reach = np.radians(ROOT_RANGE_DEGREES if guessed else ANY_YAW_DEGREES)
+    return SearchSpace(world.learned, centre, reach, task.anchor, task.translation)
 
 
 @lru_cache(maxsize=64)
-def instance(world: World, number: int, frames: int, evaluations: int) -> Instance:
+def instance(
+    world: World, number: int, frames: int = 1, evaluations: int = 1
+) -> Instance:
     """Return an instance: the same person, pose and silhouettes for the same number and arguments, everywhere."""
     motion = world.motion_of(number)
     source = motion if motion in built_in.names() else _source(motion)
@@ -357,7 +374,7 @@ def instance(world: World, number: int, frames: int, evaluations: int) -> Instan
     except ValueError as mistake:  # a file that is too short
         raise error.Error(str(mistake)) from None
     # of noise, yaw and build alone: motion and views are a sweep's
-    rng = np.random.default_rng([RNG_STREAM, number])
+    rng = generator("scene", number)
     body = body_of(motion)
     facing = float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
@@ -374,10 +391,9 @@ def instance(world: World, number: int, frames: int, evaluations: int) -> Instan
     noise = dict(world.noise)
     observations = []
     for pose, place in zip(truth.poses, truth.translations, strict=True):
-        masks = [
-            corrupted(project(body, camera, pose, place), noise, rng)
-            for camera in cameras
-        ]
+        with uncounted():  # to render the truth is no evaluation
+            shown = [project(body, camera, pose, place) for camera in cameras]
+        masks = [corrupted(mask, noise, rng) for mask in shown]
         observations.append(
             Observation([Silhouette.of(mask) for mask in masks], place.copy())
         )

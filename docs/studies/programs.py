@@ -1,0 +1,157 @@
+"""Opens the files of a track with the programs that they are for: OpenSim, Blender and others, at the versions below.
+
+    python docs/studies/programs.py --folder programs
+
+It needs a network, ten minutes, and a Python that OpenSim and Blender have packages for (3.11). A cell is a file, read
+by a program, of a track; programs_read.py has what is compared. It ends with status 1 where a cell is wrong.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+import posefit
+from posefit.motion import built_in
+from posefit.progress import QUIET
+from posefit.silhouette.cost import project
+from programs_read import EXPECTED, NOT_OFFERED, PROGRAMS
+
+READER = Path(__file__).with_name("programs_read.py")
+VERSIONS = {
+    "opensim": ("opensim==4.6", "numpy==2.4.6"),
+    "trc-data-reader": ("trc-data-reader==0.4.1", "numpy==2.4.6"),
+    "ezc3d": ("ezc3d==1.7.2",),
+    "c3d": ("c3d==0.6.0",),
+    "kineticstoolkit": ("kineticstoolkit==0.17.0", "ezc3d==1.7.2"),
+    "pyomeca": ("pyomeca==2026.0.2", "ezc3d==1.7.2"),
+    "bvhio": ("bvhio==1.5.4",),
+    "upc-pymotion": ("upc-pymotion==0.3.4",),
+    "pybvh": ("pybvh==0.9.0",),
+    "bpy": ("bpy==5.0.1",),
+    "trimesh": ("trimesh==5.2.0",),
+    "pygltflib": ("pygltflib==1.16.5", "numpy==2.4.6"),
+    "av": ("av==18.1.0", "numpy==2.4.6"),
+    "pandas": ("pandas==3.1.1",),
+}
+FRAMES = 24
+# of a track: frames that show nobody, and what differs from the plainest one
+TRACKS: Mapping[str, tuple[tuple[int, ...], Mapping[str, Any]]] = {
+    "plain": ((), {}),
+    "held frames": ((0, 5, 6, 23), {}),
+    "119.88 a second": ((), {"fps": 119.88}),
+    "--frames 10:20": ((), {"frames": (10, 20)}),
+    "odd size": ((), {"size": (101, 77)}),
+    "all of these": (
+        (10, 15, 19),
+        {"fps": 119.88, "frames": (10, 20), "size": (101, 77)},
+    ),
+    "--frames 4:5": ((), {"frames": (4, 5)}),
+}
+
+
+def write_track(
+    folder: Path,
+    empty: tuple[int, ...],
+    *,
+    size: tuple[int, int] = (160, 120),
+    fps: float = 30.0,
+    frames: tuple[int, int] = (0, FRAMES),
+) -> None:
+    """Track a walk in masks, some of them empty, and write its files and what they should hold."""
+    walk = built_in.motion("walk", frames=FRAMES)
+    body = posefit.Body.of(walk.skeleton)
+    camera = posefit.Camera.around(walk.translations[0], 0.8, 4.5, size)
+    poses = zip(walk.poses, walk.translations, strict=True)
+    masks = np.array([project(body, camera, *pose) for pose in poses])
+    masks[list(empty)] = False
+    track = posefit.track(
+        masks,
+        camera=camera,
+        fps=fps,
+        frames=frames,
+        out=folder,
+        progress=QUIET,
+        method="random@pca",
+        evaluations=80,
+        body_frames=0,
+    )
+    np.savez(
+        folder / EXPECTED,
+        joints=track.joints,
+        times=track.table["seconds"],
+        held=np.isin(track.table["frame"], [*track.unseen]),
+        places=np.array(track.joint_names),
+        fps=fps,
+        first=track.motion.first,
+    )
+
+
+def installed(program: str, folder: Path, python: str) -> Path:
+    """Return the Python of a program's environment, which is made where it is missing."""
+    place = folder / "environments" / program
+    own = place.resolve() / "bin" / "python"
+    if not (place / "done").exists():
+        subprocess.run([python, "-m", "venv", "--clear", place], check=True)
+        pip = [str(own), "-m", "pip", "install", "--quiet", *VERSIONS[program]]
+        subprocess.run(pip, check=True)
+        (place / "done").touch()
+    return own
+
+
+def read(program: str, python: Path, folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield each file that a program reads, and what is wrong with it, nothing, or a dash."""
+    words = [str(python), str(READER), program, str(folder.resolve())]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    missing = dict.fromkeys(PROGRAMS[program], f"ended with {done.returncode}")
+    for line in done.stdout.splitlines():
+        if line.startswith('["result"'):
+            _, name, wrong = json.loads(line)
+            missing.pop(name)
+            yield name, wrong
+    yield from missing.items()
+
+
+@click.command()
+@click.option("--folder", type=Path, required=True, help="For tracks and environments.")
+@click.option("--python", default=sys.executable, help="For the environments.")
+@click.option("--program", "only", multiple=True, type=click.Choice([*PROGRAMS]))
+def main(folder: Path, python: str, only: tuple[str, ...]) -> None:
+    """Print a table of programs, files and tracks, and what is wrong in it."""
+    for name, (empty, options) in TRACKS.items():
+        if not (folder / name / EXPECTED).exists():
+            write_track(folder / name, empty, **options)
+    cells = 0
+    wrong = []
+    names = [*TRACKS]
+    click.echo(f"| {' | '.join(['program', 'file', *names])} |")
+    click.echo("|---|---|" + len(names) * "---|")
+    for program in only or PROGRAMS:
+        own = installed(program, folder, python)
+        results = {track: dict(read(program, own, folder / track)) for track in TRACKS}
+        for file in PROGRAMS[program]:
+            marks = []
+            for track in TRACKS:
+                words = results[track][file]
+                if words == NOT_OFFERED:
+                    marks.append(words)
+                    continue
+                cells += 1
+                if words:
+                    wrong.append(f"{program}, {file}, {track}: {words}")
+                marks.append("wrong" if words else "right")
+            row = " | ".join([VERSIONS[program][0], file, *marks])
+            click.echo(f"| {row} |")
+    click.echo(f"\n{cells} cells, {len(wrong)} wrong\n")
+    for words in wrong:
+        click.echo(words)
+    sys.exit(bool(wrong))
+
+
+if __name__ == "__main__":
+    main()

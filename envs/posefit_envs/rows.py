@@ -1,0 +1,135 @@
+"""An environment or a vector of them, in any autoreset mode, as rows: each row resets and ends for itself.
+
+`drive`, `rollout` and the adapter to Stable-Baselines3 are written on this. A vector may be of this package, or
+Gymnasium's SyncVectorEnv or AsyncVectorEnv of any environments.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import Env
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.wrappers.vector import DictInfoToList
+
+from posefit_envs.base import Flags, Infos
+
+AnyEnv = VectorEnv[Any, Any, Any] | Env[Any, Any]
+Options = Sequence[Mapping[str, Any]]
+
+
+def rows_of(env: AnyEnv) -> "SingleRow | VectorRows":
+    """Return the rows of a vector, or the only row of a single environment."""
+    return VectorRows(env) if isinstance(env, VectorEnv) else SingleRow(env)
+
+
+class SingleRow:
+    """A single environment, as a vector of one row; `VectorRows` says what its methods do."""
+
+    count = 1
+
+    def __init__(self, env: Env[Any, Any]) -> None:
+        self._env = env
+
+    def reset(
+        self,
+        seeds: Sequence[int | None] | None,
+        options: Options,
+        mask: Flags | None = None,
+    ) -> tuple[Any, list[Infos]]:
+        """Reset the environment."""
+        seed = None if seeds is None else seeds[0]
+        observation, info = self._env.reset(seed=seed, options=dict(options[0]))
+        return np.asarray(observation)[None], [info]
+
+    def step(self, actions: Any) -> tuple[Any, Any, Flags, list[Infos]]:
+        """Step the environment."""
+        observation, reward, terminated, truncated, info = self._env.step(actions[0])
+        ended = np.array([terminated or truncated])
+        return np.asarray(observation)[None], np.array([reward]), ended, [info]
+
+    def attribute(self, name: str) -> list[Any]:
+        """Return an attribute of the environment."""
+        if name == "action_space":
+            return [self._env.action_space]
+        return [getattr(self._env.unwrapped, name)]
+
+
+class VectorRows:
+    """A vector environment, row by row; infos are a list, an element a row."""
+
+    def __init__(self, vector: VectorEnv[Any, Any, Any]) -> None:
+        self.count = vector.num_envs
+        self.mode = AutoresetMode(vector.metadata["autoreset_mode"])
+        self._vector: Any = DictInfoToList(vector)
+        self._begun = False
+        # the observations and infos of the last step, where rows that begin again by themselves have done so
+        self.begun: tuple[Any, list[Infos]] = None, []
+        # which rows of the last step were cut short
+        self.truncated = np.zeros(self.count, dtype=bool)
+
+    def reset(
+        self,
+        seeds: Sequence[int | None] | None,
+        options: Options,
+        mask: Flags | None = None,
+    ) -> tuple[Any, list[Infos]]:
+        """Reset some rows, all by default, each with its own options and seed; return observations and infos.
+
+        Rows that are not reset keep their observations; their infos mean nothing.
+        """
+        seeds = [None] * self.count if seeds is None else list(seeds)
+        waiting = np.ones(self.count, dtype=bool) if mask is None else mask.copy()
+        infos: list[Infos] = [{} for _ in range(self.count)]
+        observations = None
+        while waiting.any():
+            first = options[int(np.flatnonzero(waiting)[0])]
+            alike = waiting & np.array([one == first for one in options])
+            chosen = dict(first)
+            # the first reset of a vector is of all; those with other options are then reset again
+            if self._begun:
+                chosen["reset_mask"] = alike.copy()
+            observations, rows = self._vector.reset(seed=seeds, options=chosen or None)
+            self._begun = True
+            for i in np.flatnonzero(alike).tolist():
+                infos[i] = _plain(rows[i])
+            waiting &= ~alike
+        return observations, infos
+
+    def step(self, actions: Any) -> tuple[Any, Any, Flags, list[Infos]]:
+        """Step all rows; return observations, rewards, which episodes have ended, and infos.
+
+        Observations and infos of a row whose episode has ended are the episode's last. Reset it before the next step,
+        whatever the autoreset mode; by SAME_STEP it has also begun again by itself, see `begun`.
+        """
+        observations, rewards, terminated, truncated, rows = self._vector.step(actions)
+        ended = terminated | truncated
+        infos = [_plain(row) for row in rows]
+        self.truncated = truncated & ~terminated
+        self.begun = observations, infos
+        if self.mode is AutoresetMode.SAME_STEP and ended.any():
+            observations = observations.copy()
+            infos = list(infos)
+            for i in np.flatnonzero(ended).tolist():
+                observations[i] = infos[i]["final_obs"]
+                infos[i] = infos[i]["final_info"]
+        return observations, rewards, ended, infos
+
+    def attribute(self, name: str) -> list[Any]:
+        """Return an attribute of each environment. Raises AttributeError where they have none of that name."""
+        if name in ("action_space", "observation_space"):
+            return [getattr(self._vector, f"single_{name}")] * self.count
+        return list(self._vector.unwrapped.get_attr(name))
+
+
+def _plain(info: Infos) -> Infos:
+    """Return infos as a single environment has them: numbers of Python instead of NumPy's."""
+    plain: Infos = {}
+    for name, value in info.items():
+        if isinstance(value, dict):
+            plain[name] = _plain(value)
+        elif isinstance(value, np.generic):
+            plain[name] = value.item()
+        else:
+            plain[name] = value
+    return plain

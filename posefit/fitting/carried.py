@@ -1,0 +1,131 @@
+"""What a filter carries from frame to frame, as plain values: a track that was interrupted goes on with it.
+
+Numbers, texts, arrays, and lists and mappings of them are kept; the filter's space and its generator are known to the
+tracker. A filter with anything else among its attributes starts anew when a track is resumed.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.fitting.box import Space, Start
+from posefit.fitting.optimiser import Optimiser
+from posefit.fitting.space import SearchSpace
+
+CARRIED = "carried"  # the name among the details of a frame
+# of a space, those that the tracker has again before its first frame
+FIXED = ("prior", "tilt", "translation", "root_order")
+KIND = "kind of value"
+GENERATORS = ("PCG64", "PCG64DXSM", "MT19937", "Philox", "SFC64")
+PLAIN = (bool, int, float, str, type(None), np.generic)
+
+
+class UnknownError(Exception):
+    """A filter holds something that is no plain value."""
+
+
+def carried(
+    optimiser: Any, space: SearchSpace, rng: np.random.Generator
+) -> dict[str, Any]:
+    """Return what a filter holds after a frame, searched in `space`; nothing if it is no plain values."""
+    try:
+        return {
+            "optimiser": _kept(vars(optimiser), space, rng),
+            "space": _fields(space),
+        }
+    except (UnknownError, TypeError):  # one without attributes has no `vars`
+        return {}
+
+
+def revived(
+    state: Mapping[str, Any],
+    space: SearchSpace,
+    rng: np.random.Generator,
+    make: Callable[[Space, np.random.Generator], Optimiser],
+) -> Optimiser:
+    """Return the filter that held a state, made by `make`; the generator stays as it is.
+
+    Its space has what the state does not hold from `space`, that of another frame of the same track.
+    """
+    known = {name: _made(value) for name, value in state["space"].items()}
+    space = replace(space, **known)
+    before = rng.bit_generator.state
+    optimiser = make(space, rng)
+    rng.bit_generator.state = before
+    vars(plugin_of(optimiser)).update(_made(state["optimiser"], space, rng))
+    return optimiser
+
+
+def plugin_of(optimiser: Optimiser) -> Any:
+    """Return what a plugin has made, of an optimiser that posefit may have wrapped."""
+    return getattr(optimiser, "plugin", optimiser)
+
+
+def with_carried(frame: Any, state: Mapping[str, Any] | None) -> Any:
+    """Return a frame with what a filter carries from it, or without that."""
+    details = {name: value for name, value in frame.details.items() if name != CARRIED}
+    if state is not None:
+        details[CARRIED] = state
+    return replace(frame, details=details)
+
+
+def _fields(space: SearchSpace) -> dict[str, Any]:
+    return {
+        field.name: _kept(getattr(space, field.name), space, None)
+        for field in fields(space)
+        if field.init and field.name not in FIXED
+    }
+
+
+def _kept(value: Any, space: Any, rng: Any) -> Any:
+    """Return a value, of plain ones. Raises UnknownError where there is another one in it."""
+    if value is space:
+        return {KIND: "space"}
+    if value is rng:
+        return {KIND: "rng"}
+    if type(value) is np.ndarray and not value.dtype.hasobject:
+        return value.copy()
+    if isinstance(value, PLAIN):
+        return value
+    if isinstance(value, np.random.Generator):
+        kind = type(value.bit_generator).__name__
+        if kind not in GENERATORS:
+            raise UnknownError
+        return {KIND: "generator", "name": kind, "state": value.bit_generator.state}
+    if isinstance(value, Start):
+        return {KIND: "start", "values": _kept(vars(value), space, rng)}
+    if type(value) in (list, tuple):
+        members = [_kept(member, space, rng) for member in value]
+        return {KIND: type(value).__name__, "values": members}
+    if type(value) is dict and all(type(key) is str for key in value):
+        kept = {key: _kept(member, space, rng) for key, member in value.items()}
+        return {KIND: "dict", "values": kept}
+    raise UnknownError
+
+
+def _made(kept: Any, space: Any = None, rng: Any = None) -> Any:
+    """Return the value of which `_kept` returned this."""
+    if not isinstance(kept, Mapping):
+        return kept.copy() if isinstance(kept, np.ndarray) else kept
+    kind = kept[KIND]
+    if kind in ("space", "rng"):
+        return space if kind == "space" else rng
+    if kind == "generator":
+        if kept["name"] not in GENERATORS:
+            raise InputError(f"a generator must be one of NumPy's, got {kept['name']}")
+        bits = getattr(np.random, kept["name"])()
+        bits.state = kept["state"]
+        return np.random.Generator(bits)
+    values = kept["values"]
+    if kind in ("list", "tuple"):
+        members = [_made(value, space, rng) for value in values]
+        return members if kind == "list" else tuple(members)
+    if kind not in ("dict", "start"):
+        raise InputError(f"a kept value must be of a known kind, got {kind}")
+    if kind == "start":
+        values = values["values"]
+    made = {name: _made(value, space, rng) for name, value in values.items()}
+    return Start(**made) if kind == "start" else made

@@ -1,0 +1,68 @@
+"""A race of modes: where a search may start in several places, each is searched a little, and the best ones longer.
+
+The first costs say which starts are worth a search at all, and the costs after a short search which of them are worth
+the rest of the budget. Each search is a problem; together they have the budget of one.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from posefit.fitting.box import Start
+from posefit.fitting.problem import Problem
+
+# ours, as all that follow: of the weight of the likeliest start; less likely ones are
+# not searched
+MIN_WEIGHT = 0.05
+SHORT_SHARE = 0.5  # of the budget: for a short search from each start
+MIN_SHORT = 40  # evaluations of a short search
+FINALISTS = 2  # that are searched longer
+# of the spread of a start: what a finalist starts with, around its best proposal
+FINAL_SPREAD = 0.5
+
+# Searches from a start within a number of evaluations.
+Search = Callable[[Start, int], Problem]
+
+
+def race(starts: Sequence[Start], search: Search, budget: int) -> list[list[Problem]]:
+    """Return the searches from each start that took part, in a budget of evaluations; the cheapest start first.
+
+    Args:
+        starts: where to search, the likeliest first.
+        search: returns the problem of a start, searched within a number of evaluations.
+        budget: the evaluations of all searches together.
+
+    Returns:
+        The problems of each start: its short search, and the long one if it was a finalist.
+
+    """
+    short_budget = int(SHORT_SHARE * budget)
+    likely = [each for each in starts if each.weight >= MIN_WEIGHT * starts[0].weight]
+    likely = likely[: max(short_budget // MIN_SHORT, 1)]
+    if len(likely) == 1:
+        return [[search(likely[0], budget)]]
+    short = short_budget // len(likely)
+    raced = [(start, [search(start, short)]) for start in likely]
+    raced.sort(key=lambda each: each[1][0].best_cost)
+    remaining = budget - sum(problems[0].evaluations for _, problems in raced)
+    for number in range(FINALISTS):
+        start, problems = raced[number]
+        share = remaining // (FINALISTS - number)
+        again = replace(
+            start, mean=problems[0].best, spread=FINAL_SPREAD * start.spread
+        )
+        problems.append(search(again, share))
+        remaining -= problems[1].evaluations
+    raced.sort(key=lambda each: least_cost(each[1]))
+    return [problems for _, problems in raced]
+
+
+def least_cost(problems: Sequence[Problem]) -> float:
+    """Return the lowest cost of some problems."""
+    return float(np.min([problem.best_cost for problem in problems]))
+
+
+def cheapest(problems: Sequence[Problem]) -> Problem:
+    """Return the problem with the lowest cost."""
+    return min(problems, key=lambda problem: problem.best_cost)

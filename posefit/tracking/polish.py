@@ -1,0 +1,114 @@
+"""One frame by itself: the poses that its search left open, moved until their contours are those of the masks.
+
+A search moves a pose only as its prior can. Here every joint may give way, as it does in the smoothing of a track; what
+the polished poses cost says which of them is reported, and how likely the others are.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.contours import (
+    POINT_SPACING,
+    MaskContours,
+    contour_race,
+    precisions,
+    race_count,
+)
+from posefit.fitting.start import posterior_of
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.symmetry import exchanged_limbs, facing, reflected_poses
+from posefit.silhouette.cost import known_views, pose_costs
+
+SHARE = 0.5  # of a frame's evaluations: those of polishing
+# standard deviations that a searched pose is off: radians, and metres
+TURN = np.radians(8.0)
+SHIFT = 0.05
+
+
+def polish_evaluations(evaluations: int) -> int:
+    """Return how many of a frame's evaluations are for polishing; none where they do not suffice for one pose."""
+    share = int(SHARE * evaluations)
+    return share if race_count(share) else 0
+
+
+def polished(
+    task: Task, frame: Frame, observation: Observation, evaluations: int, beta: float
+) -> Frame:
+    """Return a frame whose poses, and their reflections, are fitted to the contours; the cheapest is its pose.
+
+    Args:
+        task: what the search of the frame knew.
+        frame: its result, with a posterior where it left several poses open.
+        observation: the masks.
+        evaluations: the effort, see `polish_evaluations`.
+        beta: that of the cost.
+
+    Returns:
+        The frame, with the evaluations of both.
+
+    """
+    scene = task.body, task.cameras, observation.silhouettes
+
+    def cost(poses: Array, places: Array) -> Array:
+        return pose_costs(*scene, poses, places, beta)[0]
+
+    poses, places = _open_poses(task, frame, observation)
+    poses = poses[: race_count(evaluations)]
+    places = places[: len(poses)]
+    views = [
+        MaskContours.of(
+            camera, view, [observation], frame.translation[None], POINT_SPACING
+        )
+        for view, camera in enumerate(task.cameras)
+    ]
+    start = poses, places
+    poses, places, used = contour_race(
+        task.body, views, start, precisions(TURN, SHIFT), cost
+    )
+    costs, areas = pose_costs(*scene, poses, places, beta)
+    best = int(costs.argmin())
+    least = float(costs[best])
+    total = frame.evaluations + used + len(poses)
+    return replace(
+        frame,
+        pose=poses[best],
+        translation=places[best],
+        cost=least,
+        areas=areas[:, best],
+        evaluations=total,
+        trace=np.vstack([frame.trace, [total, least]]),
+        posterior=posterior_of(poses, places, costs) if len(poses) > 1 else None,
+    )
+
+
+def _open_poses(
+    task: Task, frame: Frame, observation: Observation
+) -> tuple[Array, Array]:
+    """Return the poses (n, 66) and places (n, 3) that a search left open, and others with about such a silhouette.
+
+    One camera hardly shows whether a person leans towards it or away, and which leg is in front. Each pose is followed
+    by its reflections; poses whose legs or arms are exchanged come after all of these.
+    """
+    skeleton = task.body.skeleton
+    poses = frame.pose[None]
+    places = frame.translation[None]
+    if frame.posterior is not None:
+        poses = frame.posterior.poses
+        places = frame.posterior.translations
+    reflected = [
+        reflected_poses(skeleton, poses, facing(camera, frame.translation))
+        for camera in known_views(task.cameras, observation.silhouettes)
+    ]
+    exchanged = [
+        exchanged_limbs(skeleton, poses, "legs"),
+        exchanged_limbs(skeleton, poses, "arms"),
+    ]
+    groups = [
+        np.stack([poses, *reflected], axis=1),  # (modes, 1 + views, 66)
+        np.stack(exchanged, axis=1),
+    ]
+    every = [group.reshape(-1, group.shape[2]) for group in groups]
+    repeated = [np.repeat(places, group.shape[1], axis=0) for group in groups]
+    return np.concatenate(every), np.concatenate(repeated)
