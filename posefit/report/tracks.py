@@ -323,8 +323,9 @@ def _skills(
 ) -> dict[str, float | None]:
     skills: dict[str, float | None] = {}
     for name, baseline in baselines.items():
-        known = error is not None and baseline is not None
-        skills[f"skill.{name}"] = skill(error, baseline) if known else None
+        skills[f"skill.{name}"] = None
+        if error is not None and baseline is not None:
+            skills[f"skill.{name}"] = skill(error, baseline)
     return skills
 
 
