@@ -109,6 +109,7 @@ LEADERBOARD = {
 # figures of a row in which a method has a value for each of some names
 PARTS = {
     "error_degrees": ("mean", "std", "max"),
+    "effort": ("STAGE",),
     "skill": tuple(BASELINES),
     "baselines_degrees": tuple(BASELINES),
     "baselines_mm": tuple(BASELINES),

@@ -13,17 +13,18 @@ r"""The report of a ledger: a page that any browser opens, figures for papers, r
 | looking for | file |
 |---|---|
 | what the command does, in order, and what it refuses | write.py |
-| a table of runs, and what both kinds of runs have in common | kind.py |
+| a table of runs, and what a kind of runs has to say of them | kind.py |
 | the rows of a ledger as that table | runs.py |
-| what differs between tracks and single searches | tracks.py, searches.py |
-| figures and the score: digits, averages, texts | columns.py |
-| the methods compared on the runs that they share; the leaderboard | leaderboard.py |
+| the two kinds: tracks, with the error with losses, and single searches | tracks.py, searches.py |
+| figures and the score: names, digits, averages, texts | columns.py |
+| the methods compared on the runs that they share; the leaderboard and its order | leaderboard.py |
+| the leaderboard as printed lines, CSV and LaTeX | table.py |
 | charts of the page and for papers, as numbers | charts.py |
 | the sentences of the first screen | summary.py |
-| the data of the page, by two lists of sections | content.py |
+| the data of the page | content.py |
 | the page: markup, style and scripts as one document | page/ |
 | charts by matplotlib, and the folder of a paper's figures | figures.py |
-| the command that runs one row again | repeat.py |
+| one row run again: `posefit rerun`, or a command that needs no ledger | repeat.py |
 
 Statistics are in `posefit.statistics`.
 """

@@ -94,7 +94,8 @@ def _columns() -> list[Column]:
         ]
     return [
         Column(LOSS, loss, compute=error_with_losses),
-        Column("error_degrees.mean", MEASURES["error_degrees"]),
+        # in rows and the CSV alone: a page of 100,000 rows has no room for it
+        Column("error_degrees.mean", MEASURES["error_degrees"], in_tables=False),
         *skills,
         Column("lost_rate", _share("lost_rate")),
         Column("swap_rate", _share("swap_rate")),
@@ -323,8 +324,9 @@ def _skills(
 ) -> dict[str, float | None]:
     skills: dict[str, float | None] = {}
     for name, baseline in baselines.items():
-        known = error is not None and baseline is not None
-        skills[f"skill.{name}"] = skill(error, baseline) if known else None
+        skills[f"skill.{name}"] = None
+        if error is not None and baseline is not None:
+            skills[f"skill.{name}"] = skill(error, baseline)
     return skills
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from posefit.arrays import Array
@@ -114,7 +114,8 @@ def mean_intervals(
             f"strata and clusters must have shape {(count,)}, got {kinds.shape} and {drawn.shape}"
         )
     means = array.mean(axis=1)
-    names, stratum = np.unique(kinds, return_inverse=True)
+    names, stratum_index = np.unique(kinds, return_inverse=True)
+    stratum = stratum_index.astype(np.int64)
     drawn_names, number = np.unique(drawn, return_inverse=True)
     pairs, cluster = np.unique(stratum * len(drawn_names) + number, return_inverse=True)
     stratum_of_cluster = pairs // len(drawn_names)
@@ -123,7 +124,7 @@ def mean_intervals(
         unknown = np.full(rows, np.nan)
         return Intervals(means, unknown, unknown)
 
-    def sums(numbers: Array, group: Array, groups: int) -> Array:
+    def sums(numbers: Array, group: NDArray[np.int64], groups: int) -> Array:
         """Return the sums (groups, k) of numbers (n, k)."""
         total = np.zeros((groups, numbers.shape[1]))
         np.add.at(total, group, numbers)

@@ -94,9 +94,12 @@ def test_every_column_of_a_sweeps_csv_is_described(tmp_path: Path) -> None:
         present |= set(head_of(tmp_path / f"{k}.csv"))
     joints = {name for name in present if name.startswith("joint_errors_mm.")}
     assert len(joints) == len(JOINTS)
+    stages = {name for name in present if name.startswith("effort.")}
+    assert "effort.frames" in stages
     # without a value they have one column
     whole = {"coverage", "interval_mm"}
-    assert present - joints - whole == described - {"joint_errors_mm.JOINT"}
+    by_kind = {"joint_errors_mm.JOINT", "effort.STAGE"}
+    assert present - joints - stages - whole == described - by_kind
 
 
 def test_every_column_of_a_leaderboard_is_described(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ import pytest
 
 from posefit.page.document import embedded, plain
 from posefit.report.content import data_of
-from posefit.report.kind import Contest
 from posefit.report.page import MARK
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
@@ -57,20 +56,6 @@ def test_the_header_counts_runs_methods_and_failures(
     one = ledger(tmp_path / "one", [result(FIRST, 1.0)])
     assert header_of(one)["summary"] == "1 track by 1 method; no cell failed."
     assert header_of(results)["summary"] == "8 tracks by 2 methods; 1 cell failed."
-
-
-def test_fewer_resamples_than_usual_are_said(
-    results: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def said() -> list[str]:
-        return [note for note in header_of(results)["notes"] if "resamples" in note]
-
-    for count, notes in (
-        (2000, []),
-        (1999, ["So many runs have 1999 bootstrap resamples instead of 2,000."]),
-    ):
-        monkeypatch.setattr(Contest, "resamples", lambda *_, count=count: count)
-        assert said() == notes
 
 
 @pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t", "\r"])
