@@ -7,6 +7,11 @@ and every law is then asked of it:
 |---|---|---|
 | `sources.MASKS`, `sources.FILMS`, `sources.MOTIONS` | a name and a function that writes the source | numbers and times, cut |
 | `test_arguments.EQUAL` | an option and forms of one value | arguments |
+| `test_effort.OPTIMISERS`, `test_effort.TRACKERS`, `test_track_effort.CASES` | a method, a kind of start | evaluations reported are poses drawn |
+| `test_modes.FORMS` | an autoreset mode, a form of environment | same seeds, same episodes |
+| `test_writers.TIMES` | a file of a track | every rate, size, number of cameras and frames |
+| `test_symmetry.RIGS` | cameras around a person | mirrored, turned, twice the pixels |
+| `test_same_bits` | every registered optimiser and tracker | threads, pickling, order of cameras |
 
 A kind for which a law fails today is in the table all the same, as a strict xfail that says what will mend it.
 """

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.arrays import Array
 from posefit.registry import registry
 from posefit.silhouette.cost import pose_costs
 from posefit.silhouette.mask import Silhouette
@@ -67,3 +68,20 @@ def test_costs_do_not_depend_on_the_order_of_three_cameras() -> None:
             places,
         )
         assert np.array_equal(costs, expected)
+
+
+# whatever proposes, a search sees costs alone
+@pytest.mark.parametrize("name", ["annealed", "cma", "sapso"])
+def test_the_order_of_cameras_changes_no_bit_of_a_search(name: str) -> None:
+    def joints(degrees: tuple[int, ...]) -> Array:
+        track = posefit.track(
+            "walk",
+            method=method_of(name),
+            frames=(0, 2),
+            size=(80, 60),
+            evaluations=EVALUATIONS,
+            view_degrees=degrees,
+        )
+        return track.joints
+
+    assert np.array_equal(joints((0, 90, 200)), joints((200, 0, 90)))
