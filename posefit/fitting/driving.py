@@ -23,7 +23,6 @@ from posefit.silhouette.drawn import PoseCount, uncounted
 UNCOUNTED_POSES = 10
 # ours: costs are rounded where they are added up in another order
 COST_TOLERANCE = 1e-6
-NO_ANGLES = np.empty((0, 63))
 
 
 @dataclass(eq=False)
@@ -97,7 +96,8 @@ def drive(
             yield observation
 
     source = taken()
-    axes = FreeAxes(task.body.skeleton, task.angles if task.training else NO_ANGLES)
+    training = (motion.poses[:, 3:] for motion in task.training)
+    axes = FreeAxes(task.body.skeleton, training)
     drawn = PoseCount()
     frames: Iterator[Frame] | None = None
     yielded = 0

@@ -1,7 +1,7 @@
 """What plugins return in a run is checked once: a broken rule ends it, with one line that names plugin and call."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from traceback import extract_tb
@@ -184,13 +184,16 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
 class FreeAxes:
     """The axes about which the joints of a skeleton turn. Angles about the others are 0, and cannot be written.
 
-    In training angles (T, 63) of another skeleton they may be others; then as far off 0 is allowed.
+    In training angles, (T, 63) each, of another skeleton they may be others; then as far off 0 is allowed.
     """
 
-    def __init__(self, skeleton: Skeleton, training: Array) -> None:
+    def __init__(self, skeleton: Skeleton, training: Iterable[Array]) -> None:
         self._fixed = np.flatnonzero(~skeleton.free[ANGLES - JOINT_ANGLES :])
-        least = np.full(len(self._fixed), FIXED_TOLERANCE)
-        self._reach = np.abs(training[:, self._fixed]).max(axis=0, initial=0.0) + least
+        self._reach = np.zeros(len(self._fixed))
+        for angles in training:
+            off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
+            self._reach = np.maximum(self._reach, off)
+        self._reach += FIXED_TOLERANCE
 
     def broken(self, angles: Array) -> str:
         """Return the rule that joint angles (n, 63) break, or ""."""
@@ -245,7 +248,7 @@ def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) 
         )
     ]
     drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
-    axes = FreeAxes(skeleton, training)
+    axes = FreeAxes(skeleton, [training])
     for poses in (back, prior.inverse_transform(drawn)):
         if rule := axes.broken(np.asarray(poses)):
             raise broken(f"inverse_transform must {rule}")

@@ -153,7 +153,7 @@ def inverse(case: Case) -> None:
 def fixed_axes(case: Case) -> None:
     """Joints turn about their free axes only: other angles of a pose are 0, in all of the range."""
     prior = case.fitted
-    axes = FreeAxes(built_in.average_skeleton(), walking_angles())
+    axes = FreeAxes(built_in.average_skeleton(), [walking_angles()])
     for latents in (prior.transform(walking_angles()), case.latents):
         broken = axes.broken(np.asarray(prior.inverse_transform(latents)))
         expect(not broken, f"inverse_transform must {broken}")

@@ -464,7 +464,7 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
 def test_check_reports_every_rule_and_how_many_ran() -> None:
     result = run("check", "optimiser", "random")
     assert result.exit_code == 0, result.output
-    assert re.search(r"\d+ checks ran, 0 failed, 5 skipped", result.stdout)
+    assert re.search(r"\d+ checks ran, 0 failed, \d+ skipped", result.stdout)
     assert "it is the baseline itself" in result.stdout
     report = json.loads(
         run("check", "prior", "pca", "--set", "components=4", "--json").stdout

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit import Body, Motion, SearchSpace, Task
+from posefit import Body, Camera, Motion, SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.prior import Tilt
 from posefit.fitting.tracker import Observation, Prediction, Predictor, SynthesisTracker
@@ -33,7 +33,7 @@ def bending(pitch: Array, roll: Array, hip: Array | float = 0.0) -> Motion:
 def task_of(*training: Motion, yaw: float | None = 0.3) -> Task:
     return Task(
         Body.of(built_in.average_skeleton()),
-        [],
+        [Camera.around(np.zeros(3), 0.0, 3.0, (8, 8))],
         10,
         yaw,
         np.zeros(3),

@@ -56,7 +56,7 @@ def test_optunahubs_loader_takes_the_folder_that_is_ready_to_be_sent() -> None:
     assert posed.evaluate(dict.fromkeys(posed.search_space, 0.0)) == problem()(
         np.zeros(9)
     )
-    with pytest.raises(ValueError, match="instance must be at most 19999, got 20000"):
+    with pytest.raises(ValueError, match="instance must lie in 0 to 19999, got 20000"):
         module.Problem(instance=20_000)
 
 

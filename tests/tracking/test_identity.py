@@ -11,6 +11,7 @@ import posefit
 from posefit.motion import built_in
 from posefit.output.folder import OutputFolder
 from posefit.output.identity import digest_of
+from posefit.output.record import read_frames
 from tests.cases import each
 from tests.files import csv_rows
 from tests.fuzz.written import SPEC, mended, written
@@ -97,9 +98,11 @@ def test_a_first_frame_that_was_being_written_is_cut_off(tmp_path: Path) -> None
     )
     with suppress(KeyboardInterrupt), folder as output:
         assert output.earlier() == ([], None)
-        with file.open("ab") as record:  # a frame that is tracked now
-            record.write(lines[0])
-        assert len(output.earlier()[0]) == 1
+        tracked_now = tmp_path / "tracked.jsonl"
+        tracked_now.write_bytes(lines[0])
+        (frame,), state, _ = read_frames(tracked_now)
+        assert state is not None
+        output.record(frame, state)
         raise KeyboardInterrupt
     assert file.read_bytes() == lines[0]
     assert not [message for message in messages if message.startswith("warning")]

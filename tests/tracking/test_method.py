@@ -22,7 +22,7 @@ from posefit.testing.toy import Toy, sphere
 from posefit.tracking import defaults, method
 from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
-from posefit_envs import instance
+from posefit_envs import world
 from posefit_swarm.sapso import SAPSO
 from tests.cases import each
 from tests.testing import planted
@@ -157,7 +157,7 @@ def test_a_prior_that_moves_fixed_axes_is_refused_wherever_it_is_used(
         r"inverse_transform must turn joints about their free axes only, got 0.01 rad"
     )
     installed("prior", planted.MovesFixedAxes)
-    monkeypatch.setattr(instance, "registry", method.registry)
+    monkeypatch.setattr(world, "registry", method.registry)
     motion = built_in.motion("walk", frames=1)
     scene = synthetic(motion, [45.0], (120, 90), [], (None, None))
     out = tmp_path / "out"
