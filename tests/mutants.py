@@ -1,15 +1,17 @@
-"""Mutants of the equations and the kernels, and whether tests notice: `python -m tests.mutants --count 60 --seed 1`.
+"""Mutants of the code, and whether tests notice: `python -m tests.mutants --count 60 --seed 1`.
 
 Drawn lines carry a tag such as `# SAPSO (4)`, whose tests in `tests/sources` must then fail, or stand in a `*kernels.py`,
-which the tests of its package must notice. In each an operator, a comparison or a number changes. Every mutant that
-lives is printed; exit status 1 where the share of those that are killed is less than `--least`. Some change nothing
-that can be noticed: a `<` of two floats that are never equal, a number that only guards.
+which the tests of its package must notice. `--packages posefit/geometry posefit/sweep` draws as many lines from each
+of these packages instead, whatever they hold. In each an operator, a comparison or a number changes. Every mutant that
+lives or runs out of time is printed; exit status 1 where the share of killed mutants is less than `--least`. Some
+change nothing that can be noticed: a `<` of two floats that are never equal, a number that only guards.
 """
 
 import argparse
 import ast
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -43,12 +45,27 @@ NAMES = {
     "GtE": ">=",
 }
 NAMES |= {"BitAnd": "&", "BitOr": "|"}
-KERNEL_TESTS = {  # which tests notice a change of a package's kernels
+TESTS = {  # which tests notice a change of a package
     "posefit/silhouette": ["tests/silhouette"],
     "posefit/geometry": ["tests/geometry", "tests/silhouette/test_kernels.py"],
-    "posefit/fitting": ["tests/fitting", "tests/tracking/test_contours.py"],
+    "posefit/fitting": [
+        "tests/fitting",
+        "tests/tracking/test_contours.py",
+        "tests/sources/test_hansen2016.py",
+        "tests/sources/test_sapso.py",
+    ],
+    "posefit/footage": ["tests/footage", "tests/laws"],
+    "posefit/output": [
+        "tests/laws/test_writers.py",
+        "tests/measuring",
+        "tests/tracking/test_page.py",
+        "tests/tracking/test_picture.py",
+        "tests/tracking/test_result.py",
+    ],
+    "posefit/sweep": ["tests/sweep", "tests/cli"],
     "plugins/posefit_exemplars": ["tests/sources", "tests/exemplars"],
 }
+SECONDS = 300.0  # that the tests of one mutant have
 
 
 class Mutant(NamedTuple):
@@ -73,9 +90,24 @@ def mutants() -> Iterator[Mutant]:
     for path in sorted(ROOT.glob("p*/**/*kernels.py")):
         name = path.relative_to(ROOT).as_posix()
         folder = path.parent.relative_to(ROOT).as_posix()
-        yield from _of_lines(
-            name, None, tuple(KERNEL_TESTS.get(folder, ["tests/sources"]))
+        yield from _of_lines(name, None, tuple(TESTS.get(folder, ["tests/sources"])))
+
+
+def of_package(package: str) -> Iterator[Mutant]:
+    """Yield every mutant of a package, with its test files: those that name the module most come first."""
+    files = list[Path]()
+    for name in TESTS[package]:
+        path = ROOT / name
+        files += sorted(path.glob("test_*.py")) if path.is_dir() else [path]
+    texts = {file: file.read_text("utf-8") for file in files}
+    for path in sorted((ROOT / package).glob("*.py")):
+        ordered = sorted(
+            files,
+            key=lambda file: (path.stem in file.stem, texts[file].count(path.stem)),
+            reverse=True,
         )
+        names = tuple(file.relative_to(ROOT).as_posix() for file in ordered)
+        yield from _of_lines(path.relative_to(ROOT).as_posix(), None, names)
 
 
 def _of_lines(
@@ -84,7 +116,30 @@ def _of_lines(
     """Yield the mutants of some lines of a file, or of all."""
     text = (ROOT / path).read_text("utf-8")
     source = text.splitlines()
-    for node in ast.walk(ast.parse(text)):
+    tree = ast.parse(text)
+    hints = set(_hints(tree))
+    for node in ast.walk(tree):
+        if node in hints:
+            continue
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+            number = node.lineno
+            line = source[number - 1]
+            left = node.col_offset
+            right = node.end_col_offset or 0
+            # Python 3.11 misplaces what stands in an f-string
+            if (
+                line.isascii()
+                and _number(line[left:right]) == node.value
+                and (lines is None or number in lines)
+            ):
+                value = (
+                    node.value + 1
+                    if isinstance(node.value, int)
+                    else 1.5 * node.value or 1.0
+                )
+                changed = f"{line[:left]}{value!r}{line[right:]}"
+                yield Mutant(path, number, line.strip(), changed, tests)
+            continue
         if isinstance(node, ast.BinOp):
             start = node.left
             stop = node.right
@@ -114,42 +169,62 @@ def _of_lines(
             yield Mutant(path, number, line.strip(), changed, tests)
 
 
-def survives(mutant: Mutant, copy: Path) -> bool:
-    """Return whether the tests pass although a line is changed."""
+def _hints(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield what stands in type hints and in `isinstance`: a change there ends every import, so any test notices."""
+    for node in ast.walk(tree):
+        hint = getattr(node, "annotation", None) or getattr(node, "returns", None)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance":
+            hint = node.args[1]
+        if hint is not None:
+            yield from ast.walk(hint)
+
+
+def _number(text: str) -> float | None:
+    """Return the number that a text spells."""
+    try:
+        return float(ast.literal_eval(text))
+    except (SyntaxError, TypeError, ValueError):
+        return None
+
+
+def failed(tests: tuple[str, ...], copy: Path) -> str:
+    """Return the first of the tests that fails, or "". Raises TimeoutExpired."""
+    paths = os.pathsep.join(str(copy / name) for name in (".", "plugins", "envs"))
+    words = [
+        sys.executable,
+        *("-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider"),
+        *tests,
+    ]
+    ran = subprocess.run(
+        words,
+        cwd=copy,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=SECONDS,
+    )
+    if ran.returncode == 0:
+        return ""
+    # below 0 a signal ended it: a kernel that writes beyond its arrays
+    if ran.returncode not in (3, 5):
+        named = re.search(r"^(?:FAILED|ERROR) (\S+)", ran.stdout, re.MULTILINE)
+        return named[1] if named else tests[0]
+    raise RuntimeError(f"tests must pass or fail, got\n{ran.stdout}{ran.stderr}")
+
+
+def killer(mutant: Mutant, copy: Path) -> str | None:
+    """Return the test that a mutant fails, "" if it lives, None if its time runs out."""
     file = copy / mutant.path
     text = file.read_text("utf-8")
     lines = text.splitlines(keepends=True)
     lines[mutant.line - 1] = mutant.after + "\n"
     file.write_text("".join(lines), "utf-8")
-    paths = os.pathsep.join(str(copy / name) for name in (".", "plugins", "envs"))
-    words = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-x",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-        *mutant.tests,
-    ]
     try:
-        ran = subprocess.run(
-            words,
-            cwd=copy,
-            env={**os.environ, "PYTHONPATH": paths},
-            capture_output=True,
-            timeout=900,
-        )
-        # below 0 a signal ended it: a kernel that writes beyond its arrays
-        if ran.returncode > 1:
-            raise RuntimeError(
-                f"tests must pass or fail, got\n{ran.stdout.decode()}{ran.stderr.decode()}"
-            )
-        return ran.returncode == 0
+        # the likeliest file alone is quicker than after all others are imported
+        first = failed(mutant.tests[:1], copy)
+        return first or (failed(mutant.tests[1:], copy) if mutant.tests[1:] else "")
     except subprocess.TimeoutExpired:
-        return False
+        return None
     finally:
         file.write_text(text, "utf-8")
 
@@ -159,26 +234,41 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--packages", nargs="*", default=[], choices=sorted(TESTS))
     parser.add_argument("--least", type=float, default=0.8)
     asked = parser.parse_args()
-    every = sorted(set(mutants()))
-    drawn = random.Random(asked.seed).sample(every, min(asked.count, len(every)))
+    packages = [sorted(set(of_package(name))) for name in asked.packages]
+    groups = packages or [sorted(set(mutants()))]
+    share = asked.count // len(groups)
+    drawn = [
+        mutant
+        for group in groups
+        for mutant in random.Random(asked.seed).sample(group, min(share, len(group)))
+    ]
+    ends = list[str | None]()
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "copy"
         for name in COPIED:
             (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(
                 ROOT / name, copy / name
             )
-        killed = 0
         for mutant in drawn:
-            if not survives(mutant, copy):
-                killed += 1
-            else:
-                print(
-                    f"LIVES {mutant.path}:{mutant.line}\n  {mutant.before}\n  {mutant.after.strip()}",
-                    flush=True,
-                )
-    print(f"{killed} of {len(drawn)} mutants killed, of {len(every)} that there are")
+            ends.append(killer(mutant, copy))
+            end = ends[-1]
+            words = (
+                "OUT OF TIME" if end is None else f"killed by {end}" if end else "LIVES"
+            )
+            print(f"{mutant.path}:{mutant.line} {words}")
+            if not end:
+                print(f"  {mutant.before}\n  {mutant.after.strip()}")
+            sys.stdout.flush()
+        for test in sorted({end for end in ends if end}):
+            if failed((test,), copy):
+                print(f"FAILS WITHOUT A MUTANT {test}")
+                ends = [None if end == test else end for end in ends]
+    killed = sum(map(bool, ends))
+    there = sum(map(len, groups))
+    print(f"{killed} of {len(drawn)} mutants killed, of {there} that there are")
     return int(killed < asked.least * len(drawn))
 
 

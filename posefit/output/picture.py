@@ -283,9 +283,9 @@ def _labelled(image: Image, label: str, lost: bool = False) -> Image:
 
 
 def _draw_border(image: Image, width: int) -> None:
-    cv2.rectangle(
-        image, (0, 0), (image.shape[1] - 1, image.shape[0] - 1), MISSED, 2 * width - 1
-    )
+    # OpenCV's own thick lines are a pixel wider
+    image[:width] = image[-width:] = MISSED
+    image[:, :width] = image[:, -width:] = MISSED
 
 
 def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:

@@ -118,10 +118,9 @@ class Pool:
         except ProcessExpired as error:
             code = error.exitcode or 0
             if code >= 0:
+                status = 0 if code == EXIT_ZERO_STATUS else code
                 return Outcome(
-                    job,
-                    None,
-                    f"its process ended itself with status {code % EXIT_ZERO_STATUS}",
+                    job, None, f"its process ended itself with status {status}"
                 )
             name = next(
                 (number.name for number in signal.Signals if number == -code),

@@ -63,11 +63,13 @@ def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(
 
 def test_an_animated_png_is_refused(walk: list[Any], tmp_path: Path) -> None:
     first, *others = drawn(walk)
-    first.save(tmp_path / "a.png", save_all=True, append_images=others)
-    with pytest.raises(
-        ValueError, match="a.png: expected one picture, got an animation"
-    ):
-        read_masks(tmp_path, ALL)
+    for count in (1, len(others)):
+        later = others[:count]
+        first.save(tmp_path / "a.png", save_all=True, append_images=later)
+        with pytest.raises(
+            ValueError, match="a.png: expected one picture, got an animation"
+        ):
+            read_masks(tmp_path, ALL)
 
 
 def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(

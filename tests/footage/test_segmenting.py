@@ -15,7 +15,7 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage import source
 from posefit.footage.cameras import yaws_of
-from posefit.footage.quality import FrameQuality, Verdict, verdict
+from posefit.footage.quality import FrameQuality, Verdict, moved_pixels, verdict
 from posefit.footage.segmentation import (
     Extraction,
     Segmentation,
@@ -563,3 +563,23 @@ def test_the_way_that_is_doubted_least_takes_the_person_out(
     assert taken.name == used
     assert bool(taken.warnings) == (used == "second")
     assert next(results, None) is None  # all that had to be tried were
+
+
+@each(
+    ("left", "top", "around", "at"),
+    [
+        # by hand: 20 x 20 pixels and 10 more on each side; at the body 2 more, as 0.1 of 20 is
+        (40, 30, 40 * 40, 24 * 24),
+        # in a corner of the picture there is nothing to two of the sides
+        (0, 0, 30 * 30, 22 * 22),
+        (100, 80, 30 * 30, 22 * 22),
+    ],
+)
+def test_what_moves_is_counted_around_the_person_and_at_the_body(
+    left: int, top: int, around: int, at: int
+) -> None:
+    region = np.zeros((100, 120), dtype=bool)
+    region[top : top + 20, left : left + 20] = True
+    everything = np.ones_like(region)
+    assert moved_pixels(everything, region, region, 20.0, 0.1) == (around, at)
+    assert moved_pixels(~everything, region, region, 20.0, 0.1) == (0, 0)

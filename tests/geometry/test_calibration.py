@@ -428,6 +428,19 @@ def test_every_number_of_a_lens_that_is_not_read_is_named(
         read_calibrations(path)
 
 
+# row, column: K must be fx 0 cx, 0 fy cy, 0 0 1, and a skew beside fx has a message of its own
+@each(("row", "column"), [(1, 0), (2, 0), (2, 1), (2, 2)])
+def test_a_matrix_of_another_form_is_refused(
+    tmp_path: Path, row: int, column: int
+) -> None:
+    matrix = np.array(K)
+    matrix[row, column] += 0.5
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps({"K": matrix.tolist(), "image_size": [640, 480]}))
+    with pytest.raises(ValueError, match="a camera matrix that is not of the form"):
+        read_calibrations(path)
+
+
 def test_a_skewed_matrix_is_refused(tmp_path: Path) -> None:
     for skew, refused in ((0.1, False), (5.0, True)):
         matrix = [[500.0, skew, 319.5], *K[1:]]
@@ -469,7 +482,8 @@ def test_a_size_that_contradicts_the_centre_is_refused(
         if fits:
             assert read_calibrations(tmp_path / name)[0].size == size
             continue
-        with pytest.raises(ValueError, match=f"in pictures of {size[0]}x{size[1]}: "):
+        message = f"a centre of {centre[0]:g} and {centre[1]:g} in pictures of {size[0]}x{size[1]}: "
+        with pytest.raises(ValueError, match=message):
             read_calibrations(tmp_path / name)
     # without a size it is the pictures' own that has to fit
     (tmp_path / "b.json").write_text(json.dumps({"K": matrix}))

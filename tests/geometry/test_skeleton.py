@@ -100,6 +100,17 @@ def test_joints_equal_the_slow_twin_whatever_the_frames_of_the_angles() -> None:
         np.testing.assert_array_equal(
             led.reshape(10, 27, 3), skeleton.joints(poses, places)
         )
+        frames, sines, cosines = skeleton.frames(poses, places)
+        assert frames.shape == (10, 27, 4, 3)
+        np.testing.assert_allclose(frames[:, :, 3], slow, rtol=0.0, atol=1e-9)
+        axes_of = frames[:, :, :3]
+        np.testing.assert_allclose(
+            axes_of @ axes_of.swapaxes(-1, -2),
+            np.broadcast_to(np.eye(3), axes_of.shape),
+            atol=1e-9,
+        )
+        np.testing.assert_allclose(sines, np.sin(poses), atol=1e-9)
+        np.testing.assert_allclose(cosines, np.cos(poses), atol=1e-9)
 
 
 @each("name", LIMBS)

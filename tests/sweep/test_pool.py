@@ -16,6 +16,7 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from pebble import ProcessExpired, ProcessFuture
 
 from posefit.errors import InputError
 from posefit.suites.functions import SUITE
@@ -25,8 +26,8 @@ from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Outcome
 from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
-from posefit.sweep.pool import Pool
-from posefit.sweep.worker import Context, become_worker
+from posefit.sweep.pool import Pool, cores
+from posefit.sweep.worker import EXIT_ZERO_STATUS, Context, become_worker
 from posefit.version import posefit_build
 from tests.cases import each
 from tests.sweep import fake
@@ -166,6 +167,36 @@ def test_a_process_that_ends_itself_or_dies_is_noticed_at_once_and_a_kill_costs_
     ]
 
 
+@each(
+    ("code", "reason"),
+    [
+        (0, "its process ended itself with status 0"),
+        (EXIT_ZERO_STATUS, "its process ended itself with status 0"),
+        (1, "its process ended itself with status 1"),
+        (EXIT_ZERO_STATUS + 1, f"its process ended itself with status {EXIT_ZERO_STATUS + 1}"),
+        (255, "its process ended itself with status 255"),
+        (-signal.SIGSEGV, "its process died of SIGSEGV"),
+    ],
+)  # fmt: skip
+def test_a_process_that_ended_is_named_by_its_status(code: int, reason: str) -> None:
+    future: ProcessFuture[bytes] = ProcessFuture()
+    future.set_exception(ProcessExpired("gone", code=code))  # type: ignore[no-untyped-call]
+    with closing(Pool(1, LIMITS, behave)) as pool:
+        pool._running[future] = cells(1)[0], time.monotonic()
+        (outcome,) = pool.wait(1.0)
+    assert (outcome.reason, outcome.is_own_fault) == (reason, True)
+
+
+def test_the_processors_counted_are_those_of_this_process(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # 0 is this process; another may have all of the machine
+    monkeypatch.setattr(
+        os, "sched_getaffinity", lambda pid: {3} if pid == 0 else {0, 1}, raising=False
+    )
+    assert cores() == 1
+
+
 def test_a_bad_cell_is_quarantined_after_three_attempts_and_tried_again_where_that_is_asked(
     tmp_path: Path,
 ) -> None:
@@ -204,6 +235,8 @@ from posefit.sweep.engine import single_thread
 single_thread()
 assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
 assert compiled() == 1
+import cv2
+assert cv2.getNumThreads() == 1
 """
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
@@ -386,6 +419,8 @@ def test_dask_workers_without_this_posefit_are_refused_before_a_cell_is_lost(
         patch.setattr(distributed, "Client", lambda *_, **__: client)
         if message is None:
             cluster("tcp://s", LIMITS)
+            # a single one is enough: others may come later
+            assert client.wait_for_workers.call_args.args == (1,)
             return
         with pytest.raises(InputError, match=message):
             cluster("tcp://s", LIMITS)

@@ -10,11 +10,20 @@ import pytest
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import JOINTS, PARENTS
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.output import picture
-from posefit.output.drawing import BOTH, MISSED, OTHER, width_of, wrapped
-from posefit.output.picture import LABEL_HEIGHT, PANEL, Painter, curve
+from posefit.output.drawing import (
+    BOTH,
+    MISSED,
+    OTHER,
+    draw_bones,
+    side_camera,
+    width_of,
+    wrapped,
+)
+from posefit.output.picture import BORDER, LABEL_HEIGHT, PANEL, Painter, curve
 from posefit.uncertainty.modes import Mode, Posterior
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, walk
@@ -125,7 +134,47 @@ def test_a_lost_frame_has_a_border(
     image, _ = painted(scene, frame, row(lost=lost))
     edges = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
     assert (edges == MISSED).all(axis=1).all() == marked
+    if marked:
+        inner = image[BORDER - 1 : BORDER + 1, BORDER:-BORDER]
+        assert [bool((line == MISSED).all()) for line in inner] == [True, False]
     assert pixels(image[-40:, -PANEL + 12 : -PANEL + 120], MISSED) == 0 or marked
+
+
+@each("azimuth", [0.0, 0.7, -2.0, 3.1])
+def test_the_side_view_has_the_whole_body_from_the_right(
+    scene: Scene, frame: Frame, azimuth: float
+) -> None:
+    camera = Camera.around(frame.translation, azimuth, 4.0, (160, 120))
+    side = side_camera(scene.body, camera, frame.pose, frame.translation, 90)
+    # it stands to the camera's right, and looks to the left
+    np.testing.assert_allclose(side.rotation[2], -camera.rotation[0], atol=1e-9)
+    joints = scene.body.skeleton.joints(frame.pose, frame.translation)
+    pixels, depths = side.project(joints)
+    assert depths.min() > 0.0
+    # with room for the flesh about the joints; the middle of their box is in the middle
+    assert pixels.min() > 4.0
+    assert pixels.max() < 86.0
+    height = pixels[:, 1]
+    assert 0.5 * (height.min() + height.max()) == pytest.approx(45.0, abs=2.0)
+    assert np.ptp(height) > 0.6 * 90
+
+
+def test_lines_of_a_body_start_and_end_at_its_joints(
+    scene: Scene, frame: Frame
+) -> None:
+    camera = scene.cameras[0]
+    image = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)
+    draw_bones(image, scene.body, camera, frame.pose, frame.translation, BOTH)
+    joints = scene.body.skeleton.joints(frame.pose, frame.translation)
+    pixels, _ = camera.project(joints)
+    drawn = np.zeros(image.shape[:2], dtype=bool)
+    for joint, parent in enumerate(PARENTS[1:], 1):
+        for share in np.linspace(0.0, 1.0, 50):
+            x, y = pixels[parent] + share * (pixels[joint] - pixels[parent])
+            # at least half of it
+            assert image[int(y), int(x)].any(), (joint, share)
+            drawn[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4] = True
+    assert not image[~drawn].any()
 
 
 def test_a_long_note_is_broken_into_lines_of_one_size() -> None:

@@ -4,6 +4,7 @@ import pickle
 import time
 import webbrowser
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -13,6 +14,7 @@ import pytest
 import posefit
 from posefit.errors import InputError
 from posefit.motion import built_in
+from posefit.output.text import _effort
 from posefit.silhouette.cost import project
 from tests.cases import each
 from tests.files import arrays
@@ -173,3 +175,28 @@ def test_methods_are_compared(tmp_path: Path) -> None:
     compared.report(tmp_path / "report.html")
     assert (tmp_path / "report.html").stat().st_size > 1000
     assert "random@pca" in str(compared)
+
+
+@each(
+    ("drawn", "hypotheses", "stages", "words"),
+    [
+        (1200, 0, {}, "300 of 400 evaluations"),
+        (1600, 1, {}, "400 of 400 evaluations"),
+        # what is searched again takes more than one budget
+        (1604, 1, {}, "401 evaluations"),
+        # each hypothesis has a budget
+        (3200, 3, {}, "800 of 1,200 evaluations"),
+        (1600, 1, {"first_pose": 2500}, "400 of 400 evaluations (and 2,500 for the first pose)"),
+    ],
+)  # fmt: skip
+def test_the_effort_of_a_frame_is_shown_with_its_budget(
+    drawn: int, hypotheses: int, stages: dict[str, int], words: str
+) -> None:
+    content: Any = SimpleNamespace(
+        setup=SimpleNamespace(evaluations_per_frame=400, frames=4),
+        log=SimpleNamespace(hypotheses=("one",) * hypotheses),
+        measures=SimpleNamespace(
+            iou=0.9, seconds_per_frame=0.01, effort={"frames": drawn, **stages}
+        ),
+    )
+    assert f", {words} and 10" in _effort(content)
