@@ -107,11 +107,13 @@ def _exists(process: int) -> bool:
 def left_as_it_was() -> Iterator[None]:
     """Undo afterwards what the body does to this process: its folder, variables, paths, signals and random numbers.
 
-    A worker runs cells of all methods, and what one of them leaves behind would reach the others.
+    So is what NumPy is to do about a division by zero. A worker runs cells of all methods, and what one of them leaves
+    behind would reach the others.
     """
     state = _first_state()
     try:
-        yield
+        with np.errstate():
+            yield
     finally:
         state.restore()
 

@@ -94,6 +94,7 @@ def state() -> list[Any]:
         os.environ.get("LEFT"),
         "left" in sys.path,
         signal.getsignal(signal.SIGUSR1) is signal.SIG_DFL,
+        np.geterr()["divide"],
     ]
 
 
@@ -109,6 +110,7 @@ def leave_behind() -> None:
     os.environ["LEFT"] = "left"
     sys.path.append("left")
     signal.signal(signal.SIGUSR1, lambda *_: None)
+    np.seterr(divide="raise")
     random.seed(1)
     np.random.set_bit_generator(np.random.PCG64(1))
 
