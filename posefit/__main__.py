@@ -1,5 +1,19 @@
-"""`python -m posefit` is `posefit`."""
+"""`python -m posefit` is `posefit`. Ctrl-C ends it with one line, also while Python still imports it."""
 
-from posefit.cli import run
+import sys
 
-run()
+STOPPED = 130  # the exit status of a program that Ctrl-C ended
+
+
+def main() -> None:
+    """Run the command that was asked for."""
+    try:
+        from posefit.cli import run
+    except KeyboardInterrupt:
+        print("Aborted!", file=sys.stderr)
+        raise SystemExit(STOPPED) from None
+    run()
+
+
+if __name__ == "__main__":
+    main()

@@ -685,3 +685,19 @@ def test_a_mistake_is_a_traceback_for_who_debugs_and_a_fault_of_the_program_alwa
     fault = ValueError("operands could not be broadcast together")
     monkeypatch.setattr("posefit.tracking.front.track_scene", Mock(side_effect=fault))
     assert type(run("track", "walk", "--frames", "0:1").exception) is ValueError
+
+
+def test_ctrl_c_while_posefit_is_imported_is_one_line_and_a_status() -> None:
+    code = """
+import runpy, signal, sys
+class Interrupting:
+    def find_spec(name, path=None, target=None):
+        if name == "click":
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Interrupting)
+runpy.run_module("posefit", run_name="__main__")
+"""
+    end = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert (end.returncode, end.stdout, end.stderr) == (130, "", "Aborted!\n")

@@ -94,6 +94,7 @@ def state() -> list[Any]:
         os.environ.get("LEFT"),
         "left" in sys.path,
         signal.getsignal(signal.SIGUSR1) is signal.SIG_DFL,
+        np.geterr()["divide"],
     ]
 
 
@@ -101,13 +102,17 @@ def leave_behind() -> None:
     """Note the state of this process and the number of another that sleeps, and change all of it."""
     sleeps = [sys.executable, "-c", "import time; time.sleep(600)"]
     process = subprocess.Popen(sleeps, cwd="/")
+    # NumPy draws two of them, and keeps the second
+    numbers = random.random(), np.random.standard_normal()  # noqa: NPY002
     with open(os.environ[LEFT], "a", encoding="utf-8") as file:
-        file.write(json.dumps([process.pid, *state(), random.random()]) + "\n")
+        file.write(json.dumps([process.pid, *state(), numbers]) + "\n")
     os.chdir("/")
     os.environ["LEFT"] = "left"
     sys.path.append("left")
     signal.signal(signal.SIGUSR1, lambda *_: None)
+    np.seterr(divide="raise")
     random.seed(1)
+    np.random.set_bit_generator(np.random.PCG64(1))
 
 
 def compiled() -> int:
