@@ -18,8 +18,11 @@ SMALL_FACTORS = (4, 2, 1)
 class FrameCosts:
     """The silhouettes of one frame. `small` costs are of a picture with every fourth pixel of every fourth row."""
 
-    def __init__(self, task: Task, observation: Observation) -> None:
+    def __init__(
+        self, task: Task, observation: Observation, alone: bool = False
+    ) -> None:
         self._task = task
+        self.alone = alone  # the only frame of a track
         self.observation = observation
         silhouettes = observation.silhouettes
         side = min(

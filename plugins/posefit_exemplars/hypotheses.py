@@ -54,7 +54,7 @@ CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 MIN_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS  # of a frame
 FRESH_SHARE = 0.45  # of the evaluations
 REFLECTED_SHARE = 0.25  # of the fresh hypotheses: reflections of the others
-FIRST_REFLECTED_SHARE = 0.5  # of those of the first frame
+ALONE_REFLECTED_SHARE = 0.5  # of those of the only frame of a track
 # of clips, whose limbs are tried in turn, and how often each limb is
 LIMB_POSES = 16
 LIMB_ROUNDS = 2
@@ -71,8 +71,8 @@ SIMILAR_SPREAD = 0.03  # metres: that they are off the nearest of them
 # metres: d times that off the clips costs LIBRARY_COST log(1 + d^2 / 2)
 LIBRARY_DISTANCE = 0.05
 LIBRARY_COST = 4.0  # for a thirtieth of a second
-# the same of the first frame, whose hypotheses are fitted longer
-FIRST_LIBRARY_COST = 1.0
+# the same of the only frame of a track, whose hypotheses are fitted longer
+ALONE_LIBRARY_COST = 1.0
 # times the cost of a silhouette on the path, as fitted poses are nearer
 SHARPNESS = 2.0
 STEP_SPREAD = 4.0 / 3.0  # times the spread of the path's steps
@@ -219,15 +219,16 @@ class HypothesisFilter:
         )
         self._evaluations = evaluations
 
-    def counts(self, camera_count: int, first: bool = False) -> Counts:
-        """Return how many hypotheses a frame has in which so many cameras show something; several leave less open.
+    def counts(self, frame_costs: FrameCosts) -> Counts:
+        """Return how many hypotheses a frame has: fewer where several cameras show something and leave less open.
 
-        In the `first` frame of a track nothing continues, and all evaluations are for fresh ones.
+        In the only frame of a track nothing continues, and all evaluations are for fresh ones.
         """
-        evaluations = max(self._evaluations / camera_count, MIN_EVALUATIONS)
-        if first:
+        evaluations = self._evaluations / frame_costs.camera_count
+        evaluations = max(evaluations, MIN_EVALUATIONS)
+        if frame_costs.alone:
             fresh = race_count(evaluations)
-            return Counts(fresh, fresh - 1 - int(FIRST_REFLECTED_SHARE * fresh), 0)
+            return Counts(fresh, fresh - 1 - int(ALONE_REFLECTED_SHARE * fresh), 0)
         fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
         continued = int(
             (evaluations - fresh * FRESH_EVALUATIONS) / CONTINUED_EVALUATIONS
@@ -270,7 +271,7 @@ class HypothesisFilter:
         for estimate in estimates:
             if before is not None:
                 latest = before.hypotheses
-                rows = self._continuing(before, estimate.frame_costs.camera_count)
+                rows = self._continuing(before, estimate.frame_costs)
             hypotheses, noise, evaluations = self._fitted(estimate, latest, rows, rng)
             joined = self._joined(estimate.frame_costs, hypotheses, before, noise)
             estimate = replace(estimate, evaluations=estimate.evaluations + evaluations)
@@ -300,14 +301,14 @@ class HypothesisFilter:
                 START_TURN / noise,
                 ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT,
             )
-            if not len(latest.poses):
+            if frame_costs.alone:
                 poses, places, used = contour_race(
                     self._task.body,
                     contours,
                     fresh,
                     weights,
                     lambda poses, places: self._pose_costs(
-                        frame_costs, poses, places, noise, FIRST_LIBRARY_COST
+                        frame_costs, poses, places, noise
                     ),
                 )
                 fresh = poses, places
@@ -350,16 +351,16 @@ class HypothesisFilter:
         poses: Array,
         places: Array,
         noise: float,
-        library_cost: float,
     ) -> Array:
         """Return what poses (n, 66) at places (n, 3) cost: their silhouettes, and the distance from those of clips."""
         squares = self._exemplars.nearest(poses, 1)[1][:, 0]
         silhouette_costs = frame_costs.full(poses, places)
         self._least_cost = float(silhouette_costs.min())
         # beside an earlier track, with limbs that no clip has together, each view counts as much as clips do
-        alone = frame_costs.observation.estimate is None
-        views = 1 if alone else frame_costs.camera_count
+        first_pass = frame_costs.observation.estimate is None
+        views = 1 if first_pass else frame_costs.camera_count
         distances = np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
+        library_cost = ALONE_LIBRARY_COST if frame_costs.alone else self._library_cost
         return np.asarray(
             silhouette_costs / (noise * self._temperature)
             + library_cost / views * distances
@@ -382,8 +383,7 @@ class HypothesisFilter:
         landmarks = landmark_costs(likelihoods, exchanged[:, None])
         costs = landmarks.min(axis=0)
         if frame_costs.usable:
-            library_cost = FIRST_LIBRARY_COST if before is None else self._library_cost
-            costs += self._pose_costs(frame_costs, poses, places, noise, library_cost)
+            costs += self._pose_costs(frame_costs, poses, places, noise)
             self._costs.append(self._least_cost)
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
@@ -441,8 +441,7 @@ class HypothesisFilter:
         tried = [(poses, places)]
         likeliest = latest.continued(rows) if len(rows) else (poses, places)
         # of reflections
-        counts = self.counts(frame_costs.camera_count, not len(latest.poses))
-        count = counts.fresh - len(poses)
+        count = self.counts(frame_costs).fresh - len(poses)
         if count > 0:
             reflectable, place = (
                 array[: -(-count // frame_costs.camera_count)] for array in likeliest
@@ -491,9 +490,9 @@ class HypothesisFilter:
         sums = weights + pulls
         return poses + (pulls / sums)[3:] * (means - poses), sums
 
-    def _continuing(self, before: _FittedFrame, camera_count: int) -> Rows:
+    def _continuing(self, before: _FittedFrame, frame_costs: FrameCosts) -> Rows:
         """Return the hypotheses that continue: the likeliest so far, and of those near each other only one."""
-        count = self.counts(camera_count).continued
+        count = self.counts(frame_costs).continued
         joints = before.hypotheses.joints.reshape(
             len(before.hypotheses.joints), -1
         ).astype(np.float32)

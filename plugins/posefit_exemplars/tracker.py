@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -89,6 +90,7 @@ class ExemplarTracker:
         )
         self.exemplars = self.lookup.exemplars
         self.temperature = temperature / (30.0 / task.fps)
+        self.lag = lag
         self.smoothing = smoothing * task.fps / 30.0  # frames
         fit_evaluations = FIT_SHARE * task.evaluations
         self.evaluations = task.evaluations - fit_evaluations  # of the beam
@@ -127,8 +129,12 @@ class ExemplarTracker:
     ) -> Iterator[_BeamFrame]:
         interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
         latest: _BeamFrame | None = None
-        for number, observation in enumerate(observations):
-            frame_costs = FrameCosts(self.task, observation)
+        coming = iter(observations)
+        # whether there is a second frame is known only where frames are looked ahead
+        first = list(islice(coming, 2 if self.lag else 1))
+        alone = len(first) == 1 and self.lag > 0 and not self.task.before
+        for number, observation in enumerate(chain(first, coming)):
+            frame_costs = FrameCosts(self.task, observation, alone)
             before = None if latest is None else latest.beam
             beam, costs, evaluations = self._candidates(
                 frame_costs, before, number % interval == 0, rng
@@ -332,8 +338,7 @@ class ExemplarTracker:
         """Return the estimate of a frame: the weighted mean of the states like that of the path."""
         beam = frame.beam
         frame_costs = frame.frame_costs
-        first = frame.states.kernel is None  # there is no frame before it
-        count = self.hypotheses.counts(frame_costs.camera_count, first).diverse
+        count = self.hypotheses.counts(frame_costs).diverse
         diverse = beam.rows(
             beams.diverse_best(self.exemplars, beam, beam.totals, count)
         )

@@ -176,16 +176,20 @@ def _nearest(
 
 def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
     """Return the distances (n, K), metres, of poses (n, 66) from others (K, 66): the mean over joints, root-centred."""
-    from scipy.spatial.distance import cdist
-
+    total = np.zeros((len(poses), len(others)))
+    squares = np.empty_like(total)
     pairs = zip(
-        np.moveaxis(skeleton.joints(poses), 1, 0),
-        np.moveaxis(skeleton.joints(others), 1, 0),
+        skeleton.joints(poses).transpose(1, 2, 0),
+        skeleton.joints(others).transpose(1, 2, 0),
         strict=True,
     )
-    return np.asarray(
-        sum(cdist(joints, targets) for joints, targets in pairs) / len(JOINTS)
-    )
+    # joint by joint, as all of them together take much memory
+    for joints, targets in pairs:
+        squares[:] = 0.0
+        for axis, target in zip(joints, targets, strict=True):
+            squares += np.subtract.outer(axis, target) ** 2
+        total += np.sqrt(squares, out=squares)
+    return total / len(JOINTS)
 
 
 def track_modes(
