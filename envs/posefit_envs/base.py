@@ -253,7 +253,11 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self.warned = False  # that an action is clipped
         self.steps = np.zeros(num_envs, dtype=np.int64)  # of each episode
         self.ended = np.zeros(num_envs, dtype=bool)
-        self._longest = np.inf if max_episode_steps is None else max_episode_steps
+        self._longest = (
+            np.inf
+            if max_episode_steps is None
+            else checked(whole, "max_episode_steps", max_episode_steps, 1)
+        )
         # with their seeds
         self._generators: dict[int, tuple[np.random.Generator, int]] = {}
         self.numbers = np.full(num_envs, -1)  # of the instances; -1 before a reset
@@ -514,14 +518,15 @@ def checked_mask(mask: Any, count: int) -> Flags:
 
 
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    """Return a seed for each environment: s gives s, s + 1, ... Raises ArgumentError for a wrong count."""
+    """Return a seed for each environment: s gives s, s + 1, ... Raises ArgumentError for anything but whole numbers."""
     if seed is None:
         return [None] * count
-    if isinstance(seed, int | np.integer):
-        return [int(seed) + i for i in range(count)]
+    if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+        first = checked(whole, "seed", seed, 0)
+        return [first + i for i in range(count)]
     if len(seed) != count:
         raise ArgumentError(f"seed must be one number or {count}, got {len(seed)}")
-    return list(seed)
+    return [each if each is None else checked(whole, "seed", each, 0) for each in seed]
 
 
 def _instances(chosen: Any, count: int) -> list[int | None]:

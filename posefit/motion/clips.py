@@ -85,7 +85,7 @@ def _resampled(clip: recorded.RecordedClip, fps: float) -> Motion:
 def _motion_in(source: str | Path, stated: FileOptions) -> Motion:
     path = Path(source)
     if path.suffix.lower() == ".amc":
-        skeleton = _skeleton_file(path, stated.asf)
+        skeleton = skeleton_file(path, stated.asf)
         return read_clip(
             skeleton, existing(path), fps=stated.rate, unit=stated.unit, up=stated.up
         )
@@ -119,7 +119,8 @@ def load_motion(
     return clip_of(source, stated).motion(fps)
 
 
-def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:
+def skeleton_file(amc: Path, asf: str | Path | None) -> Path:
+    """Return the .asf file of an .amc file: the given one, or the only one beside it."""
     if asf is not None:
         return existing(Path(asf))
     existing(amc)

@@ -184,20 +184,13 @@ class Suite:
         budget: int | None = None,
     ) -> None:
         one_of("suite", name, SUITES)
-        for what, numbers in (
-            ("functions", functions),
-            ("dimensions", dimensions),
-            ("instances", instances),
-        ):
-            if numbers is not None and not isinstance(numbers, Iterable):
-                raise InputError(
-                    f"{what} must be a list of numbers, got {quoted(numbers)}"
-                )
         chosen = (
             FUNCTIONS
             if functions is None
-            else [suite_function(number) for number in functions]
+            else [suite_function(number) for number in _numbers("functions", functions)]
         )
+        dimensions = _numbers("dimensions", dimensions)
+        instances = _numbers("instances", instances)
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
         self.passed_over = tuple(
@@ -238,3 +231,13 @@ class Suite:
 
     def __iter__(self) -> Iterator[Problem]:
         return (self[index] for index in range(len(self)))
+
+
+def _numbers(what: str, numbers: object) -> list[int]:
+    """Return numbers as a list, since a generator gives them once only. Raises InputError where there are none."""
+    if not isinstance(numbers, Iterable) or isinstance(numbers, str):
+        raise InputError(f"{what} must be a list of numbers, got {quoted(numbers)}")
+    listed = list(numbers)
+    if not listed:
+        raise InputError(f"{what} must hold at least one number, got none")
+    return listed

@@ -19,7 +19,12 @@ from posefit.footage.source import (
     sources_of,
 )
 from posefit.motion import built_in
-from posefit.motion.clips import Source, training_clips, training_motions
+from posefit.motion.clips import (
+    Source,
+    skeleton_file,
+    training_clips,
+    training_motions,
+)
 from posefit.motion.motion import Motion
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
@@ -143,11 +148,7 @@ def _check_for_kind(
     options: TrackOptions, known: bool, motions: Sequence[Footage]
 ) -> None:
     """Raise InputError for an option of motions' files or of a known truth where there is no such thing."""
-    captured = any(
-        str(motion).lower().endswith(".amc")
-        for motion in motions
-        if isinstance(motion, str | Path)
-    )
+    captured = any(map(_is_captured, motions))
     folders = any(
         Path(motion).is_dir()
         for motion in options.train
@@ -173,6 +174,11 @@ def _check_for_kind(
         )
 
 
+def _is_captured(motion: Footage) -> bool:
+    """Return whether a motion is an .amc file, whose skeleton is in another file."""
+    return isinstance(motion, str | Path) and str(motion).lower().endswith(".amc")
+
+
 def _identity(
     sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]
 ) -> dict[str, Digest]:
@@ -183,6 +189,13 @@ def _identity(
         if declared(option).identifies
     }
     values |= {"source": sources, "train": train, "version": __version__}
+    # the skeleton beside an .amc counts as if it were given
+    if beside := [
+        skeleton_file(Path(motion), options.asf)
+        for motion in (*sources, *options.train)
+        if _is_captured(motion)
+    ]:
+        values["asf"] = beside
     # a folder of that name is not read
     named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()
     return {

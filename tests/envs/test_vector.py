@@ -283,8 +283,31 @@ def test_mistakes_are_named(name: str) -> None:
         gym.make_vec(name, num_envs=3, autoreset_mode="same")
     with pytest.raises(error.Error, match="num_envs must be at least 1, got 0"):
         gym.make_vec(name, num_envs=0)
+    for limit, message in (
+        (0, "max_episode_steps must be at least 1, got 0"),
+        (1.5, "max_episode_steps must be a whole number of at least 1, got 1.5"),
+        ("9", "max_episode_steps must be a whole number of at least 1, got '9'"),
+    ):
+        with pytest.raises(error.Error, match=message):
+            gym.make_vec(name, num_envs=3, max_episode_steps=limit)
+    for seed, message in (
+        (1.5, "seed must be a whole number of at least 0, got 1.5"),
+        ("abc", "seed must be a whole number of at least 0, got 'abc'"),
+        ([1, 2, -3], "seed must be 0 or more, got -3"),
+        ([1, 2, True], "seed must be a whole number of at least 0, got True"),
+    ):
+        with pytest.raises(error.Error, match=message):
+            vector.reset(seed=seed)
     with pytest.raises(TypeError, match="colour"):
         gym.make_vec(name, num_envs=3, colour="red")
+
+
+@each("name", CASES)
+def test_seeds_may_be_an_array(name: str) -> None:
+    vector = gym.make_vec(name, num_envs=3)
+    assert data_equivalence(
+        vector.reset(seed=np.array([5, 40, 5])), vector.reset(seed=[5, 40, 5])
+    )
 
 
 @each(

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from copy import copy, deepcopy
 from itertools import product
 from pickle import PicklingError
+from typing import Any
 
 import numpy as np
 import pytest
@@ -251,6 +252,22 @@ def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
     assert suite[0] is not suite[0]  # nothing evaluated yet, each time
 
 
+@each("numbers", [tuple, iter, np.array])
+def test_a_suite_takes_any_kind_of_numbers(numbers: Callable[[Any], Any]) -> None:
+    suite = posefit.Suite(
+        functions=numbers([1, 7]),
+        dimensions=numbers([9, 20]),
+        instances=numbers([3, 10_003]),
+    )
+    # function 7 has no problem in 9 dimensions
+    expected = [
+        f"f{function:03d}_i{instance:05d}_d{d:02d}"
+        for function, d in ((1, 9), (1, 20), (7, 20))
+        for instance in (3, 10_003)
+    ]
+    assert [posed.id.partition("_")[2] for posed in suite] == expected
+
+
 def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_not_be_counted() -> (
     None
 ):
@@ -320,6 +337,18 @@ def test_a_copy_of_a_problem_counts_for_itself(
             lambda: posefit.Suite(functions=9),
             "functions must be a list of numbers, got 9",
         ),  # type: ignore[arg-type]
+        (
+            lambda: posefit.Suite(dimensions="9"),
+            "dimensions must be a list of numbers, got '9'",
+        ),  # type: ignore[arg-type]
+        (
+            lambda: posefit.Suite(functions=[]),
+            "functions must hold at least one number, got none",
+        ),
+        (
+            lambda: posefit.Suite(instances=[]),
+            "instances must hold at least one number, got none",
+        ),
     ],
 )
 def test_what_is_no_problem_is_named(make: Callable[[], object], message: str) -> None:

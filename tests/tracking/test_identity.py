@@ -9,6 +9,8 @@ import pytest
 
 import posefit
 from posefit.motion import built_in
+from posefit.motion.amc import write_amc
+from posefit.motion.asf import write_asf
 from posefit.output.folder import OutputFolder
 from posefit.output.identity import digest_of
 from posefit.output.record import read_frames
@@ -53,6 +55,36 @@ def test_a_track_goes_on_as_if_it_had_not_ended_too_early(
     activities = [row["activity"] for row in csv_rows(tmp_path / "out" / "frames.csv")]
     assert [activity or None for activity in activities] == resumed.activity
     assert (None in resumed.activity) == (method == "sapso")
+
+
+@each("role", ["source", "train"])
+def test_a_track_does_not_go_on_with_another_skeleton(
+    role: str, tmp_path: Path
+) -> None:
+    """The .asf beside an .amc is an argument of the track, though the user did not name it."""
+    motion = built_in.motion("walk")
+    (tmp_path / "a").mkdir()
+    captured = tmp_path / "a" / "walk.amc"
+    skeleton = tmp_path / "a" / "person.asf"
+    write_amc(captured, motion)
+    write_asf(skeleton, motion.skeleton)
+    options: dict[str, Any] = {**QUICK, "method": "sapso", "out": tmp_path / "out"}
+    if role == "train":
+        options["train"] = [captured]
+    source = captured if role == "source" else "walk-a"
+    with pytest.raises(KeyboardInterrupt):
+        posefit.track(source, progress=stopping(4), **options)
+    write_asf(skeleton, posefit.Body.of(motion.skeleton).scaled(1.2, 1.2).skeleton)
+    with pytest.raises(
+        ValueError,
+        match="asf must be .* as it was, to resume, got one with another content",
+    ):
+        posefit.track(source, resume=True, **options)
+    # the frames that were tracked are kept for the skeleton that they belong to
+    write_asf(skeleton, motion.skeleton)
+    resumed = posefit.track(source, resume=True, **options)
+    whole = posefit.track(source, **{**options, "out": None})
+    np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
 
 
 def test_a_file_or_a_folder_is_what_it_holds(tmp_path: Path) -> None:
