@@ -121,7 +121,11 @@ def _of_lines(
     for node in ast.walk(tree):
         if node in hints:
             continue
-        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, float | int)
+            and not isinstance(node.value, bool)
+        ):
             number = node.lineno
             line = source[number - 1]
             left = node.col_offset

@@ -14,7 +14,7 @@ import pytest
 
 from posefit.files import opencv_name
 from posefit.footage.source import kind_of, scene_of
-from posefit.footage.video import Video
+from posefit.footage.video import Video, _rate
 from tests.cases import each
 from tests.commands import error_of
 from tests.footage.conftest import EMPTY, SIZE, Film, film, iou, stack, truth
@@ -172,3 +172,23 @@ def test_a_picture_that_is_missing_is_held(filmed: Film, tmp_path: Path) -> None
         "2 of the frames 0 to 59 are missing, and are held" in guess
         for guess in scene.guesses
     )
+
+
+@each(
+    ("rate", "stated", "expected"),
+    [
+        (
+            30.0,
+            30.1,
+            30.1,
+        ),  # within half a percent: it is the stated one, over any length
+        (30.0, 30.3, 30.0),
+        (12.3, 60.0, 12.3),
+    ],
+)
+def test_the_stated_rate_is_kept_where_the_times_allow_it(
+    rate: float, stated: float, expected: float
+) -> None:
+    for seconds in (20, 200):
+        times = np.arange(round(seconds * rate) + 1) / rate
+        assert _rate(times, 0.0, stated) == pytest.approx(expected, rel=1e-9)
