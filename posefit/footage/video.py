@@ -334,10 +334,15 @@ def _rate(times: Array, off: float, stated: float) -> float:
     rate = intervals / lasted
     # the first and the last may be off by as much
     slack = max(STAMP + 2.0 * off, SAME_RATE * lasted)
-    for likely in (stated, float(round(rate)), round(rate * 1.001) / 1.001):
-        if likely > 0.0 and abs(intervals / likely - lasted) <= slack:
-            return likely
-    return rate
+
+    def miss(likely: float) -> float:
+        return abs(intervals / likely - lasted)
+
+    if stated > 0.0 and miss(stated) <= slack:
+        return stated
+    usual = [each for each in (float(round(rate)), round(rate * 1.001) / 1.001) if each]
+    nearest = min(usual, key=miss, default=rate)
+    return nearest if miss(nearest) <= slack else rate
 
 
 class VideoWriter:

@@ -5,7 +5,6 @@
 """
 
 import _signal  # type: ignore[import-not-found]
-import ctypes
 import os
 import pickle
 import random
@@ -33,7 +32,6 @@ _SIGNALS = sorted(
     signal.valid_signals()
     - {getattr(signal, name, None) for name in ("SIGKILL", "SIGSTOP")}
 )
-MERSENNE_BYTES = 624 * 4 + 4  # of its state: its words, and its place among them
 
 
 class _Process(SpawnProcess):
@@ -133,9 +131,8 @@ class _State:
         self._path = sys.path[:]
         self._handlers = _handlers()
         self._numbers = random.getstate()
-        self._bits = np.random.get_bit_generator()
-        self._legacy = np.random.get_state()  # noqa: NPY002
-        self._words = self._mersenne_words()
+        self._bits = np.random.get_bit_generator()  # type: ignore[attr-defined]
+        self._numpy = np.random.get_state()  # noqa: NPY002
 
     def restore(self) -> None:
         """Undo what has changed since."""
@@ -152,14 +149,9 @@ class _State:
                 if before is not None and now != before:
                     signal.signal(number, before)
         random.setstate(self._numbers)
-        if np.random.get_bit_generator() is not self._bits:
-            np.random.set_bit_generator(self._bits)
-        if self._mersenne_words() != self._words:
-            np.random.set_state(self._legacy)  # noqa: NPY002
-
-    def _mersenne_words(self) -> bytes:
-        """Return the memory of NumPy's global generator, a hundred times as fast as NumPy returns its state."""
-        return ctypes.string_at(self._bits.ctypes.state_address, MERSENNE_BYTES)
+        if np.random.get_bit_generator() is not self._bits:  # type: ignore[attr-defined]
+            np.random.set_bit_generator(self._bits)  # type: ignore[attr-defined]
+        np.random.set_state(self._numpy)  # noqa: NPY002
 
 
 def _handlers() -> list[Any]:

@@ -193,7 +193,7 @@ def _identity(
     if beside := [
         skeleton_file(Path(motion), options.asf)
         for motion in (*sources, *options.train)
-        if _is_captured(motion)
+        if isinstance(motion, str | Path) and _is_captured(motion)
     ]:
         values["asf"] = beside
     # a folder of that name is not read

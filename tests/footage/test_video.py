@@ -177,12 +177,13 @@ def test_a_picture_that_is_missing_is_held(filmed: Film, tmp_path: Path) -> None
 @each(
     ("rate", "stated", "expected"),
     [
-        (
-            30.0,
-            30.1,
-            30.1,
-        ),  # within half a percent: it is the stated one, over any length
+        # within half a percent: it is the stated one, over any length
+        (30.0, 30.1, 30.1),
         (30.0, 30.3, 30.0),
+        # of a whole rate and 1000 / 1001 of it, the nearer one
+        (24.0, 30.0, 24.0),
+        (24.0 / 1.001, 30.0, 24.0 / 1.001),
+        (60.0 / 1.001, 30.0, 60.0 / 1.001),
         (12.3, 60.0, 12.3),
     ],
 )
