@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
@@ -174,7 +174,7 @@ def _check_for_kind(
         )
 
 
-def _is_captured(motion: Footage) -> bool:
+def _is_captured(motion: Footage) -> TypeGuard[str | Path]:
     """Return whether a motion is an .amc file, whose skeleton is in another file."""
     return isinstance(motion, str | Path) and str(motion).lower().endswith(".amc")
 
