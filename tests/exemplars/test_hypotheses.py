@@ -1,24 +1,27 @@
 """Hypotheses of each frame: what steps cost, which go on, and people as no clip shows them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from posefit import Observation, exchanged_limbs, turned_poses
 from posefit.arrays import Array
+from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import (
     MAX_PART_COST,
     PARTS,
+    Counts,
     Hypotheses,
     jump_cost,
     step_costs,
 )
 from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.tracker import ExemplarTracker
+from tests.cases import each
 from tests.exemplars.conftest import Walk, walk_of
 
 BUDGET = 9760
@@ -186,7 +189,10 @@ def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs(
     np.testing.assert_array_equal(mended[kept], wrong[0, kept])
 
 
-def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views() -> None:
+@each(("alone", "weight"), [(False, 4.0), (True, 1.0)])
+def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views(
+    alone: bool, weight: float
+) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
     follower = ExemplarTracker(walk.task).hypotheses
     observation = walk.observations[0]
@@ -199,14 +205,30 @@ def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views() ->
 
     def apart(observation: Observation) -> float:
         totals = follower._joined(
-            FrameCosts(walk.task, observation), hypotheses, None, 1.0
+            FrameCosts(walk.task, observation, alone), hypotheses, None, 1.0
         )[0].totals
         return float(totals[1] - totals[0])
 
     off = follower._exemplars.nearest(poses, 1)[1][:, 0] / 0.05**2
-    clips = np.log1p(0.5 * off)  # times 1 in a first frame
+    clips = weight * np.log1p(0.5 * off)
     earlier = replace(observation, estimate=(poses[0], place[0]))
     np.testing.assert_allclose(
         apart(observation) - apart(earlier), 0.5 * (clips[1] - clips[0]), rtol=1e-6
     )
-    assert clips[1] > clips[0] + 0.25
+    assert clips[1] > clips[0] + 0.25 * weight
+
+
+def test_a_track_of_one_frame_has_all_its_evaluations_for_fresh_hypotheses() -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=2), (0.0,))
+
+    def counts_of(observations: Sequence[Observation], task: Task) -> Counts:
+        tracker = ExemplarTracker(task)
+        frames = tracker._beams(observations, np.random.default_rng(0))
+        return tracker.hypotheses.counts(next(iter(frames)).frame_costs)
+
+    one, two = walk.observations[:1], walk.observations[:2]
+    alone = counts_of(one, walk.task)
+    several = counts_of(two, walk.task)
+    assert alone.continued == 0
+    assert several.continued > 0
+    assert alone.fresh > several.fresh
