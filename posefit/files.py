@@ -35,10 +35,10 @@ def check_new(path: str | Path) -> None:
 def check_place(path: str | Path) -> None:
     """Raise InputError where `path` is in no folder, or in one that cannot be written to."""
     parent = Path(path).resolve().parent
-    if not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise InputError(
-            f"{path}: expected a place to write to, got one in {parent}, which is none"
-        )
+    if not parent.is_dir():
+        raise InputError(f"cannot write to {path}: {parent} is not a folder")
+    if not os.access(parent, os.W_OK):
+        raise InputError(f"cannot write to {path}: no permission to write in {parent}")
 
 
 def check_free(path: str | Path | None) -> None:

@@ -61,7 +61,10 @@ def checked_actions(
     they have another shape, or are not finite numbers.
     """
     try:
-        values = np.array(as_numpy("actions", actions)[0], dtype=np.float64)
+        given = np.asarray(as_numpy("actions", actions)[0])
+        if given.dtype.kind == "c":
+            raise TypeError("complex numbers")
+        values = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as mistake:
         raise error.InvalidAction(
             f"an action must be {shape[-1]} numbers, got {actions!r}"

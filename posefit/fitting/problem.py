@@ -81,7 +81,7 @@ def minimise(
     if not used:
         raise BudgetError(
             f"evaluations must hold one population of {len(proposals)}, "
-            f"got {problem.remaining_evaluations:g}"
+            f"got {problem.remaining_evaluations:.0f}"
         )
     if not np.isfinite(problem.best_cost):
         raise InputError(f"costs must be numbers, got none in {used} evaluations")
@@ -174,11 +174,12 @@ class Problem:
         rows = checked.reshape(-1, self.dimension)
         if len(rows) > self.remaining_evaluations:
             raise BudgetSpentError(
-                f"{self.id}: {self.remaining_evaluations:g} of {self.budget} evaluations are left, got {len(rows)}"
+                f"{self.id}: {self.remaining_evaluations:.0f} of {self.budget} evaluations are left, got {len(rows)}"
             )
         if self._repair is not None:
             rows = self._repair(rows)
-        costs = self.cost(rows)
+        # a copy: a cost function that works in place would change what is remembered
+        costs = self.cost(rows.copy())
         if not isinstance(costs, np.ndarray) or costs.shape != (len(rows),):
             came = getattr(costs, "shape", type(costs).__name__)
             raise TypeError(
@@ -195,8 +196,7 @@ class Problem:
 
         A call does this itself; it is for those who have the costs already, of several problems in one call.
         """
-        # nan is below nothing
-        # SAPSO (5)
+        # nan < x is False, so nan never becomes the best. SAPSO (5)
         for k in np.flatnonzero(costs < self.best_cost):
             if costs[k] < self.best_cost:
                 self.best_cost = float(costs[k])
@@ -207,7 +207,12 @@ class Problem:
     def checked(self, proposals: object) -> Array:
         """Return proposals (d,) or (n, d) as float64. Raises ValueError for anything else."""
         try:
-            checked = np.asarray(proposals, dtype=np.float64)
+            values = np.asarray(proposals)
+            if values.dtype.kind == "c":
+                raise InputError("proposals must be real, got complex numbers")
+            checked = np.asarray(values, dtype=np.float64)
+        except InputError:
+            raise
         except (TypeError, ValueError):
             raise InputError(
                 f"proposals must be numbers, got {quoted(proposals)}"

@@ -47,6 +47,7 @@ from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
 from posefit.reading import cut, existing, quoted
 
+PAGED = (".tif", ".tiff", ".gif", ".webp")  # images that may have several pages
 NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf")
 # files that a user may well name, what they hold, and what is read of that
 UNREAD = (
@@ -404,7 +405,8 @@ def _view(source: Any) -> Footage:
 def _frames(sources: Sequence[Any]) -> Masks | None:
     """Return the frames of one camera, image files or masks (H, W); None where these are anything else."""
     if all(_is_image(each) for each in sources):
-        return _images(*sources)
+        files = _images(*sources)
+        return None if _are_films(files) else files
     if not all(_is_array(each) for each in sources):
         return None
     masks = [_array(each) for each in sources]
@@ -414,6 +416,24 @@ def _frames(sources: Sequence[Any]) -> Masks | None:
     if len(shapes) > 1:
         raise InputError(f"masks must have one shape, got {', '.join(shapes)}")
     return np.stack(masks)
+
+
+def _are_films(files: Sequence[Path]) -> bool:
+    """Return whether image files are what several cameras took: several of them, each with several pages."""
+    if len(files) == 1:
+        return False
+    pages = [
+        page_count(file) if file.suffix.lower() in PAGED and file.is_file() else 1
+        for file in files
+    ]
+    if max(pages) == 1:
+        return False
+    if min(pages) == 1:
+        raise InputError(
+            "source must be images of one page each, or a file of several pages for "
+            f"each camera, got {files[pages.index(1)]} beside such a file"
+        )
+    return True
 
 
 def _is_named(source: Any) -> bool:

@@ -1,7 +1,7 @@
 """`posefit.track` and `posefit.fit`: a source becomes a scene, the options are completed, and the scene is tracked."""
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -60,11 +60,7 @@ def track(
     not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
     go to `progress`, by default a terminal or a notebook. Raises InputError for any mistake in the arguments or files.
     """
-    known = [option.name for option in fields(TrackOptions)]
-    if unknown := [name for name in options if name not in known]:
-        raise TypeError(
-            f"track has no option {unknown[0]!r}{suggestion(unknown[0], known)}"
-        )
+    _check_names("track", options, [option.name for option in fields(TrackOptions)])
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
     sources = _sources(source)
@@ -129,8 +125,17 @@ def fit(
     source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any
 ) -> Fit:
     """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
+    known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
+    _check_names("fit", options, ["frame", *known])
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
+
+
+def _check_names(function: str, options: Iterable[str], known: Sequence[str]) -> None:
+    """Raise TypeError for an option that a function does not have."""
+    if unknown := [name for name in options if name not in known]:
+        hint = suggestion(unknown[0], known)
+        raise TypeError(f"{function} has no option {unknown[0]!r}{hint}")
 
 
 def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:

@@ -393,3 +393,20 @@ def test_a_problem_knows_what_its_cost_function_knows(cost: SilhouetteCost) -> N
     with pytest.raises(AttributeError, match="Problem has no attribute 'colour'"):
         _ = problem.colour
     assert not hasattr(Problem(np.sum, LINE), "decode")
+
+
+def test_a_cost_function_that_works_in_place_changes_nobodys_proposals() -> None:
+    def emptied(proposals: Array) -> Array:
+        proposals[:] = 0.0
+        return np.full(len(proposals), 3.0)
+
+    problem = Problem(emptied, LINE)
+    proposals = np.array([[0.9], [0.7]])
+    problem(proposals)
+    assert proposals.tolist() == [[0.9], [0.7]]
+    assert problem.best.tolist() == [0.9]
+
+
+def test_proposals_are_real_numbers() -> None:
+    with pytest.raises(ValueError, match="must be real, got complex"):
+        Problem(lambda x: x[:, 0], LINE)(np.array([[0.5j]]))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from posefit.errors import InputError
 from posefit.footage.cleaning import cleaned
 from posefit.footage.readers import numbered, read_masks
-from posefit.footage.source import kind_of, scene_of
+from posefit.footage.source import kind_of, scene_of, sources_of
 from posefit.progress import Progress
 from tests.cases import each
 from tests.footage.conftest import ALL
@@ -48,6 +49,21 @@ def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) 
         f"{name}, page 3",
     ]
     np.testing.assert_array_equal(masks.silhouette(1).mask, walk[3])
+
+
+@each("suffix", [".tif", ".gif"])
+def test_several_files_of_pages_are_what_several_cameras_took(
+    walk: list[Any], tmp_path: Path, suffix: str
+) -> None:
+    first, *others = drawn(walk)
+    films = [tmp_path / f"{name}{suffix}" for name in "ab"]
+    for film in films:
+        first.save(film, save_all=True, append_images=others)
+    assert sources_of(films) == [(films[0],), (films[1],)]
+    single = tmp_path / f"c{suffix}"
+    first.save(single)
+    with pytest.raises(InputError, match=f"got .*c{suffix} beside such a file"):
+        sources_of([*films, single])
 
 
 @each("suffix", [".gif", ".webp", ".tif"])

@@ -244,7 +244,7 @@ MISTAKES = [
         "results --out DIR.html",
         "expected a new name or an earlier report, got something else",
     ),
-    ("results --out none/OUT.html", "expected a place to write to, got one in "),
+    ("results --out none/OUT.html", "none is not a folder"),
     (
         "results --out OUT.html --csv OTHER.html",
         "expected a new name or an earlier file of this kind, got something else",
@@ -261,7 +261,7 @@ MISTAKES = [
     ),
     (
         "results --out OUT.html --figures none/OUT",
-        "expected a place to write to, got one in ",
+        "none is not a folder",
     ),
     ("results --methods sapso", "got 'sapso'; did you mean 'sapso@pca'?"),
 ]
