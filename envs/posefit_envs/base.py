@@ -44,7 +44,7 @@ def image_spaces(world: World) -> tuple[Box, Box]:
 
 
 def checked_world(env: object, arguments: Mapping[str, Any]) -> World:
-    """Return the world of an environment's arguments, those aside that are its own. Raises ArgumentError, TypeError."""
+    """Return the world of the arguments that are not the environment's own. Raises ArgumentError, TypeError."""
     parameters = inspect.signature(type(env)).parameters.values()
     own = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     world = world_of(own, **arguments)

@@ -23,8 +23,8 @@ from posefit.plugin import (
     wrap,
 )
 
-# ours: of rand() for a particle that is no pose to the prior; then it stays.
-# Interpretation S7
+# ours: how often a step that the prior refuses is drawn again; after that the particle
+# stays where it is. Interpretation S7
 REDRAWS = 10
 
 Rows = NDArray[np.int64]
@@ -79,8 +79,10 @@ class SAPSO:
         self.alpha = alpha
         # the positions to be evaluated next; c counts iterations, and the paper's own c is c ln(10 A) / C
         self.moved = draw_population(space, rng, population_size)  # SAPSO A1.1
-        self.x, self.cost = self.moved.copy(), np.full(population_size, np.inf)
-        self.pbest, self.pbest_cost = self.x.copy(), self.cost.copy()
+        self.x = self.moved.copy()
+        self.cost = np.full(population_size, np.inf)
+        self.pbest = self.x.copy()
+        self.pbest_cost = self.cost.copy()
         self.v = first_velocities(space, rng, population_size, alpha)
 
     def ask(self) -> Array:
@@ -110,9 +112,11 @@ class SAPSO:
             chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))
         # SAPSO A1.2d
         accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))
-        self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
+        self.x[accepted] = self.moved[accepted]
+        self.cost[accepted] = costs[accepted]
         better = self.cost < self.pbest_cost  # SAPSO A1.2b
-        self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
+        self.pbest[better] = self.x[better]
+        self.pbest_cost[better] = self.cost[better]
         return int(accepted.sum())
 
     def inertia(self) -> float:
@@ -172,9 +176,9 @@ def redrawn(
 ) -> tuple[Array, Array]:
     """Return velocities and positions (n, d) after a step from x (n, d) that is allowed. Interpretation S7.
 
-    A particle whose step is not allowed has rand() drawn again `redraws` times, all at once; the first that is allowed
-    counts, and where none is the particle stays, at rest. `step` returns the velocities and positions (k, d) of some
-    particles (k,), and `allowed` which of these are (k,); the paper's letter asks that of velocities, too.
+    For a particle whose step is not allowed, `redraws` further steps are drawn in one call, and the first allowed one
+    is taken; without one the particle stays, at rest. `step` returns the velocities and positions (k, d) of some particles
+    (k,), and `allowed` says which of them are allowed (k,). The paper's letter limits velocities as well as positions.
     """
     v, moved = step(np.arange(len(x)))
     broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c

@@ -88,8 +88,8 @@ def minimise(
     if not budget_known and 2 * problem.evaluations < problem.budget:
         warnings.warn(
             f"the optimiser ended its search after {used} of {problem.budget} "
-            "evaluations: if its schedule follows the budget, build it with it, as "
-            "factory(space, rng, evaluations=...) or iterations=...",
+            "evaluations: if its schedule follows the budget, pass the budget to its "
+            "factory, as factory(space, rng, evaluations=...) or iterations=...",
             stacklevel=2,
         )
     return problem  # SAPSO A1.3
@@ -343,9 +343,9 @@ class Problems:
         """Return the problem of a row for a search of its own: nothing of it is evaluated yet."""
         return self._makers[range(len(self))[row]]()
 
-    def begin(self, row: int, make: Callable[[], Problem]) -> None:
-        """Let a row be another problem, of which nothing is evaluated yet; it is made when it is asked for."""
-        self._makers[row] = make
+    def begin(self, row: int, make_problem: Callable[[], Problem]) -> None:
+        """Start a row afresh: its count and its best are reset, and `make_problem` makes its problem when asked for."""
+        self._makers[row] = make_problem
         self.evaluations[row] = 0
         self.best_costs[row] = np.inf
 

@@ -469,9 +469,9 @@ def _array(source: Any) -> Any:
 def kind_of(source: Footage) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video.
 
-    A name with folders in it and no suffix is a folder's, even where there is none. Images are a film where there are
-    several, or pages, and the first is a picture in many colours; else they are masks. Raises InputError for a file
-    that is no source by its name.
+    A path with a separator and no suffix is read as a folder, even if it does not exist. Images are a film if there
+    are several, or pages, and the first is a picture in many colours; else they are masks. Raises InputError for a
+    file whose name says that it is no source.
     """
     if isinstance(source, np.ndarray):
         return "masks"

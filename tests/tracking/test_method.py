@@ -446,7 +446,7 @@ def test_a_search_that_ends_long_before_its_budget_says_so(name: str) -> None:
     optimiser = registry().optimiser(name)(Toy(9), np.random.default_rng(0))
     with pytest.warns(
         UserWarning,
-        match="ended its search after 24.. of 100000 evaluations: .* build it with it",
+        match="ended its search after 24.. of 100000 evaluations: .* pass the budget to its factory",
     ):
         minimise(Problem(sphere, Toy(9), 100_000), optimiser)
 
