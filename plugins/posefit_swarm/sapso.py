@@ -177,8 +177,8 @@ def redrawn(
     """Return velocities and positions (n, d) after a step from x (n, d) that is allowed. Interpretation S7.
 
     For a particle whose step is not allowed, `redraws` further steps are drawn in one call, and the first allowed one
-    is taken; without one the particle stays, at rest. `step` returns the velocities and positions (k, d) of some particles
-    (k,), and `allowed` says which of them are allowed (k,). The paper's letter limits velocities as well as positions.
+    is taken; without one the particle stays, at rest. `step` returns the velocities and positions (k, d) of some
+    particles (k,), and `allowed` says which of them are allowed (k,). The paper's letter limits velocities as well.
     """
     v, moved = step(np.arange(len(x)))
     broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c
