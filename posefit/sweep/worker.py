@@ -21,6 +21,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
 import numpy as np
+from numpy.random import mtrand
 
 from posefit.errors import PluginWarning
 from posefit.limits import end_with_parent
@@ -133,7 +134,7 @@ class _State:
         self._path = sys.path[:]
         self._handlers = _handlers()
         self._numbers = random.getstate()
-        self._bits = np.random.get_bit_generator()
+        self._bits = mtrand.get_bit_generator()
         self._legacy = np.random.get_state()  # noqa: NPY002
         self._words = self._mersenne_words()
 
@@ -152,8 +153,8 @@ class _State:
                 if before is not None and now != before:
                     signal.signal(number, before)
         random.setstate(self._numbers)
-        if np.random.get_bit_generator() is not self._bits:
-            np.random.set_bit_generator(self._bits)
+        if mtrand.get_bit_generator() is not self._bits:
+            mtrand.set_bit_generator(self._bits)
         if self._mersenne_words() != self._words:
             np.random.set_state(self._legacy)  # noqa: NPY002
 
