@@ -20,6 +20,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
 import numpy as np
+from numpy.random import mtrand
 
 from posefit.errors import PluginWarning
 from posefit.limits import end_with_parent
@@ -131,7 +132,7 @@ class _State:
         self._path = sys.path[:]
         self._handlers = _handlers()
         self._numbers = random.getstate()
-        self._bits = np.random.get_bit_generator()  # type: ignore[attr-defined]
+        self._bits = mtrand.get_bit_generator()
         self._numpy = np.random.get_state()  # noqa: NPY002
 
     def restore(self) -> None:
@@ -149,8 +150,8 @@ class _State:
                 if before is not None and now != before:
                     signal.signal(number, before)
         random.setstate(self._numbers)
-        if np.random.get_bit_generator() is not self._bits:  # type: ignore[attr-defined]
-            np.random.set_bit_generator(self._bits)  # type: ignore[attr-defined]
+        if mtrand.get_bit_generator() is not self._bits:
+            mtrand.set_bit_generator(self._bits)
         np.random.set_state(self._numpy)  # noqa: NPY002
 
 
