@@ -196,8 +196,8 @@ class Problem:
 
         A call does this itself; it is for those who have the costs already, of several problems in one call.
         """
-        # nan < x is False, so nan never becomes the best. SAPSO (5)
-        for k in np.flatnonzero(costs < self.best_cost):
+        # nan < x is False, so nan never becomes the best
+        for k in np.flatnonzero(costs < self.best_cost):  # SAPSO (5)
             if costs[k] < self.best_cost:
                 self.best_cost = float(costs[k])
                 used = self.evaluations + int(k) + 1
