@@ -33,7 +33,7 @@ _BODY = np.uint16(BODY)
 LARGEST_REMEMBERED = 2 * 64 * 64
 
 
-class Scene(NamedTuple):
+class SceneRow(NamedTuple):
     """What a stage stores of one observation: the columns of a row."""
 
     centre: Array  # (d,) of the box
@@ -54,12 +54,12 @@ class Scene(NamedTuple):
     masks: NDArray[np.uint8]  # (height, bytes, views) the silhouettes, a bit a pixel
 
     @staticmethod
-    def of(cost: SilhouetteCost, truth: Array) -> "Scene":
+    def of(cost: SilhouetteCost, truth: Array) -> "SceneRow":
         """Return the scene of an observation, and the true pose (66,) in it."""
         cameras = cost.cameras
         silhouettes = cost.silhouettes
         masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
-        return Scene(
+        return SceneRow(
             centre=cost.space.centre,
             half=cost.space.half,
             anchor=cost.space.anchor,
@@ -79,7 +79,7 @@ class Scene(NamedTuple):
         )
 
 
-def first_scene(world: World, number: int) -> Scene:
+def first_scene(world: World, number: int) -> SceneRow:
     """Return the scene of an instance's first frame; small ones are remembered."""
     width, height = world.size
     remembers = width * height * len(world.view_degrees) <= LARGEST_REMEMBERED
@@ -87,9 +87,9 @@ def first_scene(world: World, number: int) -> Scene:
 
 
 @lru_cache(maxsize=len(TRAINING))
-def _first_scene(world: World, number: int) -> Scene:
+def _first_scene(world: World, number: int) -> SceneRow:
     made = instance(world, number)
-    return Scene.of(made.cost(0, first_space(world, made)), made.truth.poses[0])
+    return SceneRow.of(made.cost(0, first_space(world, made)), made.truth.poses[0])
 
 
 class Drawn(NamedTuple):
@@ -120,7 +120,7 @@ class Stage:
         self._prior = world.learned
         self._translation = world.translation
         self._chain = body_of(world.motion[0]).skeleton.chain
-        self._columns = Scene(
+        self._columns = SceneRow(
             centre=np.empty((rows, d)),
             half=np.empty((rows, d)),
             anchor=np.empty((rows, 3)),
@@ -153,7 +153,7 @@ class Stage:
         """The true poses (n, 66)."""
         return self._columns.truth
 
-    def set_scene(self, row: int, scene: Scene) -> None:
+    def set_scene(self, row: int, scene: SceneRow) -> None:
         """Let a row be a scene of the world, without a body."""
         self._has_body[row] = False
         columns: Sequence[NDArray[Any]] = self._columns

@@ -21,7 +21,7 @@ from posefit_envs.base import (
     row_of,
 )
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Rows, Scene, Stage
+from posefit_envs.stage import Rows, SceneRow, Stage
 from posefit_envs.world import Image, Instance, World, checked, instance
 
 FRAMES = 20
@@ -46,10 +46,10 @@ class Sequence:
         cost = self.instance.cost(self.frame, space)
         return Problem(cost, space, self.instance.task.evaluations)
 
-    def scene(self, problem: Problem) -> Scene:
+    def scene(self, problem: Problem) -> SceneRow:
         """Return the scene of the current frame's problem."""
         cost: Any = problem.cost
-        return Scene.of(cost, self.instance.truth.poses[self.frame])
+        return SceneRow.of(cost, self.instance.truth.poses[self.frame])
 
     def commit(self, proposal: Array) -> bool:
         """Commit a proposal (d,) to the current frame and go on; return whether it was the last frame."""
