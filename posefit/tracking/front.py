@@ -36,6 +36,7 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
+_ARGUMENTS = ("out", "force", "resume", "progress")  # of a track, besides its options
 # options that may name files, whose content counts
 _FILES = ("source", "train", "asf", "camera", "extraction")
 
@@ -126,7 +127,7 @@ def fit(
 ) -> Fit:
     """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
-    _check_names("fit", options, ["frame", *known])
+    _check_names("fit", options, [*_ARGUMENTS, *known])
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
 
