@@ -278,7 +278,7 @@ def test_a_file_that_changed_after_it_was_planned_is_not_followed(
     spec = {**SMALL, "motion": str(amc), "frames": 1, "fps": 120}
     cell = cell_of(spec)
     assert cell.files == {str(path): digest_of(path) for path in (amc, asf)}
-    assert run_cell(cell).row["status"] == "done"
+    assert run_cell(cell)["status"] == "done"
     with pytest.raises(ValueError, match=r"frames must be at most \d+, the length of"):
         cell_of({**spec, "frames": 500})
     amc.write_text(amc.read_text() + "\n")
@@ -336,7 +336,7 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
         cell.version
         == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     )
-    row = run_cell(cell).row
+    row = run_cell(cell)
     # it does not search
     assert (row["prior_floor_degrees"], row["trace"]) == (
         None,
