@@ -4,6 +4,7 @@ import hashlib
 import json
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -247,7 +248,8 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     for planned in cell.version.split(", "):
         if installed := other_version(planned):
             raise InputError(f"a worker must have {planned}, got {installed}")
-    figures = cell.measure()
+    with _guarded(cell):
+        figures = cell.measure()
     row = {
         "key": cell.key,
         "spec": cell.spec,
@@ -262,6 +264,24 @@ def run_cell(cell: Cell) -> dict[str, Any]:
             f"what {cell.method} measures must be finite numbers, got some that are not"
         ) from None
     return row
+
+
+def _guarded(cell: Cell) -> AbstractContextManager[None]:
+    """Return a context that undoes what a plugin from elsewhere does to libraries; posefit's own do nothing to them."""
+    from posefit.sweep.worker import functions_kept
+
+    if _own_origins().issuperset(cell.version.split(", ")[1:]):
+        return nullcontext()
+    return functions_kept()
+
+
+@lru_cache(maxsize=1)
+def _own_origins() -> frozenset[str]:
+    """Return the origins of what posefit's own plugins offer."""
+    from posefit.registry import PROJECT, registry
+
+    offers = (offer for named in registry().offers.values() for offer in named.values())
+    return frozenset(offer.origin for offer in offers if offer.distribution == PROJECT)
 
 
 def other_version(origin: str) -> str | None:

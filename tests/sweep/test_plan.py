@@ -75,6 +75,26 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
     ]
 
 
+def test_each_optimiser_is_paired_with_each_prior() -> None:
+    few = {"prior": "pca", "settings": {"components": 4}}
+    cold = {"optimiser": "sapso", "settings": {"sapso.cooling": 0.8}}
+    product = {
+        "optimisers": ["cma", cold],
+        "priors": ["full", few],
+        "motions": ["walk"],
+    }
+    made = [(cell.method, dict(cell.settings)) for cell in planned(product=product)]
+    assert made == [
+        ("cma@full", {}),
+        ("cma@pca", {"pca.components": 4}),
+        ("sapso@full", {"sapso.cooling": 0.8}),
+        ("sapso@pca", {"pca.components": 4, "sapso.cooling": 0.8}),
+    ]
+    grid = {"pca.components": [4, 5]}
+    product = {"optimisers": ["cma"], "priors": ["pca"], "motions": ["walk"]}
+    assert len(planned(product=product, grid=grid)) == 2
+
+
 def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant_has_a_name() -> (
     None
 ):
@@ -128,6 +148,10 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"defaults": [1]}, "defaults must be a table, got"),
         ({"cells": 3}, "cells must be a list of tables, got 3"),
         ({"cells": [{"method": "sapso@pca", "motion": "walk"}]}, "must differ, got sapso@pca on walk, .* seed 0 twice"),
+        ({"product": {**PRODUCT, "priors": ["pca"]}}, "product must hold methods, or both optimisers and priors, got methods, motions, priors"),
+        ({"product": {"optimisers": ["cma"]}}, "both optimisers and priors, got optimisers"),
+        ({"product": {"optimisers": ["cma"], "priors": [{"name": "pca"}]}}, "an entry of priors must hold prior, settings, got 'name'"),
+        ({"product": {"optimisers": ["cma"], "priors": [3]}}, "an entry of priors must be a name"),
         ({"product": {**PRODUCT, "methods": ["sapzo@pca"]}}, "did you mean 'sapso'"),
         ({"product": {**PRODUCT, "methods": ["vsnm"]}}, "method must be OPTIMISER@PRIOR, .*, got 'vsnm'; did you mean 'vsmm'"),
         ({"product": {**PRODUCT, "views": [[]]}}, "view_degrees must be 1 to 100 angles, got 0"),

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 from pebble import ProcessExpired, ProcessFuture
 
@@ -254,6 +255,21 @@ def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
     # the random numbers go on as if no cell had set their seed: none takes any itself
     assert len({tuple(states[-1]) for states in found}) == 1
     wait_until(lambda: not any(is_running(states[0]) for states in found))
+
+
+class Vandal(TrackCell):
+    """A cell whose method replaces functions and a class of libraries, as a careless plugin does."""
+
+    def measure(self) -> dict[str, Any]:
+        np.linalg.norm = json.dumps = np.random.Generator = print  # type: ignore[assignment,misc]
+        return {}
+
+
+def test_functions_that_a_plugin_from_elsewhere_replaces_are_put_back() -> None:
+    before = np.linalg.norm, json.dumps, np.random.Generator
+    cell = Vandal("random@pca", "walk", ("walk-a",))
+    run_cell(replace(cell, version=f"{cell.version}, elsewhere 1.0 0123abcd"))
+    assert (np.linalg.norm, json.dumps, np.random.Generator) == before
 
 
 def wait_until(true: Callable[[], bool]) -> None:
