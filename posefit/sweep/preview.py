@@ -122,7 +122,7 @@ class _Times:
             return _seconds(self._first) / _amount(self._first) * self._amount
         short = replace(self._first, frames=SHORT)
         longer = replace(self._first, frames=LONGER)
-        _seconds(short)  # imports and compiles
+        _seconds(longer)  # imports and compiles
         of_short = _seconds(short)
         slope = (_seconds(longer) - of_short) / (_amount(longer) - _amount(short))
         slope = max(slope, 0.0)
