@@ -278,7 +278,8 @@ def _guarded(cell: Cell) -> AbstractContextManager[None]:
 @lru_cache(maxsize=1)
 def _own_origins() -> frozenset[str]:
     """Return the origins of what posefit's own plugins offer."""
-    from posefit.registry import PROJECT, registry
+    from posefit.hooks import PROJECT
+    from posefit.registry import registry
 
     offers = (offer for named in registry().offers.values() for offer in named.values())
     return frozenset(offer.origin for offer in offers if offer.distribution == PROJECT)
