@@ -5,11 +5,11 @@ means the same instance on every machine and in every version, provided that the
 settings are the same. Numbers 0 to 9,999 are for training and tuning; 10,000 to 19,999
 are held out. The table says what belongs to a number, and what the number decides.
 
-| numbered | other settings | decided by the number | stream |
+| numbered | settings | decided by the number | stream |
 |---|---|---|---|
-| motion of a sweep, an environment | motion, frames | speed, phase, camera turn | motion |
-| view of it in an environment | arguments | noise, yaw, place, fitted body | scene |
-| problem of a suite | function, dimension | person, pose, cameras, noise | suite |
+| motion of a sweep, an environment | motion, frames | speed, phase, view | motion |
+| scene of an environment | arguments | noise, guesses of yaw and place, body | scene |
+| problem of a suite | function, dimension | person, pose, cameras, box, noise | suite |
 
 So a sweep's instance 17 of "walk" is the motion of an environment's instance 17 of
 "walk", and both differ from instance 17 of a suite's function. Each row has a separate
