@@ -153,11 +153,8 @@ class Registry:
 
     def rivals(self, offer: Offer) -> list[Plugin]:
         """Return the plugins that are left out because an offer has their name."""
-        return [
-            plugin
-            for plugin in self.plugins
-            if _taken(f"{offer.kind} {offer.name!r}") in plugin.cause
-        ]
+        cause = _taken(f"{offer.kind} {offer.name!r}")
+        return [plugin for plugin in self.plugins if cause in plugin.cause]
 
     @property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
@@ -295,16 +292,11 @@ def plugins_of(
 
     A plugin in a group whose name only begins with posefit's is included as broken.
     """
-    groups = [
-        group
-        for group in entry_points().groups
-        if re.sub("[-_. ]", "", group.lower()).startswith(PROJECT)
-    ]
-    return load(
-        [point for group in groups for point in entry_points(group=group)],
-        kinds,
-        taken=taken,
-    )
+    points = list[EntryPoint]()
+    for group in entry_points().groups:
+        if re.sub("[-_. ]", "", group.lower()).startswith(PROJECT):
+            points += entry_points(group=group)
+    return load(points, kinds, taken=taken)
 
 
 def version_of(origins: Iterable[str]) -> str:

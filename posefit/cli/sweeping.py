@@ -76,9 +76,10 @@ def sweep(
         # the engine starts before the folder is made: if it fails, there is no folder
         tally = command.swept(cells, out, start(), tell, shard=shard, **how)
     print_result(command.tally_lines(tally, out), {"out": out, **vars(tally)}, as_json)
-    click.get_current_context().exit(
-        130 if tally.stopped else 1 if tally.quarantined else 0
-    )
+    context = click.get_current_context()
+    if tally.stopped:
+        context.exit(130)
+    context.exit(1 if tally.quarantined else 0)
 
 
 @click.command()

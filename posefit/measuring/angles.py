@@ -110,10 +110,9 @@ def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
     pole = level < _LEVEL
     elevation = np.arctan2(level, relative[..., 1, 1])  # WU2005 (shoulder)
     plane = np.where(pole, 0.0, np.arctan2(-relative[..., 0, 1], -relative[..., 2, 1]))
-    alone = np.arctan2(relative[..., 0, 2], relative[..., 0, 0])
-    rotation = np.where(
-        pole, alone, np.arctan2(-relative[..., 1, 0], relative[..., 1, 2])
-    )
+    rotation_at_pole = np.arctan2(relative[..., 0, 2], relative[..., 0, 0])
+    rotation = np.arctan2(-relative[..., 1, 0], relative[..., 1, 2])
+    rotation = np.where(pole, rotation_at_pole, rotation)
     return np.stack([plane, elevation, rotation], axis=-1)
 
 

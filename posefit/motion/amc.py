@@ -192,13 +192,11 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
 
 def _frame_number(line: Line) -> int | None:
     """Return the number on a line that holds nothing else, or None."""
-    alone = (
-        len(line.words) == 1
-        and line.key.isascii()
-        and line.key.isdigit()
-        and len(line.key) < 10
-    )
-    return int(line.key) if alone else None
+    word = line.key
+    if len(line.words) != 1 or len(word) >= 10:
+        return None
+    # isdigit alone also accepts digits that int() does not
+    return int(word) if word.isascii() and word.isdigit() else None
 
 
 def _rate(line: Line, word: str) -> float:

@@ -154,59 +154,46 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
         # a limb may end at an ankle or a wrist without a name
         for above, end in (("shin", "foot"), ("forearm", "hand")):
             last = limbs.get((side, above))
-            ends = [
-                child
-                for child, parent in enumerate(parents)
-                if parent == last and not names[child]
-            ]
-            if ends and (side, end) not in limbs:
-                limbs[side, end] = ends[0]
+            for child, parent in enumerate(parents):
+                if parent == last and not names[child]:
+                    limbs.setdefault((side, end), child)
     if missing := _missing(limbs, names, paths):
         return missing
     legs = [limbs[side, "thigh"] for side in ("left", "right")]
     arms = [limbs[side, "arm"] for side in ("left", "right")]
     hips = _common(paths, legs)
-    heads = [
-        node
-        for node, part in enumerate(parts)
-        if part.part in _MIDDLE["head"] and not part.side
-    ]
-    head = min(
-        heads,
-        key=lambda node: (
-            parts[node].part != "head",
-            parts[node].others,
-            len(paths[node]),
-        ),
-        default=None,
-    )
-    if (
-        hips is None
-        or (chest := _common(paths, arms if head is None else [*arms, head])) is None
-    ):
+    heads = []
+    necks = []
+    for node, part in enumerate(parts):
+        if part.part in _MIDDLE["head"] and not part.side:
+            heads.append(node)
+        if part.part == "neck" and not part.side:
+            necks.append(node)
+
+    def unlikeness_to_head(node: int) -> tuple[bool, int, int]:
+        part = parts[node]
+        return part.part != "head", part.others, len(paths[node])
+
+    head = min(heads, key=unlikeness_to_head, default=None)
+    above_chest = arms if head is None else [*arms, head]
+    chest = _common(paths, above_chest)
+    if hips is None or chest is None:
         return ["a root from which legs, arms and head go"]
     if hips not in paths[chest]:
         return [f"arms and head above the hips ({names[hips]!r})"]
-    between = paths[chest][paths[chest].index(hips) + 1 :]
-    if head is None:
-        necks = [
-            node
-            for node, part in enumerate(parts)
-            if part.part == "neck" and not part.side
-        ]
-        neck = min(necks, key=lambda node: len(paths[node]), default=None)
-        bearing = (
-            []
-            if neck is None or chest not in paths[neck]
-            else paths[neck][paths[neck].index(chest) + 1 :]
-        )
-    else:
-        bearing = paths[head][paths[head].index(chest) + 1 : -1]
+    spine = paths[chest][paths[chest].index(hips) + 1 :]
+    neck: list[int] = []
+    if head is not None:
+        neck = paths[head][paths[head].index(chest) + 1 : -1]
+    elif necks:
+        lowest = min(necks, key=lambda node: len(paths[node]))
+        if chest in paths[lowest]:
+            neck = paths[lowest][paths[lowest].index(chest) + 1 :]
     # the shoulders of Biped hang from the neck
-    if parts[chest].part == "neck" and between:
-        bearing = [between[-1], *bearing]
-        between = between[:-1]
-    return Joints(limbs, hips, chest, between, bearing, head)
+    if parts[chest].part == "neck" and spine:
+        neck = [spine[-1], *neck]
+        spine = spine[:-1]
+    return Joints(limbs, hips, chest, spine, neck, head)
 
 
 # pairs of nodes that may have names of the same joint: `leg` and below it `knee`,
@@ -250,7 +237,8 @@ def _limbs(
         absent = below if joint == above else above
         two = nodes[joint]
         if not nodes[absent] and len(two) > 1 and two[0] in paths[two[1]]:
-            nodes[above], nodes[below] = two[:1], two[1:]
+            nodes[above] = two[:1]
+            nodes[below] = two[1:]
     return {joint: named[0] for joint, named in nodes.items() if named}
 
 

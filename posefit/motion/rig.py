@@ -98,7 +98,8 @@ class Rig:
         """
         if tip is None:
             return _Bone(node)
-        (turns, places), (rest_turns, rest_places) = self.moving, self.rest
+        turns, places = self.moving
+        rest_turns, rest_places = self.rest
         at = share * tip
         return _Bone(
             node,

@@ -51,16 +51,14 @@ class PluginCase:
 def construction(case: PluginCase) -> None:
     """A factory takes the arguments of its kind, and keyword-only settings."""
     parameters = inspect.signature(case.factory).parameters
-    kinds = [parameter.kind for parameter in parameters.values()]
-    expect(
-        inspect.Parameter.VAR_KEYWORD not in kinds,
-        "settings must be named, got **settings that swallow mistakes",
-    )
-    by_position = [
-        name
-        for name, kind in zip(parameters, kinds, strict=True)
-        if kind is not inspect.Parameter.KEYWORD_ONLY
-    ]
+    by_position = []
+    for name, parameter in parameters.items():
+        expect(
+            parameter.kind is not inspect.Parameter.VAR_KEYWORD,
+            "settings must be named, got **settings that swallow mistakes",
+        )
+        if parameter.kind is not inspect.Parameter.KEYWORD_ONLY:
+            by_position.append(name)
     taken = ", ".join(case.arguments)
     more = ", ".join(by_position[len(case.arguments) :])
     came = f"({', '.join(by_position)})"

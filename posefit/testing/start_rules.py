@@ -92,7 +92,9 @@ def several_views(case: Case) -> None:
     """A start survives several cameras, and views of a part of the person or none."""
     task, (observation, *_) = images()
     # in this view the feet are below the image
-    (near,), parts = scene()[0].cameras, scene()[2][0].silhouettes
+    near_task, _, near_observations = scene()
+    (near,) = near_task.cameras
+    parts = near_observations[0].silhouettes
     whole = observation.silhouettes
     empty = [Silhouette.of(np.zeros(SIZE[::-1], dtype=bool))]
     for cameras, shown in (
@@ -161,7 +163,8 @@ def gain(case: Case) -> str:
 
 def speed(case: Case) -> str:
     """A frame takes less than two seconds."""
-    start, (observation, *_) = case.build(), images()[1]
+    start = case.build()
+    observation = images()[1][0]
     return check_speed(
         "a frame", MAX_SECONDS, lambda _: len([start.posterior(observation)])
     )
