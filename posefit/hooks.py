@@ -177,6 +177,6 @@ def posefit_register_segmenters(register: RegisterSegmenter) -> Any:
 def posefit_register_commands(register: RegisterCommand) -> Any:
     """Call `register(command)` for each command.
 
-    A command is a `click.Command` or a group of commands. If it raises a ValueError or
-    an ImportError, or misses a file, the user sees one line and exit status 2.
+    A command is a `click.Command` or a group of commands. A click.UsageError, an
+    ImportError or a missing file becomes one line for the user, with exit status 2.
     """

@@ -14,7 +14,7 @@ from posefit.cli.output import print_result, results_alone
 def plugins(context: click.Context, as_json: bool) -> None:
     """List the installed optimisers, priors, trackers, starts and segmenters.
 
-    With their settings; `show NAME` explains the settings of one.
+    The list has their settings; `show NAME` explains the settings of one.
     """
     if context.invoked_subcommand is not None:
         return
