@@ -48,9 +48,7 @@ def test_limits_widen_where_a_training_pose_passes_them_or_are_the_training_rang
 def test_a_skeleton_without_limits_is_named() -> None:
     average = built_in.average_skeleton()
     bare = Skeleton("bare", average.offsets, average.axes, average.channels)
-    rule = (
-        "limits must be training where the skeleton states no joint limits, got asf and"
-    )
+    rule = "limits must be training if the skeleton states no joint limits, got asf and"
     for skeleton, name in ((bare, "bare"), (None, "no skeleton")):
         with pytest.raises(ValueError, match=f"{rule} {name}"):
             Full().fit(angles("walk-a"), skeleton)
