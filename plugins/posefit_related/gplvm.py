@@ -69,7 +69,7 @@ class GPLVM:
 
     Settings:
         components: dimensions of a latent, 1 or more.
-            poses: largest number of training poses to use, 20 or more.
+        poses: largest number of training poses to use, 20 or more.
     """
 
     low: Array  # (m,)

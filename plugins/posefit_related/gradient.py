@@ -37,7 +37,7 @@ class Gradient:
 
     Settings:
         turn_degrees: standard deviation of an angle from its prediction, above 0.
-            damping: share of the velocity that the prediction retains, 0 or more.
+        damping: share of the velocity that the prediction retains, 0 or more.
     """
 
     def __init__(

@@ -54,7 +54,7 @@ class IsomapPrior:
 
     Settings:
         components: dimensions of a latent, 1 or more.
-            poses: largest number of training poses to use, 20 or more.
+        poses: largest number of training poses to use, 20 or more.
     """
 
     low: Array  # (m,)
