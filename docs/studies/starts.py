@@ -69,7 +69,7 @@ class Image:
     mask: Mask
 
     def errors_mm(self, joints: Array) -> Array:
-        """Return the mean distances (n,) of joints (n, 27, 3), with roots at one point."""
+        """Return the mean distances (n,) of joints (n, 27, 3), roots at one point."""
         truth = self.body.skeleton.joints(self.pose[None])[0]
         away = np.linalg.norm((joints - joints[:, :1]) - (truth - truth[0]), axis=2)
         return np.asarray(1000.0 * away.mean(axis=1))
@@ -275,7 +275,7 @@ def single_images() -> None:
 
 @main.command()
 def tracks() -> None:
-    """Print how many tracks of walks and turns fail with unknown first yaw and place."""
+    """Print how many tracks of walks and turns fail, with yaw and place unknown."""
     errors = []
     for clip, view in product((*GROUPS[WALKS], *GROUPS["turns"]), SIDES):
         cell = cell_of(
