@@ -399,11 +399,10 @@ def landmarks_of(motion: Motion, camera: Camera, rng: np.random.Generator) -> Ar
         now = False
         for k in range(len(motion)):
             leave = 1.0 / EXCHANGE_FRAMES
-            now = (
-                rng.random() >= leave
-                if now
-                else rng.random() < leave * share / (1.0 - share)
-            )
+            # so that a share of the frames is exchanged in the long run
+            enter = leave * share / (1.0 - share)
+            chance = rng.random()
+            now = chance >= leave if now else chance < enter
             exchanged[k] = now
         joints[np.ix_(exchanged, group)] = joints[np.ix_(exchanged, OTHER_SIDE[group])]
     known = np.isin(np.arange(len(JOINTS)), np.concatenate(GROUPS))
@@ -428,11 +427,9 @@ def measured(folder: Path, shot: Shot) -> dict[str, Any]:
             damaged(who.mask(camera, k), shadow, rim, rng)
             for k in range(len(who.motion))
         ]
-        marks: dict[str, Any] = (
-            {"landmarks": landmarks_of(who.motion, camera, rng)}
-            if shot.landmarks
-            else {}
-        )
+        marks: dict[str, Any] = {}
+        if shot.landmarks:
+            marks = {"landmarks": landmarks_of(who.motion, camera, rng)}
         paths.append(folder / f"{shot.name}-{number}.npz")
         np.savez_compressed(
             paths[-1], masks=np.array(masks), fps=np.array(who.motion.fps), **marks

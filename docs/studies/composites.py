@@ -64,13 +64,14 @@ def track_figures(track: Track, situation: Situation, truth: Masks) -> dict[str,
     swapped = nearer_mirrored(true.joints, estimate.joints)
     unknown = track.table["unknown_sides"]
     known = seen & (unknown == 0.0)
+    said_unknown = None
+    if np.isfinite(unknown[seen]).any():
+        said_unknown = float((unknown[seen] == 1.0).mean())
     return {
         "mpjpe_mm": float(mpjpe[seen].mean()),
         "lost": float((mpjpe[seen] > LOST_MM).mean()),
         "swapped": float(swapped[seen].mean()),
-        "said_unknown": float((unknown[seen] == 1.0).mean())
-        if np.isfinite(unknown[seen]).any()
-        else None,
+        "said_unknown": said_unknown,
         "known_wrong": float(swapped[known].mean()) if known.any() else None,
         **angle_errors(true, clinical_angles(estimate.skeleton, estimate.poses), seen),
     }

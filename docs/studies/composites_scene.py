@@ -479,7 +479,8 @@ def cycle(motion: Motion) -> tuple[int, int]:
 
 
 def facing_elsewhere(motion: Motion, angle: float) -> Motion:
-    poses, (x, y, z) = motion.poses.copy(), motion.translations.T
+    poses = motion.poses.copy()
+    x, y, z = motion.translations.T
     poses[:, 0] += angle
     sine = np.sin(angle)
     cosine = np.cos(angle)

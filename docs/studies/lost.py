@@ -435,11 +435,9 @@ def auroc(scores: Array, positive: Flags) -> str:
     """
     from sklearn.metrics import roc_auc_score
 
-    return (
-        "-"
-        if positive.all() or not positive.any()
-        else f"{roc_auc_score(positive, scores):.3f}"
-    )
+    if positive.all() or not positive.any():
+        return "-"
+    return f"{roc_auc_score(positive, scores):.3f}"
 
 
 def lost_lines(

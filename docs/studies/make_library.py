@@ -87,6 +87,9 @@ def main(root: Path) -> None:
     numbers = []
     for path in files:
         skeleton = parse_asf(root / "asf" / f"{path.stem}.asf").skeleton
+        limits = None
+        if skeleton.limits is not None:
+            limits = np.round(np.degrees(skeleton.limits), 4).tolist()
         skeletons.append(
             {
                 "name": path.stem,
@@ -95,9 +98,7 @@ def main(root: Path) -> None:
                     np.degrees(joint_angles_from_rotation(skeleton.axes)), 4
                 ).tolist(),
                 "channels": skeleton.channels,
-                "limits_degrees": None
-                if skeleton.limits is None
-                else np.round(np.degrees(skeleton.limits), 4).tolist(),
+                "limits_degrees": limits,
             }
         )
         with np.load(path) as stored:

@@ -219,11 +219,9 @@ def dependent(clips: list[Recorded]) -> dict[str, Any]:
 
 def rounded(values: Array) -> Any:
     """Return nested lists of numbers with five significant digits."""
-    return (
-        [float(f"{v:.5g}") for v in values]
-        if values.ndim == 1
-        else [rounded(row) for row in values]
-    )
+    if values.ndim == 1:
+        return [float(f"{value:.5g}") for value in values]
+    return [rounded(row) for row in values]
 
 
 def normalised_ridge(

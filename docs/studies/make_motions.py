@@ -233,12 +233,10 @@ def in_step(coefficients: Array, free: NDArray[np.int64], kind: str) -> Array:
         if name is None:
             return np.zeros(len(coefficients))
         # the root's height is the second series; the first three are its path
-        first = (
-            1
-            if name == "root"
-            else 3 + int(np.searchsorted(free, angle_index(JOINTS.index(name))))
-        )
-        return np.asarray(coefficients[:, first])
+        if name == "root":
+            return np.asarray(coefficients[:, 1])
+        place = int(np.searchsorted(free, angle_index(JOINTS.index(name))))
+        return np.asarray(coefficients[:, 3 + place])
 
     high, low = BEATS[kind]
     swing = series(high) - series(low)

@@ -162,7 +162,8 @@ def sampled(case: Case) -> Samples:
     weights = np.zeros((len(posteriors), most))
     for k, frame in enumerate(posteriors):
         assert frame is not None
-        drawn[k, : len(frame)], weights[k, : len(frame)] = frame.poses, frame.weights
+        drawn[k, : len(frame)] = frame.poses
+        weights[k, : len(frame)] = frame.weights
     costs = np.array([frame.cost for frame in track.frames])
     return Samples(case, track.truth.poses, track.motion.poses, drawn, weights, costs)
 
@@ -274,11 +275,9 @@ def _rounded(values: Any) -> Any:
     """Return values ready for JSON, numbers with four digits."""
     if isinstance(values, dict):
         return {name: _rounded(value) for name, value in values.items()}
-    return (
-        [_rounded(value) for value in values]
-        if np.ndim(values)
-        else float(f"{float(values):.4g}")
-    )
+    if np.ndim(values):
+        return [_rounded(value) for value in values]
+    return float(f"{float(values):.4g}")
 
 
 def _none(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> Array:

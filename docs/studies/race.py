@@ -244,7 +244,8 @@ def _shared_net() -> type:
             self.score = nn.Sequential(
                 nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh()
             )
-            self.last, self.another = nn.Linear(width, 1), nn.Linear(COMMON_FEATURES, 1)
+            self.last = nn.Linear(width, 1)
+            self.another = nn.Linear(COMMON_FEATURES, 1)
             self.value = nn.Sequential(
                 nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh()
             )

@@ -183,13 +183,15 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
             "train must be a list of motions such as ['walk-a'], "
             f"got {quoted(world.train)}"
         )
+    motion = _motions(world.motion, held_out_people)
+    number = world.instance
+    if number is not None:
+        number = checked(instance_number, number)
     return replace(
         world,
-        motion=_motions(world.motion, held_out_people),
+        motion=motion,
         held_out_people=held_out_people,
-        instance=None
-        if world.instance is None
-        else checked(instance_number, world.instance),
+        instance=number,
         view_degrees=_views(world.view_degrees),
         train=tuple(world.train or ()),
         size=(int(sides[0]), int(sides[1])),

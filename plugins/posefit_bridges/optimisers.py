@@ -273,11 +273,9 @@ def pycma(
     positive("spread", spread)
     d = space.dimensions
     spare = np.zeros(1 if d == 1 else 0)  # pycma cannot search a single dimension
-    spreads = (
-        np.full(d, spread)
-        if space.start is None
-        else np.maximum(space.start.spread, 1e-6)
-    )
+    spreads = np.full(d, spread)
+    if space.start is not None:
+        spreads = np.maximum(space.start.spread, 1e-6)
     options = {
         "bounds": [-1, 1],
         "CMA_stds": np.append(spreads, spare + spread),
