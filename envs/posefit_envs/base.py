@@ -114,7 +114,7 @@ def log_improvement(before: Number, after: Number) -> Number:
 
 
 def error_degrees(truth: Array, pose: Array) -> Any:
-    """Return the mean angle between poses (..., 66) and the truth (...), in degrees."""
+    """Return the mean error of poses (..., 66) from the truth (...), in degrees."""
     return np.degrees(np.abs(wrapped(truth - pose))).mean(axis=-1)
 
 

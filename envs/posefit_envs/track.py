@@ -236,7 +236,7 @@ class TrackVectorEnv(SearchVectorEnv):
         return {"instance": self.numbers.copy(), "frame": self._frames()}
 
     def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
-        """Evaluate a proposal in each environment; the last of a frame commits one."""
+        """Evaluate a proposal in each environment; a full frame commits its best."""
         proposals, stepping = self.begin_step(actions)
         rows = np.flatnonzero(stepping)
         problems = self._problems

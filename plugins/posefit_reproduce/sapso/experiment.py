@@ -4,7 +4,7 @@
 |---|---|
 | track | 100 frames, the first yaw known to 45 degrees. Table 2, figure 9 |
 | unknown | the same with the first yaw unknown. Interpretation S17 |
-| image | each frame alone, from all around, yaw unknown. 5.3, table 1, figure 7 |
+| image | single frames from all around, unknown yaw. Section 5.3, table 1, figure 7 |
 | hidden | the same with a part of the silhouette hidden. Figure 8 |
 | first | searches of the first frame with several swarm sizes. Figure 6 |
 """

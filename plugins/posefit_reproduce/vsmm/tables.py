@@ -89,8 +89,8 @@ def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
     """Return the errors in cm of right elbow and hand (T, 2).
 
     They are measured to the detected joints, to the truth, and in space. As in figure
-    11 no frame is left out: a hidden joint is where it is predicted. Interpretation
-    V18.
+    11 no frame is left out: a hidden joint is where it is predicted.
+    Interpretation V18.
     """
     skeleton = film.body.skeleton
     chosen = [ELBOW, HAND]
