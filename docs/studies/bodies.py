@@ -532,7 +532,7 @@ def keep(path: Path, result: Track, who: Person) -> None:
         np.array([posterior.poses for posterior in posteriors])
     )
     models = [posterior.recalibration or Recalibration() for posterior in posteriors]
-    # without the shared spreads, which this study taught
+    # take off the shared spreads, which this study taught
     spreads = np.array([model.joint_spreads for model in models])
     spreads = np.sqrt(
         np.maximum(spreads**2 - shared_spreads(len(result.scene.cameras)) ** 2, 0.0)

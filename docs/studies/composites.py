@@ -183,7 +183,7 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
                 camera=scene.cameras,
                 extraction=chosen,
                 height=scene.actors[0].body.stature,
-                # the height belongs to one of several people: point at them
+                # of several people, point at the one with the given height
                 person=entry_point(masks[0, 0]) if len(masks) > 1 else None,
                 train=[recorded.leaving_out(recorded.LIBRARY, scene.people)],
                 progress=QUIET,

@@ -182,7 +182,7 @@ def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.int8]]]:
         for k, image in enumerate(video.frames(0, None, FILMED))
         if k in EMPTY or k < LIVING
     }
-    half = len(EMPTY) // 2  # of an odd number: the median is one of them
+    half = len(EMPTY) // 2  # an odd number of frames: the median is one of them
     still = np.partition([frames[k] for k in EMPTY], half, axis=0)[half].astype(
         np.float32
     )

@@ -171,7 +171,7 @@ def typical(before: Array) -> Array:
 
 
 def ahead(model: MotionModels, clip: Recorded, frames: int) -> tuple[float, float]:
-    """Return a model's mean error in degrees frames ahead, and standing still's."""
+    """Return a model's mean error in degrees, `frames` ahead, and standing still's."""
     step = round(clip.fps / FPS) * frames
     first = clip.states[:-step]
     second = clip.states[step:]

@@ -131,7 +131,7 @@ def printed(heads: Sequence[str], cells: Sequence[Sequence[str]], words: int) ->
 
 @click.group()
 def main() -> None:
-    """Measure starts."""
+    """Measure searches that start from a look-up."""
 
 
 @main.command()
