@@ -46,6 +46,7 @@ OPEN_SECONDS = 5.0
 BUSY_SECONDS = 60.0
 MAX_VALUE_BYTES = 200_000_000  # of a value in a file
 MIN_FILE_BYTES = 512  # a page of SQLite, at least
+PAGE_BYTES = 8192
 COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row"}
 NAMES = ("key", "spec", "status")  # that a row has beside its figures
 # What queries ask for most: where each stands, and its type. A view's expressions have no declared type, and a program
@@ -263,6 +264,8 @@ class Writer:
             (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
+        # Before the first table: a row takes more than half of a page of SQLite's usual size, and would have one alone.
+        self._db.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         self._db.executescript("PRAGMA journal_mode = WAL")
         for later in range(form + 1, FORMAT + 1):
             self._db.executescript(
