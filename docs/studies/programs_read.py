@@ -28,14 +28,17 @@ SCALING = """<OpenSimDocument Version="40000"><ScaleTool name="person"><mass>70<
 <marker_set_file>Unassigned</marker_set_file></GenericModelMaker>
 <ModelScaler><apply>true</apply><scaling_order>measurements</scaling_order>
 <MeasurementSet><objects><Measurement name="thigh"><apply>true</apply>
-<MarkerPairSet><objects><MarkerPair><markers>left_hip left_knee</markers></MarkerPair></objects></MarkerPairSet>
-<BodyScaleSet><objects><BodyScale name="lfemur"><axes>X Y Z</axes></BodyScale></objects></BodyScaleSet>
+<MarkerPairSet><objects><MarkerPair><markers>left_hip left_knee</markers>\
+</MarkerPair></objects></MarkerPairSet>
+<BodyScaleSet><objects><BodyScale name="lfemur"><axes>X Y Z</axes>\
+</BodyScale></objects></BodyScaleSet>
 </Measurement></objects></MeasurementSet>
 <marker_file>track.trc</marker_file><time_range>{start} {stop}</time_range>
 <output_model_file>scaled.osim</output_model_file></ModelScaler>
 <MarkerPlacer><apply>true</apply><IKTaskSet><objects>{tasks}</objects></IKTaskSet>
 <marker_file>track.trc</marker_file><time_range>{start} {stop}</time_range>
-<output_model_file>placed.osim</output_model_file></MarkerPlacer></ScaleTool></OpenSimDocument>"""
+<output_model_file>placed.osim</output_model_file></MarkerPlacer></ScaleTool>\
+</OpenSimDocument>"""
 
 
 class NotOfferedError(Exception):
