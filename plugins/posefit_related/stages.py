@@ -41,7 +41,9 @@ def middle(space: Space, rng: np.random.Generator) -> Array:
 
     If that is infeasible, return a random proposal.
     """
-    centre = np.zeros(space.dimensions) if space.start is None else space.start.mean
+    centre: Array = np.zeros(space.dimensions)
+    if space.start is not None:
+        centre = space.start.mean
     if space.feasible(centre[None])[0]:
         return centre.copy()
     return draw_population(space, rng, 1)[0]
