@@ -45,7 +45,7 @@ def middle(space: Space, rng: np.random.Generator) -> Array:
     if space.start is not None:
         centre = space.start.mean
     if space.feasible(centre[None])[0]:
-        return centre.copy()
+        return np.array(centre)
     return draw_population(space, rng, 1)[0]
 
 
