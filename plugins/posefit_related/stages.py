@@ -41,12 +41,13 @@ def middle(space: Space, rng: np.random.Generator) -> Array:
 
     If that is infeasible, return a random proposal.
     """
-    centre: Array = np.zeros(space.dimensions)
+    centre = np.zeros(space.dimensions)
     if space.start is not None:
         centre = space.start.mean
-    if space.feasible(centre[None])[0]:
-        return np.array(centre)
-    return draw_population(space, rng, 1)[0]
+    start: Array = centre.copy()
+    if not space.feasible(start[None])[0]:
+        start = draw_population(space, rng, 1)[0]
+    return start
 
 
 def first_population(space: Space, rng: np.random.Generator, evaluations: int) -> Array:
