@@ -354,7 +354,7 @@ def _logistic(
 
     if truth.all() or not truth.any():
         raise InputError(
-            f"frames must be {name} and not {name}, "
+            f"some frames must be {name} and some not, "
             f"got {int(truth.sum())} of {len(truth)}"
         )
     mean = known.mean(axis=0)

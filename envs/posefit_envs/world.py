@@ -273,7 +273,7 @@ def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     for name, strength in strengths.items():
         if name not in CORRUPTIONS:
             raise ArgumentError(
-                f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}"
+                f"noise must be one of {', '.join(CORRUPTIONS)}, got {quoted(name)}"
             )
         if not 0.0 <= checked(finite_number, f"noise {name}", strength) <= 1.0:
             raise ArgumentError(

@@ -54,7 +54,7 @@ class Full:
         self.angles = np.flatnonzero(high > low)
         if not len(self.angles):
             raise InputError(
-                f"angles must differ somewhere, got {len(angles)} equal frames"
+                f"angles must differ between frames, got {len(angles)} equal frames"
             )
         self.rest = angles.mean(axis=0)
         self.low = low[self.angles]

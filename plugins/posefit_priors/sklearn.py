@@ -136,7 +136,7 @@ def _built(variant: str, components: int, options: str) -> Any:
     }
     if unknown := sorted(set(parameters) - set(known)):
         raise InputError(
-            f"options of {variant} must be of {', '.join(sorted(known))}, "
+            f"options of {variant} must be among {', '.join(sorted(known))}, "
             f"got {', '.join(unknown)}"
         )
     parameters = {

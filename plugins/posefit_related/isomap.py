@@ -84,8 +84,8 @@ class IsomapPrior:
                     continue
         else:
             raise ValueError(
-                "angles must be of poses near each other, "
-                f"got {len(angles)} that no graph connects"
+                "angles must be of similar poses, "
+                f"got {len(angles)} that no graph of neighbours connects"
             )
         self._model: Any = model
         # WANG2003 (Isomap)

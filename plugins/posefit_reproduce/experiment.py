@@ -247,13 +247,13 @@ def _make_runs_folder(folder: Path) -> None:
     try:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / "runs").is_dir():
             raise InputError(
-                f"{folder}: expected a new folder or an earlier reproduction's, "
-                "got another one"
+                f"{folder}: the folder holds something else: choose a new folder, "
+                "or one of an earlier reproduction"
             )
         (folder / "runs").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{folder}: expected a folder to write to, got {error.strerror}"
+            f"{folder}: cannot write to this folder: {error.strerror}"
         ) from error
 
 
@@ -287,7 +287,7 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
         isinstance(value, dict) for value in before.values()
     ):
         raise InputError(
-            f"{file}: expected the common conditions of all runs, got something else"
+            f"{file}: not a record of the conditions of runs: choose another folder"
         )
     if not adding:
         before, now = (

@@ -52,7 +52,7 @@ def test_a_skeleton_without_limits_is_named() -> None:
     for skeleton, name in ((bare, "bare"), (None, "no skeleton")):
         with pytest.raises(ValueError, match=f"{rule} {name}"):
             Full().fit(angles("walk-a"), skeleton)
-    with pytest.raises(ValueError, match="angles must differ somewhere"):
+    with pytest.raises(ValueError, match="angles must differ between frames"):
         Full(limits="training").fit(np.zeros((5, 63)))
 
 
@@ -138,7 +138,7 @@ def test_mistakes_in_settings_are_named() -> None:
         (
             Transformed,
             {"options": '{"gama": 1}'},
-            "options of KernelPCA must be of alpha, .*, got gama",
+            "options of KernelPCA must be among alpha, .*, got gama",
         ),
     ):
         with pytest.raises(ValueError, match=message):

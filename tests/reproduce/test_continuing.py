@@ -85,7 +85,7 @@ def test_a_folder_without_a_record_is_read_and_that_is_said(
     for content in ("[]", "{", '{"frames": 1}'):
         (tmp_path / "out" / "runs.json").write_text(content)
         with pytest.raises(
-            ValueError, match=r"runs\.json: expected the common conditions of all runs"
+            ValueError, match=r"runs\.json: not a record of the conditions of runs"
         ):
             continued(tmp_path / "out", FIRST, frames=100)
 
