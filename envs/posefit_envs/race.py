@@ -423,6 +423,7 @@ def _bounds(generations: Any) -> tuple[int, int]:
     least, most = (checked(whole, "generations", number, 1) for number in ends)
     if least > most:
         raise ArgumentError(
-            f"generations must be the smallest and the largest budget, got {least} and {most}"
+            "generations must be the smallest and the largest budget, "
+            f"got {least} and {most}"
         )
     return least, most
