@@ -49,7 +49,12 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
-CONSTANTS = ("uniform", "the truth, projected")
+# what learns nothing: the k-th proposal of the look-up is the truth of the training
+# instance whose silhouette is the k-th nearest
+LOOK_UP = "look-up"
+CONSTANTS = ("uniform", "the truth, projected", LOOK_UP)
+LOOKED_UP = 10_000  # training instances
+LOOKED_UP_AT_ONCE = 500
 LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
 # CMA-ES, started from the best of PPO's proposals
 STARTED = "PPO, then cma"
@@ -128,9 +133,15 @@ def row_of(
         row["costs"] = searched(training, start)
         return row | {"cpu_seconds": round(process_time() - start_time, 1)}
     learns = training.agent in LEARNERS
-    policy = trained(training) if learns else constant(training)
+    if learns:
+        policy = trained(training)
+    elif training.agent == LOOK_UP:
+        policy = looked_up(training)
+    else:
+        policy = constant(training)
     row["cpu_seconds"] = round(process_time() - start_time, 1)
-    count = MAX_EVALUATIONS if learns or training.agent == "uniform" else 1
+    several = learns or training.agent in ("uniform", LOOK_UP)
+    count = MAX_EVALUATIONS if several else 1
     actions, costs = episodes(policy, training, count)
     row["costs"] = costs.min(axis=0).tolist()
     if learns:
@@ -150,6 +161,37 @@ def constant(training: Training) -> Policy:
     env.reset(options={"instance": TESTED})
     truths = np.array([problem.truth for problem in env.unwrapped.problems])
     return lambda _: truths
+
+
+def looked_up(training: Training) -> Policy:
+    """Return the policy that proposes the truths of the training instances with the nearest silhouettes."""
+    env = made(training, LOOKED_UP_AT_ONCE)
+    silhouettes = []
+    truths = []
+    for first in range(0, LOOKED_UP, LOOKED_UP_AT_ONCE):
+        numbers = list(range(first, first + LOOKED_UP_AT_ONCE))
+        pictures, _ = env.reset(options={"instance": numbers})
+        silhouettes.append(observed(pictures))
+        truths.append([problem.truth for problem in env.unwrapped.problems])
+    known = np.concatenate(silhouettes)
+    answers = np.concatenate(truths)
+    asked = 0
+
+    def policy(pictures: Any) -> Array:
+        nonlocal asked
+        seen = observed(pictures)
+        squares = (seen**2).sum(axis=1)[:, None] - 2.0 * seen @ known.T
+        squares += (known**2).sum(axis=1)
+        nearest = np.argpartition(squares, asked, axis=1)[:, asked]
+        asked += 1
+        return answers[nearest]
+
+    return policy
+
+
+def observed(pictures: Any) -> Array:
+    """Return the observed silhouettes (n, p) of small pictures, of 0 to 1."""
+    return np.asarray(pictures[..., ::2].reshape(len(pictures), -1) / 255.0)
 
 
 def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
@@ -290,7 +332,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             continue
         ((budget, group),) = budgets.items()
         costs = np.array([row["costs"] for row in group])
-        proposals = {STARTED: f"8 + {budget}", "uniform": "8"}.get(
+        proposals = {STARTED: f"8 + {budget}", "uniform": "8", LOOK_UP: "8"}.get(
             agent, "8" if agent in LEARNERS else "1"
         )
         steps = f"{budget:,}"
