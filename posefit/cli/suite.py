@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     "--json",
     "as_json",
     is_flag=True,
-    help="Print it as IOHexperimenter's registry of suites, in JSON.",
+    help="Print the suite as JSON, in the form of IOHexperimenter's registry.",
 )
 @click.pass_context
 def suite(context: click.Context, as_json: bool) -> None:
