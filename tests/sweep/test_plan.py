@@ -174,7 +174,7 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"grid": {"pca.components": [1]}, "product": None, "cells": [SMALL]}, "grid must come with the methods"),
         (
             {"grid": {"sapso.cooling": [1]}, "product": {**PRODUCT, "methods": [COLD]}},
-            "grid must hold what no entry of methods sets itself, got sapso.cooling, which one does",
+            "grid must hold settings that no entry of methods sets itself, got sapso.cooling, which one sets",
         ),
         ({"product": {**PRODUCT, "methods": [{**COLD, "name": 3}]}}, "name must be a text of at most 80 characters, got 3"),
     ],
