@@ -137,7 +137,7 @@ class ComponentBox(Components):
         return np.asarray(latents * share[:, None])
 
     def _beyond(self, latents: Array) -> Array:
-        """Return the distance (n,) of latents (n, m) to the middle, 1 at the surface."""
+        """Return the distance (n,) of latents (n, m), 1 at the ellipsoid's surface."""
         away = np.empty(len(latents))
         spreads_away(writeable(latents), self._spread, away)
         return away / self._reach
