@@ -89,7 +89,7 @@ FRAME = {
             "time",
             "ms",
             1,
-            "that the estimate took, since that of the frame before",
+            "wall time of the estimate, from the end of the previous frame's",
             1e3,
         ),
         Measure(
@@ -97,7 +97,7 @@ FRAME = {
             "activity",
             "",
             0,
-            "what the person does, a word; blank where not estimated",
+            "the person's activity in a word; blank where not estimated",
         ),
     )
 }

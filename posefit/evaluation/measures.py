@@ -154,7 +154,7 @@ class Measures:
         "walk; more is jitter",
     )
     acceleration_ratio: float | None = _figure(
-        "acceleration ratio", "", 1, "the same, over that of the true joints"
+        "acceleration ratio", "", 1, "the same, divided by the true joints'"
     )
     foot_slide_mm: float | None = _figure(
         "foot slide",

@@ -30,17 +30,16 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, touches_border
 from posefit.uncertainty.modes import poses_apart
 
-SMOOTH_SECONDS = (
-    0.5  # before and after a frame; a smooth path is fitted to these frames
-)
+# A smooth path is fitted to the frames within this time before and after a frame.
+SMOOTH_SECONDS = 0.5
 MIN_SMOOTH_FRAMES = 5  # of such a fit
 SCATTER_QUANTILE = 0.9  # the share of frames that are nearer to that path
 TRAINING_SECONDS = 1.0 / 15.0  # between the compared poses of a training motion
-# A share of the person's longer side: clothes and hair move as near to the body as
-# this.
+# A share of the person's longer side. What moves this near to the body is clothes or
+# hair.
 CLOTHES = 0.05
 MIN_MOVED = 0.02  # a share of the body's area; fewer pixels that moved are noise
-USELESS_TOGETHER = 3  # so many signs of a doubtful track make it useless
+USELESS_TOGETHER = 3  # this many signs of a doubtful track make it useless
 MIN_FRAMES = 12  # the fewest frames to judge depth, feet and motion
 SAMPLED_FRAMES = 60  # spread over the footage; their sizes and poses are compared
 # A person within 20 degrees of the line of sight is seen from the front or the back.
@@ -603,7 +602,7 @@ def _training_mm(
 def _size(
     scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]
 ) -> float | None:
-    """Return the size of the person's masks over that of the fitted body's.
+    """Return the size of the person's masks divided by the fitted body's.
 
     It is the median over all cameras and sampled frames, or None if no mask is whole.
     """

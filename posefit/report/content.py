@@ -121,7 +121,7 @@ def _problems(
     problems = []
 
     def add(text: str, details: Sequence[str], most: int) -> None:
-        """Add a problem with at most so many details."""
+        """Add a problem with at most `most` details."""
         more = [f"and {len(details) - most:,} more"] if len(details) > most else []
         problems.append((text, [*details[:most], *more]))
 

@@ -196,8 +196,8 @@ class Searches:
 def search_charts(contest: Contest) -> list[Chart]:
     """Return charts of the share of targets reached over evaluations.
 
-    There is one of all functions, and one of each. Intervals are those that other
-    instances would give.
+    There is one of all functions, and one of each. Intervals show what other instances
+    would give.
     """
     functions = contest.place_field("function")
     dimensions = contest.place_field("dimension")

@@ -29,7 +29,7 @@ SIZES = (6, 7, 13, 17, 21, 37)
 # unless fingers move as well.
 SHOW_NOTHING = (49, 61)
 FRAMES = 8  # of a sequence
-# Of five mixed latents, four have so many values, and the fifth is continuous.
+# Of five mixed latents, four have these numbers of values, and the fifth is continuous.
 VALUES = (2, 4, 8, 16)
 # the range, to either side, of joint angles that are constant in the data
 CONSTANT = math.radians(10.0)
@@ -96,8 +96,8 @@ class ComponentBox(Components):
         learned: The statistics of the poses.
         count: The number of components, one of `SIZES`.
         mixed: Whether most latents have only a few values, as `VALUES` says. Such a
-            latent's range has so many equal parts, and it stands for the middle of its
-            part.
+            latent's range is divided into equal parts, and the latent counts as the
+            middle of its part.
     """
 
     def __init__(self, learned: Learned, count: int, mixed: bool = False) -> None:

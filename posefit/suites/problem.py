@@ -1,8 +1,7 @@
 """Problems of a suite by number: `suite` returns one, `Suite` iterates over many.
 
 Each is a `posefit.Problem` with a `SuiteCost` as its cost function. Its attributes have
-the same names as those of COCO's problems, so loops written for COCO run on it
-unchanged.
+the same names as in COCO, so loops written for COCO run on it unchanged.
 
 A suite may get more problems, but nothing else about it ever changes.
 """

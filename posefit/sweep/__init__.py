@@ -1,4 +1,4 @@
-"""Comparative sweeps: many runs, whose results survive crashes.
+"""Comparative sweeps: many runs, with results that survive crashes.
 
     plan = Plan.read("plan.toml")        # or Plan.of({...}); ValueError if it is wrong
     frame = Ledger("results").frame()    # after `posefit sweep plan.toml --out results`

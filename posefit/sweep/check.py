@@ -64,7 +64,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     """
     for name in ("method", "motion"):
         if name not in spec:
-            raise InputError(f"a cell must say its {name}, got none")
+            raise InputError(f"a cell must have a {name}, got none")
     values = _checked(spec, CHECKS)
     texts = tuple(settings.settings_text(values.get("settings", {})))
     offers, chosen = _of_method(values["method"], texts)
@@ -174,7 +174,7 @@ def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
     if unknown := [name for name in spec if name not in checks]:
         known = suggestion(unknown[0], checks)
         raise InputError(
-            f"a cell must say {', '.join(checks)}, got {quoted(unknown[0])}{known}"
+            f"a cell must hold {', '.join(checks)}, got {quoted(unknown[0])}{known}"
         )
     return {name: checks[name](name, value) for name, value in spec.items()}
 

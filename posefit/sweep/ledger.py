@@ -47,9 +47,9 @@ SUFFIX = ".sqlite"
 WAL = "-wal"  # suffix of the log that SQLite keeps while a file is written
 DRIVER = ".driver"  # suffix of the lock file
 DRIVEN_BY = "process "  # how the content of a lock file begins
-NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # not every operating system has it
-# A cell goes into quarantine after so many attempts that failed by its own fault, or
-# that were killed from outside.
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # missing on some operating systems
+# A cell goes into quarantine after this many attempts that failed by its own fault, or
+# this many that were killed from outside.
 ATTEMPTS = 3
 LOSSES = 50
 # The longest wait for a program that locks a file: on opening it, and during a sweep.
@@ -557,8 +557,7 @@ def _locked(path: Path) -> Iterator[None]:
         opened.callback(os.close, file)
         is_locked = lock(file)
         state = os.fstat(file)
-        # A file with two names has a hard link. With none, its driver has just removed
-        # it.
+        # Two names mean a hard link. None means that its driver has just removed it.
         if not stat.S_ISREG(state.st_mode) or state.st_nlink != 1:
             raise _no_lock_file(name)
         driver = os.read(file, 1000).decode(errors="replace")

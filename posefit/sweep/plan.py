@@ -4,8 +4,8 @@ docs/howto/plan.md describes a plan's tables: the `defaults` of every cell, a `p
 of lists, a `grid` of settings, and single `cells`. An entry of a list is the value of a
 cell's field, or a table of several fields. `posefit.sweep.cell` describes the fields.
 
-A plan that names a `suite` consists of single searches; its lists are those of a
-product.
+A plan that names a `suite` consists of single searches. It has the lists of a product,
+but no table around them.
 """
 
 import sys

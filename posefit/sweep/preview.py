@@ -41,7 +41,7 @@ def preview(plan: str, out: str | None, shard: str | None) -> Preview:
 
     Args:
         plan: The plan's file, as `posefit.sweep.plan.Plan.read` takes it.
-        out: The folder of the ledger, whose finished cells are not counted as to run.
+        out: The folder of the ledger, or None. Its finished cells will not run again.
         shard: The shard as I/N, or None for all cells.
 
     Returns:

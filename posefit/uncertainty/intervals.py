@@ -46,7 +46,7 @@ def joint_intervals(
 def angle_intervals(posterior: Posterior, pose: Array) -> Array:
     """Return the intervals of a pose's angles that hold the true angles.
 
-    They are computed as `joint_intervals` computes those of joints.
+    They are computed in the same way as the radii of `joint_intervals`.
 
     Args:
         posterior: The weighted poses.
