@@ -57,6 +57,7 @@ OPEN_SECONDS = 5.0
 BUSY_SECONDS = 60.0
 MAX_VALUE_BYTES = 200_000_000  # of one value that is read
 MIN_FILE_BYTES = 512  # SQLite's smallest page, and so its smallest file
+PAGE_BYTES = 8192  # of a new file; a page then holds about three rows
 COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row"}
 NAMES = ("key", "spec", "status")  # the parts of a row that are not figures
 # The columns of the view: the column and path of each value, and its type. Expressions
@@ -302,6 +303,9 @@ class Writer:
             (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
+        # This works only before the first table. A row takes more than half of a page of
+        # SQLite's usual size, which would hold only one row.
+        self._db.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         self._db.executescript("PRAGMA journal_mode = WAL")
         for later in range(form + 1, FORMAT + 1):
             self._db.executescript(
