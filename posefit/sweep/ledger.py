@@ -303,8 +303,8 @@ class Writer:
             (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
-        # This works only before the first table. A row takes more than half of a page of
-        # SQLite's usual size, which would hold only one row.
+        # This must come before the first table. A row takes more than half of a page of
+        # SQLite's usual size, so such a page would hold only one row.
         self._db.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         self._db.executescript("PRAGMA journal_mode = WAL")
         for later in range(form + 1, FORMAT + 1):
