@@ -12,4 +12,5 @@
 | the instances of each function | instances.py |
 | the search boxes, made by `docs/studies/make_boxes.py` | boxes.py |
 | runs of an optimiser or of any loop, and their scores | running.py |
+| the suite in the form of IOHexperimenter's registry | registry.py |
 """
