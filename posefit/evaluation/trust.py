@@ -2,7 +2,7 @@
 
 Besides the overlap with the masks they are size, depth, standing feet, motion in the
 pictures, and others. Each sign has a limit from which the track is doubtful, and one
-from which it is useless. docs/howto/trust.md has the limits, and the footage from which
+from which it is unusable. docs/howto/trust.md has the limits, and the footage from which
 they come.
 """
 
@@ -39,7 +39,7 @@ TRAINING_SECONDS = 1.0 / 15.0  # between the compared poses of a training motion
 # hair.
 CLOTHES = 0.05
 MIN_MOVED = 0.02  # a share of the body's area; fewer pixels that moved are noise
-USELESS_TOGETHER = 3  # this many signs of a doubtful track make it useless
+UNUSABLE_TOGETHER = 3  # this many signs of a doubtful track make it unusable
 MIN_FRAMES = 12  # the fewest frames to judge depth, feet and motion
 SAMPLED_FRAMES = 60  # spread over the footage; their sizes and poses are compared
 # A person within 20 degrees of the line of sight is seen from the front or the back.
@@ -227,12 +227,12 @@ def covered_pixels(
     return (inside, moved) if moved > MIN_MOVED * body.sum() else (0, 0)
 
 
-Grade = Literal["good", "doubtful", "useless"]
+Grade = Literal["good", "doubtful", "do not use"]
 # how the sentence of each grade begins
 _BEGINNING: dict[Grade, str] = {
     "good": "good. ",
     "doubtful": "doubtful: ",
-    "useless": "do not use: ",
+    "do not use": "do not use: ",
 }
 
 
@@ -244,7 +244,7 @@ class Sign:
 
     Attributes:
         limits: The best value, and the distances from it at which a track is doubtful
-            and useless. None for a sign that never speaks against a track.
+            and unusable. None for a sign that never speaks against a track.
         against: The text if the sign speaks against a track.
         listed: The text in the list of all signs.
     """
@@ -270,7 +270,7 @@ class Trust:
 
     Attributes:
         sentence: The grade, and the worst sign.
-        grade: "good", "doubtful" or "useless".
+        grade: "good", "doubtful" or "do not use".
         against: What speaks against the track, the worst first.
         frames: The number of frames that show enough of the person.
         height_m: The height of the fitted body.
@@ -372,29 +372,29 @@ def signs_against(figures: Mapping[str, Any]) -> list[tuple[Grade, str]]:
         The grade and the text of each sign against the track, the worst first.
     """
     few = f"only {counted(figures['frames'], 'frame')} to judge the person by"
-    # a severity above 0 is doubtful, and above 1 useless
+    # a severity above 0 is doubtful, and above 1 unusable
     signs = [(1.0 - figures["frames"] / MIN_FRAMES, few)]
     for name, sign in SIGNS.items():
         if sign.limits is not None and figures[name] is not None:
-            best, doubtful, useless = sign.limits
-            severity = (abs(figures[name] - best) - doubtful) / (useless - doubtful)
+            best, doubtful, unusable = sign.limits
+            severity = (abs(figures[name] - best) - doubtful) / (unusable - doubtful)
             signs.append((severity, sign.against.format(**figures)))
     signs.sort(key=lambda severity_and_words: severity_and_words[0], reverse=True)
     against: list[tuple[Grade, str]] = []
     for severity, words in signs:
         if severity > 0.0:
-            against.append(("useless" if severity > 1.0 else "doubtful", words))
+            against.append(("do not use" if severity > 1.0 else "doubtful", words))
     return against
 
 
 def grade_of(signs: Sequence[tuple[Grade, str]]) -> Grade:
     """Return the grade of a track from the signs against it, the worst first.
 
-    It is the grade of the worst sign, but three signs together make a track useless.
+    It is the grade of the worst sign, but three signs together make a track unusable.
     """
     if not signs:
         return "good"
-    return "useless" if len(signs) >= USELESS_TOGETHER else signs[0][0]
+    return "do not use" if len(signs) >= UNUSABLE_TOGETHER else signs[0][0]
 
 
 def sentence(figures: Mapping[str, Any], signs: Sequence[tuple[Grade, str]]) -> str:

@@ -179,10 +179,10 @@ def test_a_sign_speaks_against_a_track_from_the_pages_limits_on() -> None:
     assert LIMITS.keys() == {name for name, sign in SIGNS.items() if sign.limits}
     for name, limits in LIMITS.items():
         best = FINE[name]
-        for doubtful, useless in limits:
+        for doubtful, unusable in limits:
             for limit, before, after in (
                 (doubtful, "good", "doubtful"),
-                (useless, "doubtful", "do not use"),
+                (unusable, "doubtful", "do not use"),
             ):
                 if limit is None:
                     continue
@@ -201,11 +201,11 @@ def test_a_track_without_a_sign_against_it_is_good() -> None:
     assert signs_against(unknown) == []
 
 
-def test_three_doubtful_signs_together_are_as_bad_as_a_useless_one() -> None:
+def test_three_doubtful_signs_together_are_as_bad_as_an_unusable_one() -> None:
     # a person waves, one camera
     signs = signs_against(FINE | {"unknown": 0.49, "lost": 0.24, "acceleration": 20.0})
     assert [grade for grade, _ in signs] == ["doubtful"] * 3
-    assert grade_of(signs) == "useless"
+    assert grade_of(signs) == "do not use"
     assert grade_of(signs[:2]) == "doubtful"
 
 
@@ -256,7 +256,7 @@ def test_motion_says_nothing_where_the_camera_moves() -> None:
         for k in range(30)
     ]
     scene = replace(scene, pictures=lambda: iter(pictures))
-    assert trusted(scene).grade == "useless"
+    assert trusted(scene).grade == "do not use"
     trust = trusted(replace(scene, camera_moves=True))
     assert (trust.grade, trust.unknown_signs["explained"]) == (
         "good",
