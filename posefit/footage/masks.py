@@ -13,6 +13,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Observation
 from posefit.geometry.calibration import Calibration
+from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import allowed_bytes
 from posefit.silhouette.mask import Silhouette
@@ -85,23 +86,39 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
 
 
 def undistorted(
-    masks: PackedMasks, calibration: Calibration, maps: tuple[Any, Any]
+    masks: PackedMasks,
+    calibration: Calibration,
+    maps: tuple[Any, Any],
+    straight: Camera | None = None,
 ) -> PackedMasks:
     """Return masks, and landmarks, as of a pinhole camera; pixels that the lens did not cover are unknown.
 
-    `maps` are those of the calibration for pictures of the masks' size.
+    Args:
+        masks: Of the camera that was calibrated.
+        calibration: That camera's.
+        maps: The calibration's, for pictures of the masks' size and for `straight`.
+        straight: The pinhole camera; by default the calibration's, of the masks' size.
+
+    Returns:
+        Masks of the size of `maps`.
+
     """
-    straight = empty_planes(len(masks), masks.size)
-    valid = empty_planes(len(masks), masks.size)
+    size = (maps[0].shape[1], maps[0].shape[0])
+    mended = empty_planes(len(masks), size)
+    valid = empty_planes(len(masks), size)
     for k in range(len(masks)):
         silhouette = masks.silhouette(k)
-        for planes, plane in ((straight, silhouette.mask), (valid, silhouette.valid)):
-            planes[k] = np.packbits(
-                cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) != 0
-            )
-    bent = masks.landmarks
-    landmarks = None if bent is None else calibration.straightened(bent, masks.size)
-    return replace(masks, masks=straight, valid=valid, landmarks=landmarks)
+        # between four pixels the border is where half of them is the person
+        share = cv2.remap(
+            255 * silhouette.mask.astype(np.uint8), *maps, cv2.INTER_LINEAR
+        )
+        known = cv2.remap(silhouette.valid.astype(np.uint8), *maps, cv2.INTER_NEAREST)
+        mended[k] = np.packbits(share > 127)
+        valid[k] = np.packbits(known != 0)
+    landmarks = masks.landmarks
+    if landmarks is not None:
+        landmarks = calibration.straightened(landmarks, masks.size, straight)
+    return replace(masks, size=size, masks=mended, valid=valid, landmarks=landmarks)
 
 
 @dataclass(frozen=True, eq=False)

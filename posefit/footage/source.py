@@ -234,7 +234,8 @@ def _placed(
         else camera.in_metres(metres).camera(camera.size or size, world)
         for camera in known
     ]
-    return cameras, [*guesses.values()]
+    # bodies are drawn with square pixels
+    return [camera.squared() for camera in cameras], [*guesses.values()]
 
 
 def logged(scene: Scene, progress: Progress) -> Scene:
@@ -342,7 +343,13 @@ def _taken_out(
                 f"taking the person out of {part.video.path} by {part.how.name}"
             )
             choose = (
-                partial(same_person, [known[0], known[len(views)]], views[0], part.size)
+                partial(
+                    same_person,
+                    [known[0], known[len(views)]],
+                    views[0],
+                    part.size,
+                    filmed=part.video.size,
+                )
                 if views
                 else None
             )

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,9 @@ LARGEST_SIDE = 16_384  # pixels
 LARGEST_FILE = 1_000_000  # bytes
 # across the larger side; our guess for an unknown camera
 FIELD_OF_VIEW = math.radians(40.0)
+# by how much of themselves the focal lengths of square pixels may differ: of a limb that
+# is 40 pixels wide, a tenth of a pixel
+SQUARE = 0.005
 FOCALS = 0.05, 100.0  # times the larger side: lenses of 170 degrees to 0.6
 MARGIN = 0.06  # share of the image left free around what `framing` shows
 _KEYS = ("width", "height", "focal", "centre", "camera_from_world")
@@ -155,6 +158,24 @@ class Camera:
         in_camera = np.asarray(points) @ self.rotation.T + self.translation
         depths = in_camera[..., 2]
         return in_camera[..., :2] / depths[..., None] * self.focal + self.centre, depths
+
+    def squared(self) -> "Camera":
+        """Return the camera of the same view whose pixels are square: the longer focal length in both directions.
+
+        A ball is a circle in its pictures, which bodies are drawn by. It is this one where its pixels are square.
+        """
+        focal = float(self.focal.max())
+        if focal - self.focal.min() <= SQUARE * focal:
+            return self
+        finer = focal / self.focal
+        width, height = np.rint(finer * (self.width, self.height)).astype(int)
+        return replace(
+            self,
+            width=max(int(width), 1),
+            height=max(int(height), 1),
+            focal=np.full(2, focal),
+            centre=finer * self.centre,
+        )
 
     def to_json(self) -> str:
         """Return the text that `from_json` reads: sizes and pixels, and the 4 x 4 matrix camera_from_world."""

@@ -16,12 +16,16 @@ from threadpoolctl import threadpool_limits
 from posefit.errors import InputError
 from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.cameras import CameraView, calibrated, combined
+from posefit.footage.cameras import (
+    CameraView,
+    calibrated,
+    combined,
+    straightening,
+)
 from posefit.footage.live import LiveMask, Stream, live_masks
-from posefit.footage.masks import PackedMasks, Views, undistorted
+from posefit.footage.masks import PackedMasks, Views
 from posefit.footage.scene import Scene
 from posefit.footage.source import body_of, check_used, logged
-from posefit.geometry.calibration import Calibration
 from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress
 from posefit.tracking.defaults import completed
@@ -151,18 +155,11 @@ def _scene_of(
     view = CameraView(packed(first), notes, name)
     scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
     scene = replace(scene, guesses=[*scene.guesses, *of_height])
-    bent = next(
-        (
-            (each, each.maps(size))
-            for each in known
-            if isinstance(each, Calibration) and each.distorted
-        ),
-        None,
-    )
+    _, how, _ = straightening(known[0], size) if known else (None, None, None)
 
     def observed(live: LiveMask) -> Observation:
         masks = packed([live])
-        return Views([masks if bent is None else undistorted(masks, *bent)])[0]  # type: ignore[no-any-return]
+        return Views([masks if how is None else how.of_masks(masks)])[0]  # type: ignore[no-any-return]
 
     return scene, observed
 
