@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -159,14 +160,20 @@ class Camera:
         depths = in_camera[..., 2]
         return in_camera[..., :2] / depths[..., None] * self.focal + self.centre, depths
 
-    def squared(self) -> "Camera":
-        """Return the camera of the same view whose pixels are square: the longer focal length in both directions.
+    @cached_property
+    def square(self) -> bool:
+        """Whether its pixels are square, so that a ball is a circle in its pictures; bodies are drawn by that."""
+        longest = float(self.focal.max())
+        return longest - float(self.focal.min()) <= SQUARE * longest
 
-        A ball is a circle in its pictures, which bodies are drawn by. It is this one where its pixels are square.
+    def squared(self) -> "Camera":
+        """Return the camera of the same view whose pixels are square; it is this one where its own are.
+
+        The longer focal length holds in both directions, so that pictures get more columns or more rows.
         """
-        focal = float(self.focal.max())
-        if focal - self.focal.min() <= SQUARE * focal:
+        if self.square:
             return self
+        focal = float(self.focal.max())
         finer = focal / self.focal
         width, height = np.rint(finer * (self.width, self.height)).astype(int)
         return replace(

@@ -15,7 +15,7 @@ names one. Lengths are in the file's own unit, see `footage/cameras.py`, and met
 always writes one unit.
 
 What a dialect does not know it refuses by its name. Messages of errors complete `expected a
-calibration of ..., got ...`.
+calibration ..., got ...`.
 """
 
 from posefit.geometry.calibration.lens import Calibration, pinhole_matrix

@@ -53,6 +53,8 @@ def _read(stored: Stored) -> list[Calibration]:
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
     check_others(name, {key: value for key, value in table.items() if key not in KEYS})
+    # Caliscope's of a camera that is not placed yet
+    table = {key: value for key, value in table.items() if value != "null"}
     place: Place | None = None
     if "rotation" in table and "translation" in table:
         place = matrix_of(table["rotation"]), matrix_of(table["translation"])

@@ -13,5 +13,5 @@ class Dialect(NamedTuple):
     program: str  # as messages call it
     # whether a file is of this program
     recognises: Callable[[Stored], bool]
-    # its cameras; raises InputError that completes `expected a calibration of ..., got`
+    # its cameras; raises InputError that completes `expected a calibration ..., got`
     read: Callable[[Stored], list[Calibration]]

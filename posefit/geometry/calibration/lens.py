@@ -208,7 +208,7 @@ def stated(
         The calibration.
 
     Raises:
-        InputError: No camera can be so; the message completes `expected a calibration of ..., got ...`.
+        InputError: No camera can be so; the message completes `expected a calibration ..., got ...`.
 
     """
     if size is not None:

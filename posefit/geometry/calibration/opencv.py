@@ -92,6 +92,8 @@ _OTHERS = re.compile(
 def _read(stored: Stored) -> list[Calibration]:
     """Return the camera that values describe by their keys, or those of their tables, and of the tables in these."""
     cameras = list[Calibration]()
+    # of tables that hold those of cameras
+    around = dict[str, Any]()
     tables: list[tuple[str, Mapping[str, Any]]] = [(stored.path.stem, stored.values)]
     for _ in range(3):
         inner = list[tuple[str, Mapping[str, Any]]]()
@@ -110,15 +112,15 @@ def _read(stored: Stored) -> list[Calibration]:
                     f"{quoted(name)} without camera_matrix, image_width and image_height"
                 )
             else:
-                check_others(
-                    name, {k: v for k, v in table.items() if not _has_tables(v)}
-                )
+                around |= {k: v for k, v in table.items() if not _has_tables(v)}
                 inner += _tables(table)
         # as an alias of YAML may give the same one again and again
         if len(inner) > MOST_TABLES:
             raise InputError(f"a file of more than {MOST_TABLES:,} tables")
         tables = inner
-    _check_places(cameras)
+    if cameras:
+        check_others(stored.path.stem, around)
+        _check_places(cameras)
     return cameras
 
 

@@ -66,11 +66,11 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     if path.suffix.lower() in PICKLES:
         raise InputError(f"{path}: expected a calibration as text, got {HOW}")
     text = read_text(path, LARGEST_FILE)
-    program = ""
+    written_by = ""
     try:
         file = stored(path, text)
         dialect = _dialect(file)
-        program = dialect.program
+        written_by = f" of {dialect.program}"
         calibrations = dialect.read(file)
         for calibration in calibrations:
             calibration.camera(calibration.size or (1000, 1000), np.eye(3))
@@ -85,9 +85,8 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     ) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
         reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)
-        expected = program or ", ".join(dialect.program for dialect in DIALECTS)
         raise InputError(
-            f"{path}: expected a calibration of {expected}, got {reason}"
+            f"{path}: expected a calibration{written_by}, got {reason}"
         ) from None
     if not calibrations:
         raise InputError(f"{path}: expected a calibration with a camera, got none")
@@ -106,4 +105,4 @@ def _dialect(file: Stored) -> Dialect:
     for dialect in DIALECTS:
         if dialect.recognises(file):
             return dialect
-    raise InputError(f"XML of {quoted(file.root.tag)}")
+    raise InputError(f"XML of {quoted(file.root.tag)}, which is not known")

@@ -1,8 +1,8 @@
 """Vicon's calibration, .xcp: millimetres; its cameras look along z with y down.
 
 A lens is described from the picture to the straight one: a pixel at a distance r from the centre belongs at
-r (1 + k1 r^2 + k2 r^4 + k3 r^6), lengths in pixels. OpenCV describes it the other way around, in the same form; its
-numbers are fitted.
+r (1 + k1 r^2 + k2 r^4 + k3 r^6), lengths in pixels. OpenCV describes it the other way around, by a quotient of two such
+forms, whose numbers are fitted.
 """
 
 from typing import Any
@@ -82,7 +82,7 @@ def _of_quaternion(numbers: Array) -> Array:
 
 
 def _lens(frame: Any, centre: Array, focal: float, size: Array) -> Array:
-    """Return OpenCV's k1, k2, p1, p2, k3 of a frame's lens."""
+    """Return OpenCV's k1, k2, p1, p2, k3 to k6 of a frame's lens."""
     if frame.get("VICON_RADIAL2") is not None:
         _, *words = frame.get("VICON_RADIAL2").split()
         numbers = numbers_of(numbers_in(" ".join(words)), (5,))
@@ -98,24 +98,26 @@ def _lens(frame: Any, centre: Array, focal: float, size: Array) -> Array:
 
 
 def _turned_around(radial: ArrayLike, focal: float, reach: float) -> Array:
-    """Return OpenCV's five numbers of a lens whose radial ones lead from the picture to the straight one."""
+    """Return OpenCV's eight numbers of a lens whose radial ones lead from the picture to the straight one."""
     radial = np.asarray(radial, dtype=np.float64)
+    if not radial.any():
+        return np.zeros(8)
     bent = np.linspace(0.0, reach, SAMPLES + 1)[1:]
     powers = bent[:, None] ** (2.0 * np.arange(1, radial.size + 1))
     straight = bent * (1.0 + powers @ radial)
     if not (np.diff(straight) > 0.0).all():
         raise InputError("a lens that folds the picture over")
-    # bent / straight = 1 + k1 s^2 + k2 s^4 + k3 s^6 with s = straight / focal
-    across = straight / focal
-    form = across[:, None] ** [2.0, 4.0, 6.0]
-    weights = straight[:, None]
-    (k1, k2, k3), *_ = np.linalg.lstsq(form * weights, bent - straight, rcond=None)
-    off = np.abs(straight * (1.0 + form @ [k1, k2, k3]) - bent).max()
-    if off > TOLERANCE:
+    # bent (1 + k4 s^2 + k5 s^4 + k6 s^6) = straight (1 + k1 s^2 + k2 s^4 + k3 s^6) with s = straight / focal
+    form = (straight / focal)[:, None] ** [2.0, 4.0, 6.0]
+    columns = np.hstack([straight[:, None] * form, -bent[:, None] * form])
+    k1, k2, k3, *below = np.linalg.lstsq(columns, bent - straight, rcond=None)[0]
+    ratio = (1.0 + form @ [k1, k2, k3]) / (1.0 + form @ below)
+    off = float(np.abs(straight * ratio - bent).max())
+    if not off <= TOLERANCE:
         raise InputError(
             f"a lens of which OpenCV's numbers are {off:.2g} pixels off, {quoted(radial.tolist())}"
         )
-    return np.array([k1, k2, 0.0, 0.0, k3])
+    return np.array([k1, k2, 0.0, 0.0, k3, *below])
 
 
 def _recognises(stored: Stored) -> bool:
