@@ -221,6 +221,12 @@ TRACK: tuple[Any, ...] = (
         help="Write poses, table, video and picture to this new folder.",
     ),
     _result(
+        "--write",
+        default="",
+        metavar="KIND,...",
+        help="Only these files, such as bvh,trc,html, and summary.json; by default all.",
+    ),
+    _result(
         "--force", is_flag=True, help="Replace DIR where it holds earlier results."
     ),
     _result(
