@@ -45,6 +45,8 @@ GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
 # of a camera from its world's origin: no metres, and no centimetres either
 FAR = 100.0
 FARTHER = 1000.0
+# metres: the origin is on the floor as a rule, or in the first camera
+BELOW = 1.0
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
 
@@ -340,7 +342,20 @@ def world_of(
             guesses["size"] = (
                 "the calibration is for pictures of this size, which it does not state"
             )
-    return upright(calibrations, up), METRES[unit or "m"], guesses
+    world = upright(calibrations, up)
+    heights = [
+        float(
+            world[1]
+            @ (-one.rotation.T @ one.in_metres(METRES[unit or "m"]).translation)
+        )
+        for one in calibrations
+        if one.rotation is not None and one.translation is not None
+    ]
+    if min(heights, default=0.0) < -BELOW:
+        guesses["below"] = (
+            f"a camera stands {-min(heights):.1f} m below its world's origin: is its translation its place?"
+        )
+    return world, METRES[unit or "m"], guesses
 
 
 def unit_of_heights(ratio: float) -> Unit:

@@ -69,11 +69,13 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     written_by = ""
     try:
         file = stored(path, text)
-        dialect = _dialect(file)
+        dialect = dialect_of(file)
         written_by = f" of {dialect.program}"
-        calibrations = dialect.read(file)
-        for calibration in calibrations:
-            calibration.camera(calibration.size or (1000, 1000), np.eye(3))
+        # of numbers that are not finite, or become so, a check says more
+        with np.errstate(all="ignore"):
+            calibrations = dialect.read(file)
+            for calibration in calibrations:
+                calibration.camera(calibration.size or (1000, 1000), np.eye(3))
     except (
         ValueError,
         TypeError,
@@ -100,7 +102,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     ]
 
 
-def _dialect(file: Stored) -> Dialect:
+def dialect_of(file: Stored) -> Dialect:
     """Return how a file is written. Raises InputError where no dialect is recognised."""
     for dialect in DIALECTS:
         if dialect.recognises(file):
