@@ -344,12 +344,9 @@ def world_of(
             )
     world = upright(calibrations, up)
     heights = [
-        float(
-            world[1]
-            @ (-one.rotation.T @ one.in_metres(METRES[unit or "m"]).translation)
-        )
-        for one in calibrations
-        if one.rotation is not None and one.translation is not None
+        float(world[1] @ place)
+        for calibration in calibrations
+        if (place := calibration.in_metres(METRES[unit or "m"]).position) is not None
     ]
     if min(heights, default=0.0) < -BELOW:
         guesses["below"] = (

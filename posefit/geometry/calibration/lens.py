@@ -57,6 +57,13 @@ class Calibration:
         """Whether the lens bends straight lines; a fisheye does so by itself."""
         return self.fisheye or bool(np.any(self.distortion))
 
+    @property
+    def position(self) -> Array | None:
+        """Where (3,) it stands in the world of its file; None where this does not place it."""
+        if self.rotation is None or self.translation is None:
+            return None
+        return np.asarray(-self.rotation.T @ self.translation)
+
     @classmethod
     def of(cls, camera: Camera, name: str = "camera") -> "Calibration":
         """Return what a file would say of a camera, whose lens does not bend straight lines."""

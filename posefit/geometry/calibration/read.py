@@ -55,10 +55,10 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     """
     path = Path(path)
     chosen = ""
-    file, colon, name = str(path).rpartition(":")
+    before, colon, after = str(path).rpartition(":")
     if colon and not path.is_file():
-        path = Path(file)
-        chosen = name
+        path = Path(before)
+        chosen = after
     if not path.is_file():
         raise InputError(
             f"{path}: expected a calibration file, got nothing of that name"
@@ -68,12 +68,12 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     text = read_text(path, LARGEST_FILE)
     written_by = ""
     try:
-        file = stored(path, text)
-        dialect = dialect_of(file)
+        content = stored(path, text)
+        dialect = dialect_of(content)
         written_by = f" of {dialect.program}"
         # of numbers that are not finite, or become so, a check says more
         with np.errstate(all="ignore"):
-            calibrations = dialect.read(file)
+            calibrations = dialect.read(content)
             for calibration in calibrations:
                 calibration.camera(calibration.size or (1000, 1000), np.eye(3))
     except (
