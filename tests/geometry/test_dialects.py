@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.calibration import DIALECTS, Calibration, read_calibrations
 from posefit.geometry.calibration.read import dialect_of
 from posefit.geometry.calibration.values import stored
+from posefit.geometry.calibration.world import check_places
 from posefit.geometry.camera import Camera
 from tests.cases import each
 from tests.geometry import programs
@@ -355,6 +357,42 @@ def test_places_where_translations_should_be_are_recognised(
         assert len(read_calibrations(path)) == count
         text = ring(count, height, places=True)
         assert "seem to be the places of cameras" in refused(tmp_path, text)
+
+
+def placed(turns: Array, moved: Array) -> list[Calibration]:
+    """Return calibrations of rotations (n, 3, 3) and translations (n, 3)."""
+    return [
+        Calibration("a", SIZE, np.array(programs.K), np.zeros(4), turn, place)
+        for turn, place in zip(turns, moved, strict=True)
+    ]
+
+
+def test_of_random_rigs_few_are_mistaken_and_most_places_are_recognised() -> None:
+    rng = np.random.default_rng(5)
+
+    def refused(turns: Array, moved: Array) -> bool:
+        try:
+            check_places(placed(turns, moved))
+        except InputError:
+            return True
+        return False
+
+    for count, most_wrong, least_right in ((2, 0.01, 0.7), (4, 0.002, 0.85)):
+        wrong = right = 0
+        for _ in range(500):
+            angles = rng.uniform(0.0, 2.0 * np.pi, count)
+            far = rng.uniform(2.5, 6.0, count)
+            tall = rng.uniform(0.4, 3.0, count)
+            places = np.column_stack([far * np.cos(angles), far * np.sin(angles), tall])
+            ahead = rng.normal(0.0, 0.3, (count, 3)) + [0.0, 0.0, 1.0] - places
+            ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+            aside = np.cross(ahead, [0.0, 0.0, 1.0])
+            aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+            turns = np.stack([aside, np.cross(ahead, aside), ahead], axis=1)
+            wrong += refused(turns, -np.einsum("nij,nj->ni", turns, places))
+            right += refused(turns, places)
+        assert wrong <= most_wrong * 500
+        assert right >= least_right * 500
 
 
 def test_cameras_beside_each_other_are_no_places(tmp_path: Path) -> None:

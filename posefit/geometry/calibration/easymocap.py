@@ -6,6 +6,7 @@ from typing import Any
 from posefit.geometry.calibration.dialect import Dialect
 from posefit.geometry.calibration.lens import Calibration, Place, numbers_of, stated
 from posefit.geometry.calibration.values import (
+    LARGEST_FILE,
     Stored,
     check_keys,
     counts,
@@ -15,7 +16,6 @@ from posefit.geometry.calibration.values import (
 )
 from posefit.reading import read_text
 
-LARGEST_FILE = 500_000  # bytes
 # kinds of values, each with an underscore and the camera's name; ccm corrects colours
 KINDS = ("K", "dist", "Rot", "R", "T", "H", "W", "ccm")
 

@@ -33,12 +33,13 @@ from posefit.geometry.calibration.values import (
 from posefit.reading import quoted
 
 MOST_TABLES = 10_000
-# of its distance: how far the point that cameras look at may be beside their axes
-AIMED = 0.5
-MATRIX = (
-    *("cameramatrix", "cameramat", "cameramtx", "matrix", "k", "m", "mtx"),
+INTRINSICS = (
     *("intrinsic", "intrinsics", "intrinsicmatrix", "intrinsicmat"),
     *("cameraintrinsic", "cameraintrinsics"),
+)
+MATRIX = (
+    *("cameramatrix", "cameramat", "cameramtx", "matrix", "k", "m", "mtx"),
+    *INTRINSICS,
 )
 LENS = (
     *("distortioncoefficients", "distortioncoeffs", "distortioncoefs"),
@@ -120,7 +121,6 @@ def _read(stored: Stored) -> list[Calibration]:
         tables = inner
     if cameras:
         check_others(stored.path.stem, around)
-        _check_places(cameras)
     return cameras
 
 
@@ -136,7 +136,7 @@ def _whole(table: Mapping[str, Any]) -> Mapping[str, Any]:
     for key, value in table.items():
         inner = isinstance(value, dict) and not any(map(_has_tables, value.values()))
         names = {plain(name) for name in value} if inner else set()
-        of_lens = plain(key) in MATRIX[-6:] and not names.isdisjoint((*MATRIX, "fx"))
+        of_lens = plain(key) in INTRINSICS and not names.isdisjoint((*MATRIX, "fx"))
         of_place = plain(key) in EXTRINSICS and not names.isdisjoint(ROTATION)
         whole |= value if of_lens or of_place else {key: value}
     return whole
@@ -249,50 +249,6 @@ def _is_fisheye(known: Mapping[str, Any]) -> bool:
         ):
             raise InputError(f"the lens model {quoted(known[key])}, which is not known")
     return False
-
-
-def _check_places(cameras: Sequence[Calibration]) -> None:
-    """Raise InputError where translations seem to be the cameras' places.
-
-    Keys do not tell. Cameras of one scene see one point in front of them, from above the floor: where they do not, but
-    do once translations are read as places, these are meant.
-    """
-    placed = [
-        (camera.rotation, camera.translation)
-        for camera in cameras
-        if camera.rotation is not None and camera.translation is not None
-    ]
-    if len(placed) < 2:
-        return
-    rotations = np.array([rotation for rotation, _ in placed])
-    translations = np.array([translation for _, translation in placed])
-    positions = -np.einsum("nji,nj->ni", rotations, translations)
-    if not _sees_one_point(rotations, positions) and _sees_one_point(
-        rotations, translations
-    ):
-        raise InputError(
-            "translations that seem to be the places of cameras: T must be -R times the place, from the "
-            "world to the camera"
-        )
-
-
-def _sees_one_point(rotations: Array, positions: Array) -> bool:
-    """Return whether cameras, from above the world's floor, have one point about the middle of their pictures."""
-    ahead = rotations[:, 2]
-    up = -rotations[:, 1].sum(axis=0)
-    heights = positions @ up / max(float(np.linalg.norm(up)), 1e-9)
-    across = np.eye(3) - np.einsum("ni,nj->nij", ahead, ahead)
-    point, _, rank, _ = np.linalg.lstsq(
-        across.sum(axis=0), np.einsum("nij,nj->i", across, positions), rcond=1e-6
-    )
-    depths = np.einsum("ni,ni->n", ahead, point - positions)
-    misses = np.linalg.norm(np.einsum("nij,nj->ni", across, point - positions), axis=1)
-    return bool(
-        rank == 3
-        and (depths > 0.0).all()
-        and (heights > 0.0).all()
-        and (misses < AIMED * depths).all()
-    )
 
 
 OPENCV = Dialect("OpenCV", lambda stored: stored.root is None, _read)

@@ -21,9 +21,10 @@ from posefit.geometry.calibration.panoptic import PANOPTIC
 from posefit.geometry.calibration.qualisys import QUALISYS
 from posefit.geometry.calibration.realsense import REALSENSE
 from posefit.geometry.calibration.ros import ROS
-from posefit.geometry.calibration.values import Stored, stored
+from posefit.geometry.calibration.values import LARGEST_FILE, Stored, stored
 from posefit.geometry.calibration.vicon import VICON
 from posefit.geometry.calibration.voxelpose import VOXELPOSE
+from posefit.geometry.calibration.world import check_places
 from posefit.reading import cut, quoted, read_text
 
 # A program joins by a line; the first that recognises a file reads it, OpenCV's users last, who choose their names.
@@ -44,7 +45,6 @@ DIALECTS: tuple[Dialect, ...] = (
     ANIPOSE,
     OPENCV,
 )
-LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
 MESSAGE = 300  # characters of what is wrong
 
 
@@ -74,6 +74,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         # of numbers that are not finite, or become so, a check says more
         with np.errstate(all="ignore"):
             calibrations = dialect.read(content)
+            check_places(calibrations)
             for calibration in calibrations:
                 calibration.camera(calibration.size or (1000, 1000), np.eye(3))
     except (

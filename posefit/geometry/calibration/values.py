@@ -17,6 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.reading import parsed_json, parsed_toml, quoted
 
+LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
 # the letters of OpenCV's element types whose numbers are rounded when they are read
 _ROUNDED = {"f": np.float32, "h": np.float16}
 _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
@@ -80,7 +81,7 @@ def check_keys(
 ) -> None:
     """Raise InputError for the first key of a table that is not known, and says something."""
     for key, value in table.items():
-        if key not in known and (says(value) or value is True):
+        if key not in known and says(value):
             raise InputError(
                 f"the key {quoted(key)} of {quoted(name)}, which {program} is not known to write"
             )

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others
 from posefit.geometry.calibration.lens import (
     Calibration,
     numbers_of,
@@ -21,7 +22,7 @@ from posefit.geometry.calibration.lens import (
     stated,
 )
 from posefit.geometry.calibration.values import Stored, number_of
-from posefit.geometry.calibration.xml_tags import check_attributes, numbers_in
+from posefit.geometry.calibration.xml_tags import numbers_in
 from posefit.reading import quoted
 
 MILLIMETRES = 0.001
@@ -53,8 +54,11 @@ def _read(stored: Stored) -> list[Calibration]:
 
 
 def _camera(camera: Any, frame: Any) -> Calibration:
-    check_attributes(camera, CAMERA, "Vicon")
-    check_attributes(frame, FRAME, "Vicon")
+    name = str(camera.get("DEVICEID"))
+    for tag, known in ((camera, CAMERA), (frame, FRAME)):
+        check_others(
+            name, {key: value for key, value in tag.items() if key not in known}
+        )
     size = numbers_of(numbers_in(camera.get("SENSOR_SIZE")), (2,))
     centre = numbers_of(numbers_in(frame.get("PRINCIPAL_POINT")), (2,))
     focal = number_of(frame.get("FOCAL_LENGTH"))
@@ -62,7 +66,7 @@ def _camera(camera: Any, frame: Any) -> Calibration:
     turn = numbers_of(numbers_in(frame.get("ORIENTATION")), (4,))
     position = MILLIMETRES * numbers_of(numbers_in(frame.get("POSITION")), (3,))
     return stated(
-        str(camera.get("DEVICEID")),
+        name,
         size,
         pinhole_matrix([focal, focal / aspect], centre),
         _lens(frame, centre, focal, size),

@@ -1,11 +1,10 @@
-"""What readers of XML share: tags that must be there, and attributes that must be known."""
+"""What readers of XML share: tags that must be there, and numbers in a text."""
 
-from collections.abc import Collection
 from typing import Any
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.calibration.values import check_keys, matrix_of
+from posefit.geometry.calibration.values import matrix_of
 
 
 def tag_of(parent: Any, path: str) -> Any:
@@ -19,8 +18,3 @@ def tag_of(parent: Any, path: str) -> Any:
 def numbers_in(text: str | None) -> Array:
     """Return the numbers of a text, separated by blanks."""
     return matrix_of({"data": text or ""})
-
-
-def check_attributes(tag: Any, known: Collection[str], program: str) -> None:
-    """Raise InputError for an attribute that is not known, and says something."""
-    check_keys(dict(tag.items()), known, tag.tag, program)
