@@ -191,26 +191,26 @@ def straightening(
         metres: Of the calibration's unit.
 
     Returns:
-        The camera, None where its masks are straight already, and sentences.
+        The camera without distortion, of square pixels; how masks and pictures become its own, None where they are;
+        sentences.
 
     Raises:
         InputError: The masks are not of this camera.
 
     """
     said = list[str]()
+    lens = Calibration.of(known, "") if isinstance(known, Camera) else known
     if isinstance(known, Camera) and (known.width, known.height) == size:
-        lens = Calibration.of(known)
         camera = known
     else:
-        stated = Calibration.of(known, "") if isinstance(known, Camera) else known
-        lens = _fitting(stated, filmed or size, scaled=filmed is None)
-        turn = (
-            world if isinstance(known, Calibration) and world is not None else np.eye(3)
-        )
-        factor = metres if isinstance(known, Calibration) else 1.0
-        camera = lens.in_metres(factor).camera(size, turn)
-        if stated.size is not None and stated.size != (filmed or size):
-            said.append(_resized(stated, filmed or size))
+        stated = lens.size
+        lens = _fitting(lens, filmed or size, scaled=filmed is None)
+        # a camera's world is upright, and in metres
+        if world is None or isinstance(known, Camera):
+            world = np.eye(3)
+        camera = lens.in_metres(metres).camera(size, world)
+        if stated not in (None, filmed or size):
+            said.append(_resized(known, filmed or size))
     square = camera.squared()
     if square is not camera:
         ratio = camera.focal[0] / camera.focal[1]
@@ -223,15 +223,16 @@ def straightening(
     return square, Straightening(square, lens, lens.maps(size, square)), said
 
 
-def _resized(known: Calibration, size: tuple[int, int]) -> str:
+def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:
     """Return what is said of pictures of another size than their calibration's."""
-    width, height = known.size or size
+    calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
+    width, height = calibration.size or size
     change = (
         f"is scaled to {size[0]}x{size[1]}"
-        if known.padded(size) is None
+        if calibration.padded(size) is None
         else f"holds for {size[0]}x{size[1]}, with rows or columns more or less at the end"
     )
-    name = f" {quoted(known.name)}" if known.name else ""
+    name = f" {quoted(calibration.name)}" if calibration.name else ""
     return f"the calibration{name} of {width}x{height} {change}"
 
 

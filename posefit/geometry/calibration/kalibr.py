@@ -34,7 +34,10 @@ KEYS = {
 def _recognises(stored: Stored) -> bool:
     return any(
         isinstance(table, dict)
-        and (CHAINED in table or {"camera_model", "intrinsics"} <= table.keys())
+        and (CHAINED in table or "camera_model" in table)
+        # users have a matrix under that name
+        and isinstance(table.get("intrinsics"), list)
+        and len(table["intrinsics"]) == 4
         for table in stored.values.values()
     )
 
