@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.errors import InputError
-from posefit.footage.masks import unpacked
+from posefit.errors import NoPersonError
+from posefit.footage.views import unpacked
 from posefit.silhouette.foreground import RIVAL_AREA, Image
 from posefit.silhouette.mask import Mask, padded_box
 
@@ -254,8 +254,8 @@ class People:
     ) -> tuple[list[Tracklet], str]:
         """Return the parts of the person who is followed, and what there is to say where there are several.
 
-        `name` names a frame; places in `choice` and in words are `scale` times as large as in masks. Raises InputError
-        where nobody has the number.
+        `name` names a frame; places in `choice` and in words are `scale` times as large as in masks. Raises
+        NoPersonError where nobody has the number.
         """
         persons = self.persons()
         if not persons:
@@ -276,7 +276,7 @@ class People:
             ]
             number = 1 + int(np.argmin(away))
         if not 1 <= number <= len(persons):
-            raise InputError(
+            raise NoPersonError(
                 f"person must be 1 to {len(persons)}, as many people as there are, got {number}"
             )
         if len(persons) == 1:

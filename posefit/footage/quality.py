@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.footage.masks import Views
+from posefit.footage.views import Observations
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image, Person
 from posefit.silhouette.mask import Mask, Silhouette, box_of, padded_box
@@ -303,21 +303,22 @@ def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array,
 
 
 def apparent_sizes(
-    views: Views, cameras: Sequence[Camera]
+    observations: Observations, cameras: Sequence[Camera]
 ) -> tuple[float, Array] | None:
     """Return by how much the rays of cameras to the person miss each other, and how tall the person is in each view.
 
     Both are medians over frames, in the cameras' unit; None where no frame is usable in all views.
     """
-    usable = [
-        k for k in range(len(views)) if all(masks.usable[k] for masks in views.masks)
-    ]
+    count = len(observations)
+    each = [view.usable[:count] for view in observations.views]
+    usable = np.flatnonzero(np.all(each, axis=0)).tolist()
     if not usable:
         return None
     misses = []
     heights = []
     for k in np.unique(np.linspace(0, len(usable) - 1, CAMERA_FRAMES).astype(int)):
-        extents = [extent_of(silhouette) for silhouette in views[usable[k]].silhouettes]
+        silhouettes = observations[usable[k]].silhouettes
+        extents = [extent_of(silhouette) for silhouette in silhouettes]
         miss, tall = apparent_size(cameras, extents)
         misses.append(miss)
         heights.append(tall)

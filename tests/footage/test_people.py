@@ -128,7 +128,7 @@ def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followe
     segmenter("one", factory, still_background=False)
     alone = Extraction("one", person=person)
     among = Extraction(background=f"0:{EMPTY}", person=person)
-    masks = Segmentation(video, alone, (None, None), among).read().masks
+    masks, *_ = Segmentation(video, alone, (None, None), among).read()
     shares = np.array(
         [
             [iou(masks.silhouette(k).mask, each) for each in pair]
