@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,20 +10,11 @@ from posefit.errors import InputError
 from posefit.footage.people import Choice, Chooser, People, planes_of
 from posefit.footage.views import View, border_of, empty_planes, full_planes, unpacked
 from posefit.motion.clips import FPS
-from posefit.silhouette.foreground import (
-    MAX_HOLE_AREA,
-    MIN_PIECE_AREA,
-    PIECE_REACH,
-    without_holes,
-)
+from posefit.silhouette.foreground import MAX_HOLE_AREA, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
+from posefit.silhouette.pieces import people_in
 
 BORDER_SHARE = 0.5  # of the image's border: a person covers no more of it
-# of the largest person's area: something so large may be another person
-RIVAL_AREA = 0.4
-# of the height of both: parts of a person that stand above each other are no farther
-# apart
-ABOVE_GAP = 0.3
 # of the person's area: the largest hole that is filled in a mask by itself. Between an
 # arm and the trunk it says where the arm is, and no other frame does
 MAX_HOLE_ALONE = 0.0005
@@ -71,7 +61,7 @@ def cleaned(
 
     for k in range(count):
         silhouette = _silhouette(view, k, inverted)
-        masks = people_in(silhouette) if usable[k] else []
+        masks = _people(silhouette) if usable[k] else []
         people.add(masks)
         mask = without_holes(masks[0], holes) if masks else silhouette.mask
         put(k, mask & silhouette.valid)
@@ -101,6 +91,14 @@ def _silhouette(view: View, k: int, inverted: bool) -> Silhouette:
     return Silhouette.of(~silhouette.mask, silhouette.valid) if inverted else silhouette
 
 
+def _people(silhouette: Silhouette) -> list[Mask]:
+    """Return the masks of the people in a silhouette; a single person's is the whole mask."""
+    people = people_in(silhouette.mask, silhouette.valid)
+    if len(people) == 1:
+        return [silhouette.mask]
+    return [person.mask for person in people]
+
+
 def _shows_enough(
     usable: NDArray[np.bool_], areas: Array, cut: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
@@ -122,60 +120,3 @@ def _is_inverted(view: View) -> bool:
         known = border_of(view.known, view.size)
     covered = (marked & known).sum(axis=1) > BORDER_SHARE * known.sum(axis=1)
     return bool(np.mean(covered[view.shows] if view.shows.any() else 0.0) > 0.5)
-
-
-def people_in(silhouette: Silhouette) -> list[Mask]:
-    """Return the masks of the people in a silhouette, the largest first; a single person's is the whole mask.
-
-    Pieces near each other are one person's; so are those with unknown pixels between them, and one above the other, as
-    a table leaves them. A piece much smaller than the largest is no person.
-    """
-    mask = silhouette.mask
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        mask.astype(np.uint8), connectivity=8
-    )
-    areas = stats[:, cv2.CC_STAT_AREA]
-    large = [k for k in range(1, count) if areas[k] >= MIN_PIECE_AREA * areas[1:].max()]
-    if len(large) < 2:
-        return [mask]
-    through = cv2.connectedComponents(
-        (mask | ~silhouette.valid).astype(np.uint8), connectivity=8
-    )[1]
-    # takes a tenth of a second to import
-    from scipy.sparse.csgraph import connected_components
-
-    near = np.zeros((len(large), len(large)), dtype=bool)
-    for row, k in enumerate(large):
-        distance = cv2.distanceTransform((labels != k).astype(np.uint8), cv2.DIST_L2, 3)
-        joined = through == through[labels == k][0]
-        for column, j in enumerate(large[:row]):
-            other = labels == j
-            near[row, column] = _is_one_person(
-                stats[k], stats[j], distance[other].min(), joined[other].all()
-            )
-    owners = connected_components(near, directed=False)[1]
-    groups = [
-        [k for k, owner in zip(large, owners, strict=True) if owner == number]
-        for number in np.unique(owners)
-    ]
-    totals = [sum(int(areas[k]) for k in group) for group in groups]
-    people = [
-        k
-        for k in np.argsort(totals)[::-1].tolist()
-        if totals[k] >= RIVAL_AREA * max(totals)
-    ]
-    return [mask] if len(people) == 1 else [np.isin(labels, groups[k]) for k in people]
-
-
-def _is_one_person(
-    first: NDArray[np.int32], second: NDArray[np.int32], distance: float, joined: bool
-) -> bool:
-    left, top, wide, tall = (
-        np.array([piece[k] for piece in (first, second)]) for k in range(4)
-    )
-    if joined or distance <= PIECE_REACH * tall.max():
-        return True
-    across = (left + wide).min() - left.max()
-    between = top.max() - (top + tall).min()
-    whole = (top + tall).max() - top.min()
-    return bool(across >= 0.5 * wide.min() and 0 <= between <= ABOVE_GAP * whole)

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import NoPersonError
 from posefit.footage.views import unpacked
-from posefit.silhouette.foreground import RIVAL_AREA, Image
+from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, padded_box
+from posefit.silhouette.pieces import RIVAL_AREA
 
 MAX_STEP = 1.0  # times the height: farther from where they are expected a person is not
 MAX_GAP_SECONDS = 1.0  # without a detection, after which a person is another one

@@ -510,8 +510,10 @@ class Segmentation:
         used[frames] = True
         one = scan.view
         # a pass states all of these
-        assert one.known is not None and own.view.known is not None
-        assert one.landmarks is not None and one.facings is not None
+        assert one.known is not None
+        assert own.view.known is not None
+        assert one.landmarks is not None
+        assert one.facings is not None
         view = replace(
             own.view,
             known=np.where(used[:, None], one.known, own.view.known),
