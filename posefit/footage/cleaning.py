@@ -8,19 +8,16 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.people import Choice, Chooser, People, planes_of
+from posefit.footage.quality import MOST
 from posefit.footage.views import View, border_of, empty_planes, full_planes, unpacked
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import MAX_HOLE_AREA, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
 from posefit.silhouette.pieces import people_in
 
-BORDER_SHARE = 0.5  # of the image's border: a person covers no more of it
 # of the person's area: the largest hole that is filled in a mask by itself. Between an
 # arm and the trunk it says where the arm is, and no other frame does
 MAX_HOLE_ALONE = 0.0005
-# of the person's area: where the picture's edge leaves less of it, there is too little
-# to search
-CUT_SHOWN = 0.5
 
 
 def cleaned(
@@ -107,7 +104,7 @@ def _shows_enough(
     whole = np.flatnonzero(usable & ~cut)
     for frame in np.flatnonzero(usable & cut) if len(whole) else ():
         enough[frame] = (
-            areas[frame] >= CUT_SHOWN * areas[whole[np.abs(whole - frame).argmin()]]
+            areas[frame] >= MOST * areas[whole[np.abs(whole - frame).argmin()]]
         )
     return enough
 
@@ -118,5 +115,5 @@ def _is_inverted(view: View) -> bool:
     known = np.ones_like(marked)
     if view.known is not None:
         known = border_of(view.known, view.size)
-    covered = (marked & known).sum(axis=1) > BORDER_SHARE * known.sum(axis=1)
+    covered = (marked & known).sum(axis=1) > MOST * known.sum(axis=1)
     return bool(np.mean(covered[view.shows] if view.shows.any() else 0.0) > 0.5)

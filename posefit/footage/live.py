@@ -24,12 +24,11 @@ from posefit.footage.video import Video, scaled
 from posefit.footage.views import View
 from posefit.motion.clips import FPS
 from posefit.reading import quoted
-from posefit.silhouette.foreground import Image
+from posefit.silhouette.foreground import BRIGHT, Image
 from posefit.silhouette.mask import Mask
 
 STALL_SECONDS = 5.0  # without a frame, after which a stream counts as broken
 EMPTY_SECONDS = 3.0  # in which the scene is still empty, by default: VSMM 1.1
-MASK_LEVEL = 127  # a pixel of a grey frame that is brighter belongs to the person
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +169,7 @@ def live_views(
     first = next(images)
     if first.image.ndim == 2:
         for live in chain([first], images):
-            mask = live.image > MASK_LEVEL
+            mask = live.image > BRIGHT
             usable = bool(mask.any() and not mask.all())
             yield _view(stream, live, mask, np.ones_like(mask), usable)
         return

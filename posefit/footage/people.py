@@ -1,6 +1,6 @@
 """The people of a film: who is who from frame to frame, and which of them is followed.
 
-A person goes on from frame to frame as they went, and keeps about their size and colours. Where people meet, a blob
+A person goes on from frame to frame as they went, and keeps about their colours. Where people meet, a blob
 shows several: what lies where one of them alone is expected is theirs, and the rest of it is unknown.
 """
 
@@ -25,12 +25,9 @@ MEMORY = 0.8  # of the last step, size and colours that is kept with each frame
 COVERED = 0.3
 SLACK = 0.04  # of the height: so far around where they are expected people may be
 AROUND = 0.3  # of the height: so far around where they are a network looks for a person
-LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
 CLEARER = 2.0  # times as many pixels of a person as of any other show whose a mask is
 MIN_DETECTIONS = 8  # frames of a person alone; what shows in fewer may be noise
-MIN_SCORE = 0.1  # of the best person's: less is noise
-COLOUR = 1.0  # what 100 grey levels of another colour count, in heights
-AREA = 0.5  # what an area e times as large counts, in heights
+COLOUR = 0.01  # what a grey level of another colour counts, in heights
 
 Cut = tuple[tuple[slice, slice], NDArray[np.uint8]]  # a box of a mask, and its bits
 # a person by their number, 1 the longest visible, or by a point of where they are when they come
@@ -93,7 +90,6 @@ class Tracklet:
         self.colours = blob.colours
         self._step = np.zeros(2)  # pixels a frame
         self._usable = 0
-        self._large = False
 
     def expected(self, frame: int) -> Array:
         """Return where (2,) their middle is expected."""
@@ -102,12 +98,8 @@ class Tracklet:
     def distance(self, blob: _Blob, frame: int) -> float:
         """Return how far a blob is from what is expected, in heights; infinite where it is too far away."""
         away = float(np.linalg.norm(blob.place - self.expected(frame))) / self.height
-        colour = float(np.abs(blob.colours - self.colours).mean()) / 100.0
-        return (
-            away + COLOUR * colour + AREA * abs(np.log(blob.area / self.area))
-            if away <= MAX_STEP
-            else np.inf
-        )
+        colour = float(np.abs(blob.colours - self.colours).mean())
+        return away + COLOUR * colour if away <= MAX_STEP else np.inf
 
     def outline(self, frame: int) -> Mask:
         """Return where they are expected, and a little around."""
@@ -135,14 +127,12 @@ class Tracklet:
         self.alone = self.alone + 1
         self.last = frame
         self.latest = blob
-        self._large = self._large or self.height > LARGE * len(blob.mask)
         self.detections[frame] = cut_out(blob.mask), None
 
     def confirmed(self, least: float = MIN_DETECTIONS) -> bool:
         """Return whether they are visible so often, and as a person, that they are no noise."""
-        return self._large and (self._usable if self.rows else self.alone) >= min(
-            MIN_DETECTIONS, least
-        )
+        frames = self._usable if self.rows else self.alone
+        return frames >= min(MIN_DETECTIONS, least)
 
     def add_row(self, frame: int, row: dict[str, Any]) -> None:
         """Take the row of `FrameQuality` of a frame."""
@@ -234,8 +224,7 @@ class People:
         confirmed = [
             k
             for k, person in enumerate(persons)
-            if scores[k] >= MIN_SCORE * max(scores)
-            and any(part.confirmed(least) for part in person)
+            if any(part.confirmed(least) for part in person)
         ]
         if not confirmed:  # whatever there is
             return [[part for person in persons for part in person]] if persons else []
@@ -317,10 +306,9 @@ def _distance(tracklet: Tracklet, other: Tracklet) -> float:
     first, second = sorted((tracklet, other), key=lambda part: min(part.detections))
     start = min(second.detections)
     _, *place = second.first
-    colour = float(np.abs(first.colours - second.colours).mean()) / 100.0
+    colour = float(np.abs(first.colours - second.colours).mean())
     away = float(np.linalg.norm(np.array(place) - first.latest.place)) / first.height
-    size = AREA * float(abs(np.log(second.area / first.area)))
-    return COLOUR * colour + size + away / (1.0 + max(0, start - first.last) / 30.0)
+    return COLOUR * colour + away / (1.0 + max(0, start - first.last) / 30.0)
 
 
 def _share(blob: _Blob, group: Sequence[Tracklet], frame: int) -> None:

@@ -30,6 +30,7 @@ from posefit.footage.images import (
     FLAT,
     FORMATS,
     IMAGES,
+    MANY_COLOURS,
     PIXELS,
     Marks,
     flat_share,
@@ -46,21 +47,18 @@ from posefit.footage.views import (
     times_of,
 )
 from posefit.geometry.skeleton import JOINTS
-from posefit.limits import check_decoded
-from posefit.reading import existing, quoted
+from posefit.limits import RATES, check_decoded
+from posefit.reading import cut, existing, quoted
 from posefit.silhouette.mask import Mask
 
 ARRAYS = (".npz", ".npy")  # files of masks
-NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
 PACKED = 2_000_000_000  # bytes of an .npz file
-MAX_FPS = 1000.0
 _KINDS = {".jpeg": ".jpg", ".tiff": ".tif"}
 NAMES = ("masks", "valid", "usable", "fps", "first", "landmarks")
 LAST = 1_000_000_000  # number of a frame
 
 # missing numbers for each image: where there are more, the numbers count something else
 MOST_MISSING = 9.0
-FEW_VALUES = 64  # masks with more values are soft
 COUNTED_VALUES = 4_096
 SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
 # times a scale: degrees may go a little beyond, as resampling makes them
@@ -69,7 +67,6 @@ NEAR_SCALE = 1.25
 SIGNED = 0.2
 # the same where the highest is no usual scale: resampling goes no farther beyond an edge
 RINGING = 0.1
-LISTED_LABELS = 6  # in a message
 
 # (height, width): grey levels, an alpha channel, indices of a palette, or colours
 # 0xRRGGBB
@@ -123,10 +120,7 @@ def images_in(folder: Path) -> list[Path]:
 def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     """Return the key that files are sorted by: numbers in their names count as such."""
     parts = re.findall(r"[0-9]+|[^0-9]+", file.name)
-    return [
-        (int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p)
-        for p in parts
-    ], file.name
+    return [(int(p), "") if p.isdigit() else (-1, p) for p in parts], file.name
 
 
 class Numbered(NamedTuple):
@@ -399,8 +393,9 @@ def _packed(
         else np.ones(count, dtype=bool)
     )
     fps = float(np.asarray(arrays["fps"])) if "fps" in arrays else None
-    if fps is not None and not 0.0 < fps <= MAX_FPS:
-        raise InputError(f"{name}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
+    if fps is not None and not RATES[0] <= fps <= RATES[1]:
+        ends = f"{RATES[0]:g} to {RATES[1]:g}"
+        raise InputError(f"{name}: fps must lie in {ends}, got {fps:g}")
     first = int(np.asarray(arrays["first"])) if "first" in arrays else 0
     if not 0 <= first <= LAST:
         raise InputError(
@@ -483,7 +478,7 @@ def _checked_stack(
             "f",
             f"be of shape {shape[0], len(JOINTS), 3}",
         ),
-        "fps": ((), "iuf", f"be a number up to {MAX_FPS:g}"),
+        "fps": ((), "iuf", "be a number, of frames a second"),
         "first": ((), "iu", "be a whole number, of the first frame"),
     }
     for key, (wanted, kinds, expected) in others.items():
@@ -602,7 +597,7 @@ class ValueCounts:
                 )
             return lambda values: np.asarray(values == label), []
         values = sorted(self.pixels)
-        many = len(values) > FEW_VALUES
+        many = len(values) > MANY_COLOURS
         if many and not self.soft and 2 * self.flat > self.several:
             most = [value for value, _ in self.pixels.most_common() if value]
             raise self._several(name, most)
@@ -671,10 +666,9 @@ class ValueCounts:
         """Return some labels, the commonest first; colours as hexadecimal numbers."""
         written = [
             str(value) if self.highest <= SCALES[-1] else f"0x{value:06x}"
-            for value in labels[:LISTED_LABELS]
+            for value in labels
         ]
-        others = len(labels) - LISTED_LABELS
-        return ", ".join(written) + (f" and {others} others" if others > 0 else "")
+        return cut(", ".join(written))
 
 
 def _above(threshold: float) -> Classifier:
@@ -693,7 +687,7 @@ def _many_colours(name: object) -> InputError:
 
 def _solid(values: Values, unique: NDArray[Any]) -> list[int]:
     """Return those values that fill 3 x 3 pixels somewhere: what lies between two others at an edge does not."""
-    if len(unique) > FEW_VALUES:
+    if len(unique) > MANY_COLOURS:
         return []
     numbers = np.searchsorted(unique, values).astype(np.uint8)
     kernel = np.ones((3, 3), np.uint8)

@@ -29,6 +29,7 @@ from posefit.footage.people import (
     rows_of,
 )
 from posefit.footage.quality import (
+    MOST,
     PEOPLE_SEGMENTER,
     FrameQuality,
     Verdict,
@@ -48,7 +49,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check
-from posefit.silhouette.foreground import Film, Image, Person, Segmenter, people
+from posefit.silhouette.foreground import BRIGHT, Film, Image, Person, Segmenter, people
 from posefit.silhouette.mask import Mask, touches_border
 
 T = TypeVar("T", bound=np.generic)
@@ -63,25 +64,19 @@ MISSING = 0.02  # the share of a file's frames that may be missing without a war
 # of the longer side: a person who goes as far across the picture within `STAYING` is
 # not on the spot
 CROSSING = 0.35
-# of the frames with a person: in so many a network has to find them to be used
-REDIRECTED = 0.5
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
 PERIOD = 5  # frames between two that are compared with the first
 SMALL = 160  # pixels: the width of the pictures that are compared
 TILES = 4  # to a side
-# pixels: smaller and larger structures are filtered out
-FINE = 1.0
-COARSE = 4.0
-REACH = 4  # pixels by which a tile is searched to either side
+# pixels: larger structures are filtered out, and a tile is searched so far to either
+# side
+REACH = 4
 # grey levels a pixel: a tile that changes less along some axis does not show where it
 # went
 TEXTURE = 0.7
 FREE = 0.25  # the share of these tiles that a person leaves free at least
-# the share of all tiles that have such texture at least: else it may be the person's
-# alone
-SPREAD = 0.5
 # of the width: a shift since the first frame that counts as a moving camera
 MOVED = 0.008
 
@@ -499,7 +494,7 @@ class Segmentation:
                 for k, index in enumerate(indices)
                 if index is not None and persons[index] == parts
             ]
-            if len(frames) >= REDIRECTED * len(
+            if len(frames) >= MOST * len(
                 {frame for part in parts for frame in part.detections}
             ):
                 break
@@ -651,9 +646,9 @@ class CameraMotion:
             cv2.resize(image, self._size, interpolation=cv2.INTER_AREA),
             cv2.COLOR_BGR2GRAY,
         )
-        # noise is no texture,
-        grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)
-        grey -= cv2.GaussianBlur(grey, (0, 0), COARSE)  # and light that changes is none
+        grey: Any = small.astype(np.float32)
+        # light that changes is no texture
+        grey -= cv2.GaussianBlur(grey, (0, 0), REACH)
         wide, tall = (side // TILES for side in self._size)
         corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]
         tiles = [
@@ -672,7 +667,7 @@ class CameraMotion:
                 )[3]
                 shifts.append(float(np.hypot(*np.subtract(best, REACH))))
         return (
-            float(np.quantile(shifts, FREE)) if len(shifts) > SPREAD * TILES**2 else 0.0
+            float(np.quantile(shifts, FREE)) if len(shifts) > MOST * TILES**2 else 0.0
         )
 
 
@@ -717,4 +712,4 @@ def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
         raise InputError(
             f"{path}: expected an image of what to ignore, got a file that is none"
         )
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > 127)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > BRIGHT)

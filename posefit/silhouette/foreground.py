@@ -27,8 +27,9 @@ GAP = 0.012  # of the image's height: what a closing joins
 # of the person's height: shadow between parts of the person that are no farther apart
 # is clothing
 BRIDGE = 0.15
+BRIGHT = 127  # a pixel of a mask that is brighter belongs to the person
 MAX_HOLE_AREA = 0.02  # of the person's area: a hole that is smaller is filled
-SAMPLES = 40  # frames that a median background looks at
+SAMPLES = 40  # frames that a median looks at, spread over a film
 HISTORY = 500  # frames that a mixture remembers
 # squared standard deviations from its nearest Gaussian, from which on a pixel is
 # foreground
@@ -163,7 +164,7 @@ class GivenMasks:
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return which pixels are bright, and that nothing is a shadow."""
-        bright = np.asarray(image.max(axis=2) > 127)
+        bright = np.asarray(image.max(axis=2) > BRIGHT)
         return bright, np.zeros_like(bright)
 
 
