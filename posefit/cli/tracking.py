@@ -169,7 +169,7 @@ def _print(
 
 
 @click.command()
-@click.argument("video")
+@click.argument("source")
 @click.option(
     "--out",
     required=True,
@@ -188,7 +188,7 @@ def _print(
 @options(track_flags("person"))
 @JSON
 def extract(
-    video: str,
+    source: str,
     out: str,
     as_json: bool,
     frames: Any,
@@ -196,16 +196,18 @@ def extract(
     person: Any,
     **options: Any,
 ) -> None:
-    """Take the masks of one person out of a VIDEO, or a folder of pictures, before a still background."""
+    """Write the masks of one person as a file, of whatever SOURCE one camera took.
+
+    They are taken out of a video, or of pictures, before a still background; masks are cleaned, and motions drawn.
+    """
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import resolve
 
-    source = resolve(video)
-    how = replace(
-        extraction_of(options, source.medium, settings) or Extraction(), person=person
-    )
-    result = run(source, out, how, frames=frames, progress=progress)
+    resolved = resolve(source)
+    how = extraction_of(options, resolved.medium, settings) or Extraction()
+    how = replace(how, person=person)
+    result = run(resolved, out, how, frames=frames, progress=progress)
     if result["guesses"]:
         say(f"guessed: {'; '.join(result['guesses'])}")
     for warning in result["warnings"]:
@@ -213,9 +215,12 @@ def extract(
     if as_json:
         click.echo(json.dumps(result))
         return
+    pieces = ""
+    if result["in_pieces"] is not None:
+        pieces = f", {result['in_pieces']} in pieces"
     click.echo(
-        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border, "
-        f"{result['in_pieces']} in pieces; written to {out}: watch preview.mp4"
+        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border{pieces}; "
+        f"written to {out}: watch preview.mp4"
     )
 
 

@@ -8,8 +8,14 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.people import Choice, Chooser, People, planes_of
-from posefit.footage.quality import MOST
-from posefit.footage.views import View, border_of, empty_planes, full_planes, unpacked
+from posefit.footage.views import (
+    MOST,
+    View,
+    border_of,
+    empty_planes,
+    full_planes,
+    unpacked,
+)
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import MAX_HOLE_AREA, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border

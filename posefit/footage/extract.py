@@ -95,7 +95,8 @@ def extract(
         "size": list(view.size),
         "fps": view.fps,
         "touching_border": int(border.sum()),
-        "in_pieces": sum(row["pieces"] > 1 for row in rows),
+        # which a film's quality.csv says
+        "in_pieces": sum(row["pieces"] > 1 for row in rows) if rows else None,
         "warnings": warnings,
         "guesses": [*view.guesses],
     }

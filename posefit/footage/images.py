@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from posefit.errors import InputError
+from posefit.footage.views import MOST
 from posefit.reading import check_size
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".gif", ".webp")
@@ -27,8 +28,6 @@ COLOUR_RANGE = 32
 COLOUR_SHARE = 0.02
 # a picture of a place, or a person cut out, has more; so many labels are rare
 MANY_COLOURS = 64
-# of the pixels of labels have neighbours of their own label; of degrees few have
-FLAT = 0.5
 # as Pillow calls what has no colours
 _GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")
 # what is wrong with a file is reported by posefit
@@ -179,7 +178,7 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
         numbers,
         photo=_is_colourful(colours)
         and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS
-        and flat_share(numbers) < FLAT,
+        and flat_share(numbers) < MOST,
     )
 
 
@@ -223,7 +222,7 @@ def _colour_numbers(colours: NDArray[np.uint8]) -> NDArray[np.int32]:
 def flat_share(values: NDArray[Any]) -> float:
     """Return which share of the pixels between the lowest and the highest tenth of values has equal neighbours.
 
-    Areas of labels are flat, and degrees pass from one value to the next.
+    Most of labels are flat areas, and degrees pass from one value to the next.
     """
     middle = values[1:-1, 1:-1]
     low, high = float(values.min()), float(values.max())

@@ -1,6 +1,6 @@
 """The people of a film: who is who from frame to frame, and which of them is followed.
 
-A person goes on from frame to frame as they went, and keeps about their colours. Where people meet, a blob
+A person goes on from frame to frame as they went, and keeps about their size and colours. Where people meet, a blob
 shows several: what lies where one of them alone is expected is theirs, and the rest of it is unknown.
 """
 
@@ -28,6 +28,7 @@ AROUND = 0.3  # of the height: so far around where they are a network looks for 
 CLEARER = 2.0  # times as many pixels of a person as of any other show whose a mask is
 MIN_DETECTIONS = 8  # frames of a person alone; what shows in fewer may be noise
 COLOUR = 0.01  # what a grey level of another colour counts, in heights
+AREA = 0.5  # what an area e times as large counts, in heights
 
 Cut = tuple[tuple[slice, slice], NDArray[np.uint8]]  # a box of a mask, and its bits
 # a person by their number, 1 the longest visible, or by a point of where they are when they come
@@ -99,7 +100,10 @@ class Tracklet:
         """Return how far a blob is from what is expected, in heights; infinite where it is too far away."""
         away = float(np.linalg.norm(blob.place - self.expected(frame))) / self.height
         colour = float(np.abs(blob.colours - self.colours).mean())
-        return away + COLOUR * colour if away <= MAX_STEP else np.inf
+        if away > MAX_STEP:
+            return np.inf
+        size = float(abs(np.log(blob.area / self.area)))
+        return away + COLOUR * colour + AREA * size
 
     def outline(self, frame: int) -> Mask:
         """Return where they are expected, and a little around."""
@@ -308,7 +312,10 @@ def _distance(tracklet: Tracklet, other: Tracklet) -> float:
     _, *place = second.first
     colour = float(np.abs(first.colours - second.colours).mean())
     away = float(np.linalg.norm(np.array(place) - first.latest.place)) / first.height
-    return COLOUR * colour + away / (1.0 + max(0, start - first.last) / 30.0)
+    size = float(abs(np.log(second.area / first.area)))
+    return (
+        COLOUR * colour + AREA * size + away / (1.0 + max(0, start - first.last) / 30.0)
+    )
 
 
 def _share(blob: _Blob, group: Sequence[Tracklet], frame: int) -> None:

@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.footage.people import MIN_DETECTIONS, SLACK
-from posefit.footage.views import Observations
+from posefit.footage.views import MOST, Observations
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import SAMPLES, Image, Person
 from posefit.silhouette.mask import Mask, Silhouette, box_of, padded_box
-
-MOST = 0.5  # a larger share of something is most of it
 
 # of a frame
 AREA_FRAMES = 15  # latest frames that a frame's area is compared with

@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import (
-    FLAT,
     FORMATS,
     IMAGES,
     MANY_COLOURS,
@@ -38,6 +37,7 @@ from posefit.footage.images import (
     read_marks,
 )
 from posefit.footage.views import (
+    MOST,
     Planes,
     Range,
     View,
@@ -63,9 +63,7 @@ COUNTED_VALUES = 4_096
 SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
 # times a scale: degrees may go a little beyond, as resampling makes them
 NEAR_SCALE = 1.25
-# of the highest value: where the lowest is as far below 0, they are logits, not degrees
-SIGNED = 0.2
-# the same where the highest is no usual scale: resampling goes no farther beyond an edge
+# of the highest value, where that is no usual scale: degrees go no farther below 0
 RINGING = 0.1
 
 # (height, width): grey levels, an alpha channel, indices of a palette, or colours
@@ -575,7 +573,7 @@ class ValueCounts:
         if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
             self.several += len(unique) > 2
-            self.flat += len(unique) > 2 and flat_share(values) >= FLAT
+            self.flat += len(unique) > 2 and flat_share(values) >= MOST
 
     def classifier(
         self, label: int | None, name: object
@@ -649,7 +647,9 @@ class ValueCounts:
         usual = any(
             0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
         )
-        if self.lowest < -(SIGNED if usual else RINGING) * self.highest:
+        # degrees go as far below 0 as beyond the scale
+        below = NEAR_SCALE - 1.0 if usual else RINGING
+        if self.lowest < -below * self.highest:
             return 0.0, "logits"
         if self.alpha and self.highest <= SCALES[1] // 2:
             return float(self.highest // 2), "translucent"

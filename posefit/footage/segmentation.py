@@ -29,7 +29,6 @@ from posefit.footage.people import (
     rows_of,
 )
 from posefit.footage.quality import (
-    MOST,
     PEOPLE_SEGMENTER,
     FrameQuality,
     Verdict,
@@ -38,6 +37,7 @@ from posefit.footage.quality import (
 )
 from posefit.footage.video import Video, scaled
 from posefit.footage.views import (
+    MOST,
     Range,
     View,
     empty_planes,
@@ -70,6 +70,7 @@ STAYING = 2.0  # seconds before and after a frame
 PERIOD = 5  # frames between two that are compared with the first
 SMALL = 160  # pixels: the width of the pictures that are compared
 TILES = 4  # to a side
+FINE = 1.0  # pixels: smaller structures are filtered out
 # pixels: larger structures are filtered out, and a tile is searched so far to either
 # side
 REACH = 4
@@ -646,8 +647,8 @@ class CameraMotion:
             cv2.resize(image, self._size, interpolation=cv2.INTER_AREA),
             cv2.COLOR_BGR2GRAY,
         )
-        grey: Any = small.astype(np.float32)
-        # light that changes is no texture
+        # noise is no texture, and light that changes is none
+        grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)
         grey -= cv2.GaussianBlur(grey, (0, 0), REACH)
         wide, tall = (side // TILES for side in self._size)
         corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]

@@ -25,6 +25,7 @@ from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, Silhouette
 
+MOST = 0.5  # a larger share of something is most of it
 Range = tuple[int | None, int | None]
 # (T, bytes): of each frame the bits of its pixels, row by row; bits after the last are 0
 Planes = NDArray[np.uint8]

@@ -221,7 +221,7 @@ def people(
         mask = without_holes(part.mask)
         border = touches_border(mask)
         area = int(mask.sum())
-        result.append(Person(mask, known | mask, area, part.count, part.rival, border))
+        result.append(Person(mask, known | mask, area, part.pieces, part.rival, border))
     return result
 
 

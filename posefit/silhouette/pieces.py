@@ -1,6 +1,6 @@
 """Which pieces of a mask are one person, whether others made it or a segmenter did."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -21,8 +21,8 @@ class Pieces(NamedTuple):
     """One person in a mask."""
 
     mask: Mask  # (height, width)
-    # in the mask without larger people: how many are large enough to be a part of one
-    count: int
+    # in the mask without larger people: how many are large enough to be part of one
+    pieces: int
     # the area of the largest of these that is not theirs, as a share of their own
     rival: float
 
@@ -64,9 +64,9 @@ def people_in(mask: Mask, known: Mask | None = None) -> list[Pieces]:
 
 
 def _owners(
-    labels: NDArray[np.int32],
-    stats: NDArray[np.int32],
-    areas: NDArray[np.int32],
+    labels: NDArray[Any],
+    stats: NDArray[Any],
+    areas: NDArray[Any],
     known: Mask | None,
 ) -> NDArray[np.int64]:
     """Return for each piece (n,) the number of its person, that of one of their large pieces; 0 for a speck alone."""

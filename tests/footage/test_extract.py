@@ -282,7 +282,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
             {"usable": np.zeros(12, dtype=bool)},
             "expected a frame that is usable, got none from 0 to 12",
         ),
-        ({"fps": np.array(0.0)}, "fps must be a number up to 1000, got 0"),
+        ({"fps": np.array(0.0)}, r"fps must lie in 0.001 to 1e\+06, got 0"),
     ],
 )
 def test_masks_that_contradict_themselves_are_named(
