@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,8 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.errors import InputError
+from posefit.errors import InputError, NoPersonError
 from posefit.footage.images import IMAGES
-from posefit.footage.masks import ARRAYS, PackedMasks, Views, undistorted
 from posefit.footage.people import Persons, part_at, paste
 from posefit.footage.quality import (
     apparent_size,
@@ -22,7 +21,9 @@ from posefit.footage.quality import (
     extent_of,
     meeting,
 )
+from posefit.footage.readers import ARRAYS
 from posefit.footage.scene import Scene
+from posefit.footage.views import Observations, View, undistorted
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import (
     Calibration,
@@ -50,23 +51,8 @@ BELOW = 1.0
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
 
-@dataclass(frozen=True, eq=False)
-class CameraView:
-    """The masks of one camera."""
-
-    masks: PackedMasks
-    warnings: Sequence[str]
-    name: str  # of the source
-    # size of the video, where the masks were taken from one
-    filmed: tuple[int, int] | None = None
-    pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
-    # of each frame, as `Segmenter.facing`; NaN where unknown
-    facings: Array | Sequence[float] = ()
-    moves: bool = False  # whether the camera seems to
-
-
 def combined(
-    views: Sequence[CameraView],
+    views: Sequence[View],
     name: str,
     body: Body,
     known: Sequence[Camera | Calibration],
@@ -82,8 +68,8 @@ def combined(
     InputError where views and cameras do not fit each other, or several cameras cannot see one person of this size.
     """
     rate, stated = _rate(views, fps)
-    guesses = [guess for view in views for guess in view.masks.guesses]
-    if not stated and len(views[0].masks) > 1:
+    guesses = [guess for view in views for guess in view.guesses]
+    if not stated and len(views[0]) > 1:
         guesses.append(f"{rate:g} frames a second")
     if not known:
         guesses.append(
@@ -99,10 +85,11 @@ def combined(
         )
         guesses += [sentence for sentences in said for sentence in sentences]
     else:
-        cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].masks.size)]
+        cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)]
     # several cameras distinguish front and back themselves
-    yaws = yaws_of(views[0].facings if len(views) == 1 else (), cameras[0], rate)
-    observations = Views([view.masks for view in views], yaws)
+    facings = views[0].facings if len(views) == 1 else None
+    yaws = yaws_of(() if facings is None else facings, cameras[0], rate)
+    observations = Observations(views, yaws)
     if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
         miss, tall = apparent
         if unit_is_open and np.median(tall) > 0.0:
@@ -126,7 +113,7 @@ def combined(
             miss = factor * miss
             tall = factor * tall
         if wrong := disagreement(miss, tall, body.stature):
-            raise InputError(f"{name}: {wrong}")
+            raise NoPersonError(f"{name}: {wrong}")
     first = observations[observations.first]
     yaw = first.yaw
     if view_degrees is not None:
@@ -147,7 +134,7 @@ def combined(
         + _unequal(views),
         guesses=[*guesses, *of_cameras.values()],
         pictures=views[0].pictures,
-        first=views[0].masks.first,
+        first=int(views[0].numbers[0]),
         camera_moves=views[0].moves,
     )
 
@@ -160,12 +147,13 @@ class Straightening:
     lens: Calibration
     maps: tuple[Any, Any]
 
-    def of_masks(self, masks: PackedMasks) -> PackedMasks:
-        """Return masks, and landmarks, of the straight camera."""
-        return undistorted(masks, self.lens, self.maps, self.camera)
+    def of(self, view: View) -> View:
+        """Return a view of the straight camera."""
+        pictures = view.pictures and partial(self._pictures, view.pictures)
+        straight = undistorted(view, self.lens, self.maps, self.camera)
+        return replace(straight, pictures=pictures)
 
-    def of_pictures(self, pictures: Callable[[], Iterator[Image]]) -> Iterator[Image]:
-        """Yield pictures of the straight camera."""
+    def _pictures(self, pictures: Callable[[], Iterator[Image]]) -> Iterator[Image]:
         for image in pictures():
             yield np.asarray(
                 cv2.remap(image, *self.maps, cv2.INTER_LINEAR), dtype=np.uint8
@@ -237,25 +225,16 @@ def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:
 
 
 def _straight(
-    world: Array, metres: float, known: Camera | Calibration, view: CameraView
-) -> tuple[Camera, CameraView, list[str]]:
+    world: Array, metres: float, known: Camera | Calibration, view: View
+) -> tuple[Camera, View, list[str]]:
     """Return the camera of a view, the view as that camera has it, and what is to be said of it."""
-    camera, how, said = straightening(
-        known, view.masks.size, view.filmed, world, metres
-    )
-    if how is None:
-        return camera, view, said
-    pictures = view.pictures and partial(how.of_pictures, view.pictures)
-    return (
-        camera,
-        replace(view, masks=how.of_masks(view.masks), pictures=pictures),
-        said,
-    )
+    camera, how, said = straightening(known, view.size, view.filmed, world, metres)
+    return camera, view if how is None else how.of(view), said
 
 
 def same_person(
     known: Sequence[Camera | Calibration],
-    first: CameraView,
+    first: View,
     size: tuple[int, int],
     persons: Persons,
     filmed: tuple[int, int] | None = None,
@@ -266,7 +245,7 @@ def same_person(
     frames: rays of level cameras meet anyhow. `known` are the cameras of both, and `persons` are the people in the
     other's masks, which have a `size` and were taken from a video of the size `filmed`.
     """
-    sizes = (first.masks.size, size)
+    sizes = (first.size, size)
     blank = np.zeros(size[::-1], dtype=bool)
     fitted = [
         camera
@@ -284,11 +263,11 @@ def same_person(
     for person in persons:
         # by how much rays miss each other, and the heights in both views
         pairs = list[tuple[float, Array]]()
-        for k in np.flatnonzero(first.masks.usable).tolist():
+        for k in np.flatnonzero(first.usable).tolist():
             part = part_at(person, k)
             if part is not None and part.detections[k][1] is None:
                 paste(part.detections[k][0], mask := blank.copy())
-                views = first.masks.silhouette(k), Silhouette.of(mask)
+                views = first.silhouette(k), Silhouette.of(mask)
                 pairs.append(apparent_size(cameras, [*map(_extent, fitted, views)]))
         heights = np.array([np.maximum(tall, 1e-9) for _, tall in pairs])
         misses = [miss / float(np.median(heights)) for miss, _ in pairs]
@@ -381,8 +360,8 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
     )
 
 
-def _unequal(views: Sequence[CameraView]) -> list[str]:
-    lengths = [len(view.masks) for view in views]
+def _unequal(views: Sequence[View]) -> list[str]:
+    lengths = [len(view) for view in views]
     if len(set(lengths)) == 1:
         return []
     came = ", ".join(
@@ -393,21 +372,19 @@ def _unequal(views: Sequence[CameraView]) -> list[str]:
     ]
 
 
-def _rate(views: Sequence[CameraView], fps: float | None) -> tuple[float, bool]:
+def _rate(views: Sequence[View], fps: float | None) -> tuple[float, bool]:
     """Return the frame rate of views: `fps`, or else what their files state, or 30; and whether it is stated.
 
     Raises InputError where views of masks differ in their rates, or in how many frames they have.
     """
     first = views[0]
     for view in views[1:]:
-        if view.filmed is None and len(view.masks) != len(first.masks):
-            came = f"{len(first.masks)} of {first.name} and {len(view.masks)} of {view.name}"
+        if view.filmed is None and len(view) != len(first):
+            came = f"{len(first)} of {first.name} and {len(view)} of {view.name}"
             raise InputError(f"views must have the same frames, got {came}")
     if fps is not None:
         return fps, True
-    stated = [
-        (view.masks.fps, view.name) for view in views if view.masks.fps is not None
-    ]
+    stated = [(view.fps, view.name) for view in views if view.fps is not None]
     for rate, name in stated[1:]:
         if views[0].filmed is None and rate != stated[0][0]:
             came = f"{stated[0][0]:g} of {stated[0][1]} and {rate:g} of {name}"

@@ -9,14 +9,13 @@ from typing import Any, TypeGuard
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
-from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
 from posefit.footage.source import (
     Footage,
+    Resolved,
     check_used,
-    kind_of,
+    resolve,
     scene_of,
-    sources_of,
 )
 from posefit.motion import built_in
 from posefit.motion.clips import (
@@ -49,7 +48,7 @@ _FILES = ("source", "train", "asf", "camera", "extraction")
 
 
 def track(
-    source: Footage | Scene | Sequence[Any] = "walk",
+    source: Footage | Scene | Resolved | Sequence[Any] = "walk",
     *,
     out: str | Path | None = None,
     force: bool = False,
@@ -73,17 +72,18 @@ def track(
     _check_names("track", options, [option.name for option in fields(TrackOptions)])
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
-    sources = _sources(source)
+    resolved = _resolved(source)
     changed = [
         name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)
     ]
     if scene is not None and changed:
         raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
-    kind = kind_of(sources[0])
-    check_used(kind, chosen.view)
-    _check_for_kind(chosen, kind == "motion", [*sources, *chosen.train])
-    followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
-    chosen = completed(chosen, followed if kind == "motion" else None)
+    check_used(resolved.medium, chosen.view)
+    known = resolved.medium == "motion"
+    _check_for_kind(chosen, known, [*resolved.named, *chosen.train])
+    named = resolved.named[0]
+    followed = named if isinstance(named, str | Path | Motion) else None
+    chosen = completed(chosen, followed if known else None)
     # before the work, as a name may be wrong
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)
     kinds = chosen_kinds(write)
@@ -99,14 +99,14 @@ def track(
             out,
             force,
             resume,
-            _identity(sources, chosen, options.get("train", ())),
+            _identity(resolved, chosen, options.get("train", ())),
             progress.log,
             kinds,
         )
     with recorder:
         with progress.phase("masks"):
             start = clocks()
-            scene = scene or scene_of(sources, progress, **chosen.view)
+            scene = scene or scene_of(resolved, progress, **chosen.view)
             # a known motion is drawn frame by frame, as it is tracked
             if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
@@ -116,14 +116,11 @@ def track(
         track = track_scene(
             scene, training, chosen, recorder=recorder, progress=progress
         )
-        names = [
-            each.name if isinstance(each, Motion) else name_of(each) for each in sources
-        ]
         # numbers of Python, whatever kind they were given as
         view_degrees = list(chosen.view_degrees) or None  # type: ignore[arg-type]
         setup = replace(
             track.setup,
-            source=names,
+            source=list(resolved.names),
             frames_chosen=list(chosen.frames),
             view_degrees=view_degrees,
         )
@@ -150,15 +147,15 @@ def _check_names(function: str, options: Iterable[str], known: Sequence[str]) ->
         raise TypeError(f"{function} has no option {unknown[0]!r}{hint}")
 
 
-def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
-    """Return one source a camera, or the motion of a scene."""
+def _resolved(source: Footage | Scene | Resolved | Sequence[Any]) -> Resolved:
+    """Return what a source is; of a scene, its motion."""
     if not isinstance(source, Scene):
-        return sources_of(source)
+        return resolve(source)
     if source.truth is None:
         raise InputError(
             f"a scene must be of a known motion, got {source.name}, whose truth is unknown"
         )
-    return [source.truth]
+    return resolve(source.truth)
 
 
 def _check_for_kind(
@@ -197,7 +194,7 @@ def _is_captured(motion: Footage) -> TypeGuard[str | Path]:
 
 
 def _identity(
-    sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]
+    source: Resolved, options: TrackOptions, train: Sequence[Source]
 ) -> dict[str, Digest]:
     """Return what a track must have in common with one that it goes on with."""
     values = {
@@ -205,16 +202,16 @@ def _identity(
         for option in fields(options)
         if declared(option).identifies
     }
-    values |= {"source": sources, "train": train, "version": __version__}
+    values |= {"source": source.named, "train": train, "version": __version__}
     # the skeleton beside an .amc counts as if it were given
     if beside := [
         skeleton_file(Path(motion), options.asf)
-        for motion in (*sources, *options.train)
+        for motion in (*source.named, *options.train)
         if isinstance(motion, str | Path) and _is_captured(motion)
     ]:
         values["asf"] = beside
     # a folder of that name is not read
-    named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()
+    named = source.medium == "motion" and source.named[0] in built_in.names()
     return {
         name: digest_of(
             value, files=name in _FILES and not (named and name == "source")
