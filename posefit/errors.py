@@ -34,6 +34,10 @@ class InputError(ValueError):
         super().__init__(printable(str(message)))
 
 
+class NoPersonError(InputError):
+    """Masks show no person, or not the one who is meant; another segmenter may find them."""
+
+
 class PluginWarning(UserWarning):
     """A plugin is left out. The message, on one line, names it and says why."""
 

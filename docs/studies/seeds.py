@@ -17,7 +17,7 @@ from posefit.cli.options import EXTRACTION, FRAMES, options, track_flags
 from posefit.cli.output import Command
 from posefit.cli.tracking import extraction_of
 from posefit.evaluation.errors import LOST
-from posefit.footage.masks import Range
+from posefit.footage.views import Range
 from posefit.geometry.skeleton import BONES
 from posefit.progress import QUIET
 from posefit.tracking.front import track

@@ -1,7 +1,7 @@
 """Segmenters that compare each frame with a still background."""
 
 from posefit.fitting.check import at_least, positive
-from posefit.footage.masks import span
+from posefit.footage.views import span
 from posefit.silhouette.foreground import (
     HISTORY,
     SAMPLES,

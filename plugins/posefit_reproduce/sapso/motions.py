@@ -12,8 +12,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
+from posefit.footage.views import Range
 from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
 from posefit.sweep.cell import digest_of
