@@ -3,14 +3,14 @@
 `FRAME` are the columns of frames.csv: a column is a line there, and its values in `evaluated`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evaluation.measures import MEASURES, Measure, Measures, Spread
+from posefit.evaluation.measures import MEASURES, Effort, Measure, Measures, Spread
 from posefit.fitting import metrics
 from posefit.fitting.prior import Latents
 from posefit.fitting.tracker import Frame, Observation
@@ -117,16 +117,14 @@ def evaluated(
     prior: Latents | None,
     training: Array | None,
     beta: float,
-    clock: Array,
-    effort: Mapping[str, int] | None = None,
+    effort: Effort,
 ) -> tuple[Table, Measures]:
     """Return a column for each figure of a frame, and what the whole track is worth.
 
     Baselines have the true root and translation, which a tracker has not: `mean_pose`, the mean of the training poses
     (n, 63), which only the errors against a truth need; `persistence`, the true pose of the first frame; `nearest`, the
     training pose of least cost in each frame. `prior_floor_degrees` is the error of the truth projected into the prior,
-    which is no floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took, and
-    `effort` the evaluations of each stage; without it all are of the frames.
+    which is no floor where a prior is not linear.
     """
     cost = np.array([frame.cost for frame in frames])
     held = np.zeros(len(frames), dtype=bool)
@@ -153,9 +151,8 @@ def evaluated(
         "evaluations": evaluations,
         "wall_seconds": np.array([frame.seconds for frame in frames]),
     }
-    seconds, cpu_seconds = clock.tolist()
-    effort = effort or {"frames": int(evaluations.sum())}
-    total = sum(effort.values())
+    stages = effort.evaluations or {"frames": int(evaluations.sum())}
+    total = sum(stages.values())
     measures = Measures(
         **error_measures,
         **certainty_measures,
@@ -163,11 +160,11 @@ def evaluated(
         iou=float(iou[usable].mean()),
         cost=float(cost[usable].mean()),
         held_frames=int(held.sum()),
-        seconds_per_frame=seconds / len(frames),
-        cpu_seconds_per_frame=cpu_seconds / len(frames),
+        seconds_per_frame=effort.seconds / len(frames),
+        cpu_seconds_per_frame=effort.cpu_seconds / len(frames),
         evaluations=total,
-        effort=effort,
-        evaluations_per_second=total / seconds,
+        effort=stages,
+        evaluations_per_second=total / effort.seconds,
     )
     return table, measures
 

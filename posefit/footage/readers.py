@@ -124,6 +124,19 @@ def read_views(
     return together(masks, names)
 
 
+def first_number(sources: Iterable[Any]) -> int:
+    """Return the number of the first frame that sources have in common, which archives of masks state; 0 of others."""
+    first = 0
+    for source in sources:
+        if isinstance(source, str | Path) and str(source).lower().endswith(".npz"):
+            with archived(
+                Path(source), NAMES, "the key masks", PACKED, single=True
+            ) as arrays:
+                if "first" in arrays:
+                    first = max(first, int(np.asarray(arrays["first"])))
+    return first
+
+
 def images_of(source: Path | Masks) -> tuple[Path, ...] | None:
     """Return the images of a source; None where it has none. Raises InputError for a folder without any."""
     if isinstance(source, tuple):

@@ -9,7 +9,7 @@ from typing import Any, TypeGuard
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
-from posefit.footage.readers import name_of
+from posefit.footage.readers import first_number, name_of
 from posefit.footage.scene import Scene
 from posefit.footage.source import (
     Footage,
@@ -123,11 +123,19 @@ def track(
 
 
 def fit(
-    source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any
+    source: Footage | Sequence[Any] = "walk",
+    *,
+    frame: int | None = None,
+    **options: Any,
 ) -> Fit:
-    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
+    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`.
+
+    The frame has its number as filmed, of a motion that after resampling; by default it is the first.
+    """
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])
+    if frame is None:
+        frame = 0 if isinstance(source, Scene) else first_number(sources_of(source))
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from posefit.evaluation.measures import Effort
 from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
@@ -189,9 +190,16 @@ def track_scene(
             progress.log(guess)
         # what a track is compared with is no effort of the method
         with progress.phase("evaluate"), uncounted():
-            clock = clocks() - start_clocks + scene.reading_seconds
+            taken = clocks() - start_clocks + scene.reading_seconds
             track = evaluate(
-                scene, frames, tracked, shape, method, task, options, clock, effort
+                scene,
+                frames,
+                tracked,
+                shape,
+                method,
+                task,
+                options,
+                Effort(*taken.tolist(), evaluations=effort),
             )
     for warning in track.log.warnings[len(scene.warnings) :]:
         progress.warn(warning)
