@@ -2,7 +2,7 @@
 
 import sys
 
-STOPPED = 130  # the exit status of a program that Ctrl-C ended
+from posefit.errors import STOPPED
 
 
 def main() -> None:

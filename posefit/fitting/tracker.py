@@ -402,8 +402,9 @@ class SynthesisTracker:
                 yield latest
                 continue
             budget = task.evaluations - predictor.guess_evaluations
-            several = space.start is not None and len(space.start.others) > 0
-            if several and self.next_frame == "start":
+            # of a single picture, which nothing that follows can correct: a track goes on from one swarm as well
+            alone = self.next_frame == "start" and len(task.modes) > 1
+            if alone and space.start is not None and space.start.others:
                 searches = self._raced(space, observation, budget, rng)
                 best = cheapest(searches[0])
                 predictor.commit(best.best)

@@ -61,6 +61,7 @@ MOST_MISSING = 9.0
 FEW_VALUES = 64  # masks with more values are soft
 COUNTED_VALUES = 4_096
 SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
+PERCENT = 100.0
 # times a scale: degrees may go a little beyond, as resampling makes them
 NEAR_SCALE = 1.25
 # of the highest value: where the lowest is as far below 0, they are logits, not degrees
@@ -657,8 +658,9 @@ class ValueCounts:
     def _half(self) -> tuple[float, str]:
         """The value half way to a whole person, 127 of 255, as whole numbers have no middle; and what the values are.
 
-        Signed ones are a network's logits, of which 0 is the middle. Degrees that were resampled go a little below 0,
-        and reach about a whole person. An alpha channel that is nowhere half opaque is a translucent colour.
+        Numbers up to about 100 are percentages. Signed ones are a network's logits, of which 0 is the middle. Degrees
+        that were resampled go a little below 0, and reach about a whole person. An alpha channel that is nowhere half
+        opaque is a translucent colour.
         """
         usual = any(
             0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
@@ -670,6 +672,9 @@ class ValueCounts:
         # of no usual scale
         if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:
             return self.highest / 2.0, "degrees"
+        # above half of 255 there is nothing
+        if 0.5 * PERCENT < self.highest <= NEAR_SCALE * PERCENT:
+            return 0.5 * PERCENT, "percentages"
         full = next(
             (scale for scale in SCALES if self.highest <= NEAR_SCALE * scale),
             self.highest,

@@ -1,5 +1,6 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,11 +10,13 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import NAMES, SPREAD, Shape, fit_shape
-from posefit.fitting.tracker import Frame, Task
+from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
+from posefit.motion import built_in, recorded
+from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.silhouette.cost import BETA, pose_costs
@@ -78,9 +81,11 @@ def initialise(
     compile_for(scene, task)
     start = clocks()
     shape = None
-    if scene.count == 1:  # it is one search, by the tracker itself
-        return Initialised(task, None, start, {})
     effort = dict[str, int]()
+    if scene.count == 1:  # it is one search, by the tracker itself
+        if method.prior is not None and task.start is not None:
+            task, effort["first_pose"] = guessed(task, next(iter(scene.observations)))
+        return Initialised(task, None, start, effort)
     body_frames = options.body_frames or 0
     if options.restarts:
         searched = scene.observations, method.follow, options.restarts, options.seed
@@ -108,6 +113,24 @@ def initialise(
         effort["build"] = round(drawn.poses / len(scene.cameras))
         task = replace(task, body=shape.body, cameras=cameras)
     return Initialised(task, shape, start, effort)
+
+
+def guessed(task: Task, observation: Observation) -> tuple[Task, int]:
+    """Return the task of one picture with modes of what it may show, and the evaluations that these took of its budget.
+
+    A built-in walk is all that its prior knows, but not all that people do: where nothing else is to be learned from,
+    the modes are poses of the library, which a prior need not be able to say.
+    """
+    library = task
+    if all(motion.name in built_in.names() for motion in task.training):
+        clips = training_clips([recorded.LIBRARY])
+        library = replace(task, training=training_motions(clips, task.fps))
+    drawn = PoseCount()
+    with drawn.counting():
+        modes = guessed_modes(library, observation)
+    used = math.ceil(drawn.poses / len(task.cameras))
+    task = replace(task, modes=modes, start=None, evaluations=task.evaluations - used)
+    return task, used
 
 
 def fitted_build(

@@ -118,4 +118,8 @@ def _open_poses(
     ]
     every = [group.reshape(-1, group.shape[2]) for group in groups]
     repeated = [np.repeat(places, group.shape[1], axis=0) for group in groups]
-    return np.concatenate(every), np.concatenate(repeated)
+    # of what was guessed, the poses as they are: the prior may not be able to say them
+    guessed = [mode for _, mode in task.modes]
+    poses = np.concatenate([*(mode.poses[:1] for mode in guessed), *every])
+    places = np.concatenate([*(mode.translations[:1] for mode in guessed), *repeated])
+    return poses, places
