@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
@@ -136,7 +136,7 @@ class Registry:
             if _taken(f"{offer.kind} {offer.name!r}") in plugin.cause
         ]
 
-    @property
+    @cached_property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
         """The offers of all plugins that were loaded."""
         offers = [offer for plugin in self.plugins for offer in plugin.offers]

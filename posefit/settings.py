@@ -4,8 +4,9 @@ import inspect
 import json
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from posefit import hints
@@ -35,7 +36,14 @@ class Setting:
 
 
 def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
-    """Return the settings that a factory takes, in the order of its signature."""
+    """Return the settings that a factory takes, in the order of its signature; a signature is read once."""
+    if isinstance(factory, Hashable):
+        return _settings_of(factory)
+    return _settings_of.__wrapped__(factory)
+
+
+@lru_cache
+def _settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     # the others may be hints of names that only a type checker imports
     return tuple(
         Setting(

@@ -14,6 +14,7 @@ of walks and turns from all sides; a track goes wrong whose mean error is above 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -29,7 +30,7 @@ from posefit.fitting.start import modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.motion import recorded
-from posefit.motion.built_in import average_skeleton
+from posefit.motion.built_in import average_skeleton, other_styles
 from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.output.picture import ALTERNATIVES, MIN_WEIGHT
@@ -39,6 +40,7 @@ from posefit.sweep.cell import ALL_AROUND, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.uncertainty.modes import other_modes
 from posefit_exemplars.lookup import Lookup
+from posefit_priors.pca import PCA
 from table import markdown, percent
 
 SIZE = (320, 240)
@@ -216,6 +218,13 @@ IMAGES = (
 )
 
 
+@lru_cache
+def of_walks() -> PCA:
+    """Return the prior that has learned from the built-in walks."""
+    walks = training_motions(training_clips(other_styles("walk")), 30.0)
+    return PCA().fit(np.concatenate([walk.poses[:, 3:] for walk in walks]))
+
+
 @main.command("images")
 def single_images() -> None:
     """Print the errors of single images, and those of the best of the poses shown."""
@@ -230,15 +239,18 @@ def single_images() -> None:
                 for clip in GROUPS[name]
                 if clip.subject != image.clip.subject
             ]
+            known: dict[str, Any] = {"method": method, "train": others}
+            if not others:
+                known["train"] = [image.clip.library]
+            if "@" in method and not others:  # as by default, but for the person
+                known["method"] = (method.partition("@")[0], of_walks())
+                known["settings"] = {"tracker.tilt": "learned"}
             fit = posefit.fit(
                 image.mask,
-                method=method,
                 camera=image.camera,
                 height=image.body.stature,
-                body_frames=0,
-                smooth=False,
                 progress=QUIET,
-                train=others if "@" in method else [image.clip.library],
+                **known,
             )
             skeleton = fit.track.motion.skeleton
             shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[

@@ -47,6 +47,7 @@ def activity_of(name: str) -> str:
     return re.sub(r"-[a-z]$", "", name)
 
 
+@lru_cache
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind, what its prior is trained on by default."""
     _check(name)

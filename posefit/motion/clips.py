@@ -147,23 +147,23 @@ def training_clips(
     """
     clips = []
     poses = 0
+    most = allowed_bytes()
     for source in sources:
         for clip in _clips(source, stated, followed):
             clips.append(clip)
             poses += clip.count(FPS)
-            _check_memory(poses, FPS)
+            _check_memory(poses, FPS, most)
     return clips
 
 
 def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
     """Return the motions of clips at a rate. Raises InputError where they would take more memory than there may be."""
-    _check_memory(sum(clip.count(fps) for clip in clips), fps)
+    _check_memory(sum(clip.count(fps) for clip in clips), fps, allowed_bytes())
     return [clip.motion(fps) for clip in clips]
 
 
-def _check_memory(poses: int, fps: float) -> None:
-    """Raise InputError where learning from poses would take more memory than this process may have."""
-    most = allowed_bytes()
+def _check_memory(poses: int, fps: float, most: int) -> None:
+    """Raise InputError where learning from poses would take more memory, in bytes, than this process may have."""
     if poses * POSE_BYTES > most:
         took = f"{poses * POSE_BYTES / 1e9:.1f} GB for {poses:,} poses at {fps:g} frames a second"
         raise InputError(

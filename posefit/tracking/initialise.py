@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +85,9 @@ def initialise(
     effort = dict[str, int]()
     if scene.count == 1:  # it is one search, by the tracker itself
         if method.prior is not None and task.start is not None:
-            task, effort["first_pose"] = guessed(task, next(iter(scene.observations)))
+            shown = next(iter(scene.observations))
+            task, used = guessed(task, shown, within_prior=not options.smooth)
+            effort["first_pose"] = used
         return Initialised(task, None, start, effort)
     body_frames = options.body_frames or 0
     if options.restarts:
@@ -115,22 +118,31 @@ def initialise(
     return Initialised(task, shape, start, effort)
 
 
-def guessed(task: Task, observation: Observation) -> tuple[Task, int]:
+def guessed(
+    task: Task, observation: Observation, within_prior: bool
+) -> tuple[Task, int]:
     """Return the task of one picture with modes of what it may show, and the evaluations that these took of its budget.
 
     A built-in walk is all that its prior knows, but not all that people do: where nothing else is to be learned from,
-    the modes are poses of the library, which a prior need not be able to say.
+    the modes are poses of the library, unless the result has to stay within the prior.
     """
     library = task
-    if all(motion.name in built_in.names() for motion in task.training):
-        clips = training_clips([recorded.LIBRARY])
-        library = replace(task, training=training_motions(clips, task.fps))
+    if not within_prior and all(
+        motion.name in built_in.names() for motion in task.training
+    ):
+        library = replace(task, training=_library(task.fps))
     drawn = PoseCount()
     with drawn.counting():
         modes = guessed_modes(library, observation)
     used = math.ceil(drawn.poses / len(task.cameras))
     task = replace(task, modes=modes, start=None, evaluations=task.evaluations - used)
     return task, used
+
+
+@lru_cache(maxsize=1)
+def _library(fps: float) -> list[Motion]:
+    """Return all recorded motions at a rate."""
+    return training_motions(training_clips([recorded.LIBRARY]), fps)
 
 
 def fitted_build(

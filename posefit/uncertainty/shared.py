@@ -53,12 +53,15 @@ def in_footage(model: Recalibration, cameras: int, height_known: bool) -> Recali
     )
 
 
+_PART_OF = {name: part for part, names in PARTS.items() for name in names}
+_PARTS_OF_JOINTS = [_PART_OF[kind(joint)] for joint in JOINTS]
+
+
 def shared_spreads(cameras: int, world: bool = False) -> Array:
     """Return by how much joints (27,) are off, metres on each axis: about the root, or in the world but for depth."""
-    part_of = {name: part for part, names in PARTS.items() for name in names}
     column = min(cameras, 3) - 1
     return np.array(
-        [1e-3 * SHARED_MM[part_of[kind(joint)]][world][column] for joint in JOINTS]
+        [1e-3 * SHARED_MM[part][world][column] for part in _PARTS_OF_JOINTS]
     )
 
 
