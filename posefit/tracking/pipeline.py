@@ -34,6 +34,7 @@ from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import Method, prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.polish import (
+    beyond_prior,
     polish_evaluations,
     polished,
     with_one_mode,
@@ -155,6 +156,11 @@ def track_scene(
             shown = next(iter(scene.observations))
             frames = [polished(task, frames[0], shown, polishing, method.audit.beta)]
             effort["frames"] = _evaluations(frames)
+            assert method.prior is not None
+            left = beyond_prior(method.prior, task.body.skeleton, frames[0].pose)
+            if left:
+                progress.warn(left)
+                scene = replace(scene, warnings=[*scene.warnings, left])
         elif alone and method.prior is not None and frames[0].posterior is None:
             frames = [with_one_mode(frames[0])]
         smoothed = Smoothed(scene, frames, shape)

@@ -16,10 +16,13 @@ from posefit.fitting.contours import (
     precisions,
     race_count,
 )
+from posefit.fitting.prior import Latents
 from posefit.fitting.start import posterior_of
 from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import exchanged_limbs, facing, reflected_poses
 from posefit.silhouette.cost import known_views, pose_costs
+from posefit.uncertainty.modes import APART, poses_apart
 
 SHARE = 0.5  # of a frame's evaluations: those of polishing
 # standard deviations that a searched pose is off: radians, and metres
@@ -80,6 +83,20 @@ def polished(
         evaluations=total,
         trace=np.vstack([frame.trace, [total, least]]),
         posterior=posterior_of(poses, places, costs),
+    )
+
+
+def beyond_prior(prior: Latents, skeleton: Skeleton, pose: Array) -> str:
+    """Return what a user should know of a pose (66,) that a prior cannot say; "" where it can."""
+    latents = np.clip(prior.transform(pose[None, 3:]), prior.low, prior.high)
+    nearest = pose[None].copy()
+    nearest[:, 3:] = prior.inverse_transform(latents)
+    off = float(poses_apart(skeleton, pose[None], nearest)[0, 0])
+    if off <= APART:
+        return ""
+    return (
+        f"the prior does not know this pose: the nearest that it knows is {1e3 * off:.0f} mm off, "
+        "so that the search had to leave it; --train names motions with such poses"
     )
 
 
