@@ -11,7 +11,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import NAMES, SPREAD, Shape, fit_shape
-from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
+from posefit.fitting.tracker import Follow, Frame, Observation, Task, guessed_modes
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -27,7 +27,6 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import (
     TRIAL_FRAMES,
     TRIAL_STRIDE,
-    Follow,
     best_restart,
     first_shown_whole,
     usable_observations,

@@ -197,6 +197,7 @@ def track_scene(
         # what a track is compared with is no effort of the method
         with progress.phase("evaluate"), uncounted():
             taken = clocks() - start_clocks + scene.reading_seconds
+            seconds, cpu_seconds = taken.tolist()
             track = evaluate(
                 scene,
                 frames,
@@ -205,7 +206,7 @@ def track_scene(
                 method,
                 task,
                 options,
-                Effort(*taken.tolist(), evaluations=effort),
+                Effort(seconds, cpu_seconds, effort),
             )
     for warning in track.log.warnings[len(scene.warnings) :]:
         progress.warn(warning)
