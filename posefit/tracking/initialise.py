@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +15,6 @@ from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
-from posefit.motion import built_in, recorded
-from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.silhouette.cost import BETA, pose_costs
@@ -33,6 +30,7 @@ from posefit.tracking.restarts import (
 )
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility
+from posefit.uncertainty.modes import Posterior
 
 MIN_BODY_FRAMES = 5
 # ours: within which a walker hardly turns farther than a search reaches, 45 degrees
@@ -85,8 +83,10 @@ def initialise(
     if scene.count == 1:  # it is one search, by the tracker itself
         if method.prior is not None and task.start is not None:
             shown = next(iter(scene.observations))
-            task, used = guessed(task, shown, within_prior=not options.smooth)
+            modes, used = guessed(task, shown)
             effort["first_pose"] = used
+            left = task.evaluations - used
+            task = replace(task, modes=modes, start=None, evaluations=left)
         return Initialised(task, None, start, effort)
     body_frames = options.body_frames or 0
     if options.restarts:
@@ -118,30 +118,13 @@ def initialise(
 
 
 def guessed(
-    task: Task, observation: Observation, within_prior: bool
-) -> tuple[Task, int]:
-    """Return the task of one picture with modes of what it may show, and the evaluations that these took of its budget.
-
-    A built-in walk is all that its prior knows, but not all that people do: where nothing else is to be learned from,
-    the modes are poses of the library, unless the result has to stay within the prior.
-    """
-    library = task
-    if not within_prior and all(
-        motion.name in built_in.names() for motion in task.training
-    ):
-        library = replace(task, training=_library(task.fps))
+    task: Task, observation: Observation
+) -> tuple[Sequence[tuple[float, Posterior]], int]:
+    """Return modes of what one picture may show, and the evaluations that these took."""
     drawn = PoseCount()
     with drawn.counting():
-        modes = guessed_modes(library, observation)
-    used = math.ceil(drawn.poses / len(task.cameras))
-    task = replace(task, modes=modes, start=None, evaluations=task.evaluations - used)
-    return task, used
-
-
-@lru_cache(maxsize=1)
-def _library(fps: float) -> list[Motion]:
-    """Return all recorded motions at a rate."""
-    return training_motions(training_clips([recorded.LIBRARY]), fps)
+        modes = guessed_modes(task, observation)
+    return modes, math.ceil(drawn.poses / len(task.cameras))
 
 
 def fitted_build(

@@ -154,9 +154,11 @@ def track_scene(
         frames = tracked.frames
         if polishing:
             shown = next(iter(scene.observations))
-            frames = [polished(task, frames[0], shown, polishing, method.audit.beta)]
-            effort["frames"] = _evaluations(frames)
             assert method.prior is not None
+            search = replace(task, start=method.start if task.yaw is None else None)
+            known = shown, polishing, method.audit.beta
+            frames = [polished(search, frames[0], *known)]
+            effort["frames"] = _evaluations(frames)
             left = beyond_prior(method.prior, task.body.skeleton, frames[0].pose)
             if left:
                 progress.warn(left)

@@ -7,10 +7,11 @@ import numpy as np
 
 from posefit import Motion
 from posefit.motion import built_in
-from posefit.tracking import initialise
-from posefit.tracking.initialise import guessed, task_of
+from posefit.tracking import polish
+from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.polish import beyond_prior
+from posefit.uncertainty.modes import Posterior
 from posefit_priors.pca import PCA
 from tests.cases import each
 from tests.tracking.scenes import walk
@@ -20,36 +21,32 @@ OTHER = replace(WALKS[0], name="a dance")
 
 
 @each(
-    "training, within_prior, looked_up",
-    [
-        (WALKS, False, ["a dance"]),
-        (WALKS, True, [motion.name for motion in WALKS]),
-        ([*WALKS[:1], OTHER], False, [WALKS[0].name, "a dance"]),
-    ],
+    "training, looked_up_in",
+    [(WALKS, ["a dance"]), ([*WALKS[:1], OTHER], [])],
 )
 def test_a_picture_is_looked_up_in_the_library_unless_other_motions_are_named(
-    monkeypatch: Any, training: list[Motion], within_prior: bool, looked_up: list[str]
+    monkeypatch: Any, training: list[Motion], looked_up_in: list[str]
 ) -> None:
-    monkeypatch.setattr(initialise, "_library", lambda _fps: [OTHER])
+    monkeypatch.setattr(polish, "_library", lambda _fps: [OTHER])
     scene = walk(1, (45.0,), (80, 60))
     options = TrackOptions(evaluations=400, translation="aligned")
+    pose = scene.truth.poses[:1]
+    known = Posterior(pose, scene.truth.translations[:1], np.ones(1))
     learned_from: list[str] = []
 
-    class Nothing:
+    class Start:
         def __init__(self, task: Any) -> None:
             learned_from.extend(motion.name for motion in task.training)
 
-        def posterior(self, observation: Any) -> None:
-            return None
+        def posterior(self, observation: Any) -> Posterior:
+            return known
 
-    task = replace(task_of(scene, options, training), yaw=None, start=Nothing)
-    task = replace(task, first_pose=None)
-    searched, used = guessed(task, scene.observations[0], within_prior)
-    assert learned_from == looked_up
-    assert (searched.start, searched.modes, used) == (None, (), 0)
-    assert [motion.name for motion in searched.training] == [
-        motion.name for motion in training
-    ]
+    task = replace(task_of(scene, options, training), yaw=None, start=Start)
+    task = replace(task, first_pose=None, modes=[(1.0, known)])
+    modes, used = polish.looked_up(task, scene.observations[0])
+    assert learned_from == looked_up_in
+    assert [mode.poses.tolist() for mode in modes] == [pose.tolist()]
+    assert used == 0
 
 
 def test_a_pose_that_the_prior_does_not_know_is_said() -> None:
