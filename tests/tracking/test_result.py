@@ -29,12 +29,15 @@ QUICK: dict[str, Any] = {
 MOTION = built_in.motion("walk", frames=3)
 BODY = posefit.Body.of(MOTION.skeleton)
 CAMERA = posefit.Camera.around(MOTION.translations[0], 0.5, 3.6, (80, 60))
-MASKS = np.array(
-    [
-        project(BODY, CAMERA, *pose)
-        for pose in zip(MOTION.poses, MOTION.translations, strict=True)
-    ]
-)
+CAMERAS = [CAMERA, posefit.Camera.around(MOTION.translations[0], 2.0, 3.6, (80, 60))]
+
+
+def masks_by(camera: posefit.Camera) -> Any:
+    poses = zip(MOTION.poses, MOTION.translations, strict=True)
+    return np.array([project(BODY, camera, *pose) for pose in poses])
+
+
+MASKS = masks_by(CAMERA)
 
 
 @pytest.fixture(scope="module")
@@ -150,9 +153,9 @@ def test_a_fit_takes_the_first_frame_as_filmed(
         source: Any = MASKS
         if first is not None:
             source = tmp_path / f"{view}.npz"
-            np.savez(source, masks=MASKS, first=first)
+            np.savez(source, masks=masks_by(CAMERAS[view]), first=first)
         sources.append(source)
-    cameras = [CAMERA] * len(sources)
+    cameras = CAMERAS[: len(sources)]
     fit = posefit.fit(
         sources if len(sources) > 1 else sources[0], camera=cameras, **chosen, **QUICK
     )
