@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 
 
 @click.group(cls=Group, invoke_without_command=True)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print it as IOHexperimenter's registry of suites, in JSON.",
+)
 @click.pass_context
 def suite(context: click.Context, as_json: bool) -> None:
     """List the functions of the numbered benchmark, and their dimensions."""
@@ -25,6 +30,7 @@ def suite(context: click.Context, as_json: bool) -> None:
         return
     from posefit.motion.instances import HELD_OUT, TRAINING
     from posefit.suites.functions import FUNCTIONS, SUITE
+    from posefit.suites.registry import suite_registry
 
     lines = [f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100"]
     lines += [
@@ -35,7 +41,7 @@ def suite(context: click.Context, as_json: bool) -> None:
         f"  {f.number}  {f.name:20} d = {listed(f.dimensions):14} {f.summary}"
         for f in FUNCTIONS
     ]
-    print_result(lines, [asdict(function) for function in FUNCTIONS], as_json)
+    print_result(lines, suite_registry(), as_json)
 
 
 @suite.command("run")
