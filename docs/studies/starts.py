@@ -18,9 +18,9 @@ fails if its mean error is above 150 mm.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import product
 from typing import Any
+from unittest.mock import patch
 
 import click
 import numpy as np
@@ -34,7 +34,7 @@ from posefit.fitting.start import modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.motion import recorded
-from posefit.motion.built_in import average_skeleton, other_styles
+from posefit.motion.built_in import average_skeleton
 from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.output.picture import ALTERNATIVES, MIN_WEIGHT
@@ -42,9 +42,9 @@ from posefit.progress import QUIET
 from posefit.silhouette.mask import Mask
 from posefit.sweep.cell import ALL_AROUND, cell_scene
 from posefit.sweep.check import cell_of
+from posefit.tracking import polish
 from posefit.uncertainty.modes import other_modes
 from posefit_exemplars.lookup import Lookup
-from posefit_priors.pca import PCA
 from table import markdown, percent
 
 SIZE = (320, 240)
@@ -226,13 +226,6 @@ IMAGES = (
 )
 
 
-@lru_cache
-def of_walks() -> PCA:
-    """Return the prior that has learned from the built-in walks."""
-    walks = training_motions(training_clips(other_styles("walk")), 30.0)
-    return PCA().fit(np.concatenate([walk.poses[:, 3:] for walk in walks]))
-
-
 @main.command("images")
 def single_images() -> None:
     """Print the errors of single images, and of the best of the alternatives shown."""
@@ -247,19 +240,19 @@ def single_images() -> None:
                 for clip in GROUPS[name]
                 if clip.subject != image.clip.subject
             ]
-            known: dict[str, Any] = {"method": method, "train": others}
-            if not others:
-                known["train"] = [image.clip.library]
-            if "@" in method and not others:  # as by default, but for the person
-                known["method"] = (method.partition("@")[0], of_walks())
-                known["settings"] = {"tracker.tilt": "learned"}
-            fit = posefit.fit(
-                image.mask,
-                camera=image.camera,
-                height=image.body.stature,
-                progress=QUIET,
-                **known,
-            )
+            if "@" not in method:
+                others = [image.clip.library]
+            # what is looked up by default, without the person
+            library = training_of(image.clip)
+            with patch.object(polish, "_library", lambda _fps, known=library: known):
+                fit = posefit.fit(
+                    image.mask,
+                    method=method,
+                    camera=image.camera,
+                    height=image.body.stature,
+                    progress=QUIET,
+                    train=others,
+                )
             skeleton = fit.track.motion.skeleton
             shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[
                 :ALTERNATIVES
