@@ -1,4 +1,7 @@
-"""`python -m posefit` is `posefit`. Ctrl-C ends it with one line, also while Python still imports it."""
+"""`python -m posefit` is `posefit`.
+
+Ctrl-C ends it with one line, also while Python still imports it.
+"""
 
 import sys
 
@@ -6,7 +9,7 @@ from posefit.errors import STOPPED
 
 
 def main() -> None:
-    """Run the command that was asked for."""
+    """Run the command."""
     try:
         from posefit.cli import run
     except KeyboardInterrupt:

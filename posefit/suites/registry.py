@@ -1,7 +1,7 @@
-"""The suite in the form of IOHexperimenter's registry of suites, which leaderboards read.
+"""The suite in the form of IOHexperimenter's registry, which leaderboards read.
 
-The form is that of `ioh.registry()` in ioh 0.4.2, its schema 1. Beyond it a problem has `dimensions`, those it exists
-in, and a `summary`.
+The form is schema 1 of `ioh.registry()` in ioh 0.4.2. In addition a problem has the
+`dimensions` in which it exists, and a `summary`.
 """
 
 from typing import Any
@@ -11,11 +11,11 @@ from posefit.suites.functions import DIMENSIONS, FUNCTIONS, SUITE, SuiteFunction
 from posefit.suites.problem import EVALUATIONS, TARGETS
 
 SCHEMA_VERSION = 1
-STANDARD_INSTANCES = 15  # the first of those held out, as in plans
+STANDARD_INSTANCES = 15  # the first held-out instances, as in plans
 
 
 def suite_registry() -> dict[str, Any]:
-    """Return the registry of the numbered benchmark, as JSON holds it.
+    """Return the registry of the numbered benchmark, as values that JSON has.
 
     >>> problem = suite_registry()["suites"]["posefit-2026.3"]["problems"][0]
     >>> problem["name"], problem["bounds"]
@@ -44,6 +44,7 @@ def suite_registry() -> dict[str, Any]:
 
 
 def _problem(function: SuiteFunction) -> dict[str, Any]:
+    """Return the registry's entry of a function."""
     listed = ", ".join(map(str, function.dimensions))
     return {
         "id": function.number,

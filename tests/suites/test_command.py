@@ -306,7 +306,7 @@ def test_a_mistake_is_one_line_and_status_2(
         ({"methods": ["sapso@pca"]}, "optimiser must be one of .*, got 'sapso@pca'"),
         (
             {"methods": [{"method": "pso", "colour": 1}]},
-            "a cell must say suite, .*, got 'colour'",
+            "a cell must hold suite, .*, got 'colour'",
         ),
         (
             {"methods": [{"method": "pso", "settings": {"particle": 2}}]},
