@@ -80,10 +80,8 @@ def track(
 @under("What is seen")(
     "--frame",
     type=int,
-    default=0,
-    show_default=True,
     metavar="K",
-    help="The frame, after resampling.",
+    help="The frame: its number as filmed, of a motion after resampling; by default the first.",
 )
 def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.

@@ -34,6 +34,7 @@ from posefit.footage.people import Choice
 from posefit.footage.readers import (
     ARRAYS,
     Images,
+    first_number,
     images_in,
     numbered_together,
     read_array,
@@ -177,6 +178,19 @@ def resolve(source: Any) -> Resolved:
             for place in places
         ]
     return Resolved(medium, named, [*map(_name_of, places)], places, kinds)
+
+
+def first_of(source: Resolved) -> int:
+    """Return the number of the first frame that all cameras have.
+
+    An .npz file of masks may state its own; other sources begin at 0.
+    """
+    archives = [
+        place
+        for kind, place in zip(source.kinds, source.places, strict=True)
+        if kind.view is read_npz
+    ]
+    return max((first_number(Path(str(place))) for place in archives), default=0)
 
 
 def _place(source: Footage) -> Place:

@@ -14,6 +14,7 @@ from posefit.footage.source import (
     Footage,
     Resolved,
     check_used,
+    first_of,
     resolve,
     scene_of,
 )
@@ -131,11 +132,19 @@ def track(
 
 
 def fit(
-    source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any
+    source: Footage | Sequence[Any] = "walk",
+    *,
+    frame: int | None = None,
+    **options: Any,
 ) -> Fit:
-    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
+    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`.
+
+    The frame has its number as filmed, of a motion that after resampling; by default it is the first.
+    """
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])
+    if frame is None:
+        frame = first_of(_resolved(source))
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
 

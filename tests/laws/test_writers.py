@@ -22,6 +22,7 @@ import posefit
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.evaluation.errors import evaluated, unseen
+from posefit.evaluation.measures import Effort
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage import video
 from posefit.footage.extract import extract
@@ -110,7 +111,7 @@ def track_of(case: Case) -> Track:
         placing="given",
         first=case.first,
     )
-    table, measures = evaluated(scene, frames, None, None, BETA, np.ones(2))
+    table, measures = evaluated(scene, frames, None, None, BETA, Effort(1.0, 1.0))
     setup = Setup(
         motion=scene.name,
         method="by hand",
