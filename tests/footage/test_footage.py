@@ -197,7 +197,7 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
         )
     assert not (tmp_path / "out").exists()
     assert (
-        "11 finished frames are kept: the same command with --resume goes on from there"
+        "11 finished frames are kept: the same command with --resume continues from there"
         in messages
     )
     again = posefit.track(

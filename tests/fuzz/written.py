@@ -148,7 +148,7 @@ class _ReadError(Exception):
 
 def checked_message(message: str) -> None:
     """Raise an error where a message is not one line, is too long or names no file."""
-    if message.endswith("the same command with --resume goes on from there"):
+    if message.endswith("the same command with --resume continues from there"):
         return
     if NAME not in message or "\n" in message.strip() or len(message) > 400:
         raise RuntimeError(f"a message of {len(message)} characters: {message}")
