@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from posefit.output.content import Content
 
 _OF_FILES = ("source", "out", "force", "resume")
-COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
+COLOURS = {"good": "green", "doubtful": "yellow", "do not use": "red"}
 
 
 @click.command(cls=TrackCommand)

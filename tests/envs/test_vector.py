@@ -236,7 +236,7 @@ def test_by_disabled_the_caller_resets_what_has_ended(name: str) -> None:
     with pytest.raises(error.ResetNeeded, match="the episode has ended"):
         vector.step(actions)
     vector.reset(options={"reset_mask": np.array([True, False, True])})
-    with pytest.raises(error.ResetNeeded, match=r"got \[1\] that have ended"):
+    with pytest.raises(error.ResetNeeded, match=r"ended environments: \[1\]"):
         vector.step(actions)
     vector.reset(options={"reset_mask": np.array([False, True, False])})
     assert not vector.step(actions)[3].any()
