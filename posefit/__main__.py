@@ -5,7 +5,7 @@ Ctrl-C ends it with one line, also while Python still imports it.
 
 import sys
 
-STOPPED = 130  # exit status of a program that Ctrl-C ended
+from posefit.errors import STOPPED
 
 
 def main() -> None:

@@ -4,6 +4,7 @@ import re
 import warnings
 from typing import Any
 
+STOPPED = 130  # exit status of a program that Ctrl-C ended
 _LONG = re.compile(r"\S{300,}")  # longer than the name of a file may be
 
 

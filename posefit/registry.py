@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
@@ -156,7 +156,7 @@ class Registry:
         cause = _taken(f"{offer.kind} {offer.name!r}")
         return [plugin for plugin in self.plugins if cause in plugin.cause]
 
-    @property
+    @cached_property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
         """The offers of all loaded plugins."""
         offers = [offer for plugin in self.plugins for offer in plugin.offers]

@@ -4,8 +4,9 @@ import inspect
 import json
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from posefit import hints
@@ -37,6 +38,14 @@ class Setting:
 
 def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     """Return the settings that a factory takes, in the order of its signature."""
+    if isinstance(factory, Hashable):
+        return _settings_of(factory)
+    return _settings_of.__wrapped__(factory)
+
+
+@lru_cache
+def _settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
+    """Return the same, and keep it: a signature takes long to read."""
     settings = []
     for parameter in inspect.signature(factory).parameters.values():
         # only hints of settings are resolved: others may name types that are imported

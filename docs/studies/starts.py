@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
+from unittest.mock import patch
 
 import click
 import numpy as np
@@ -41,6 +42,7 @@ from posefit.progress import QUIET
 from posefit.silhouette.mask import Mask
 from posefit.sweep.cell import ALL_AROUND, cell_scene
 from posefit.sweep.check import cell_of
+from posefit.tracking import polish
 from posefit.uncertainty.modes import other_modes
 from posefit_exemplars.lookup import Lookup
 from table import markdown, percent
@@ -238,16 +240,19 @@ def single_images() -> None:
                 for clip in GROUPS[name]
                 if clip.subject != image.clip.subject
             ]
-            fit = posefit.fit(
-                image.mask,
-                method=method,
-                camera=image.camera,
-                height=image.body.stature,
-                body_frames=0,
-                smooth=False,
-                progress=QUIET,
-                train=others if "@" in method else [image.clip.library],
-            )
+            if "@" not in method:
+                others = [image.clip.library]
+            # what is looked up by default, without the person
+            library = training_of(image.clip)
+            with patch.object(polish, "_library", lambda _fps, known=library: known):
+                fit = posefit.fit(
+                    image.mask,
+                    method=method,
+                    camera=image.camera,
+                    height=image.body.stature,
+                    progress=QUIET,
+                    train=others,
+                )
             skeleton = fit.track.motion.skeleton
             shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[
                 :ALTERNATIVES

@@ -291,6 +291,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._generators: dict[int, tuple[np.random.Generator, int]] = {}
         # of the instances; -1 before the first reset
         self.numbers = np.full(num_envs, -1)
+        # attributes that a user has added, by their names: a value for each environment
+        self._own: dict[str, tuple[Any, ...]] = {}
 
     def set_spaces(self, action_space: Box, observation_space: Box) -> None:
         """Set the spaces of one environment, and the batched spaces of all."""
@@ -439,6 +441,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             return self.np_random_seed
         if name == "np_random":
             return self.np_random
+        if name in self._own:
+            return self._own[name]
         if name in self.row_attributes:
             return tuple(self.row_attribute(name, i) for i in range(self.num_envs))
         return (getattr(self, name),) * self.num_envs
@@ -452,9 +456,35 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             return (method(*args, **kwargs),) * self.num_envs
         return self.get_attr(name)
 
-    def set_attr(self, name: str, value: Any) -> None:
-        """Set an attribute that all environments share."""
-        setattr(self, name, value)
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each environment, as Gymnasium's own vectors do.
+
+        Args:
+            name: any name. What the environments have in common, such as `world`, stays common to all.
+            values: a list or a tuple has a value for each environment; anything else is the value of all.
+
+        Raises:
+            gymnasium.error.Error: there is another number of values, values that must be common differ, or the
+                attribute is one that `reset` sets, such as `number`.
+
+        """
+        if not isinstance(values, list | tuple):
+            values = [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise error.Error(
+                f"values must be one for each of the {self.num_envs} environments, got {len(values)}"
+            )
+        if name in self.row_attributes:
+            raise error.Error(f"{name} must be set by the options of reset")
+        if name in self._own or not hasattr(self, name):
+            self._own[name] = tuple(values)
+            return
+        first, *others = values
+        if not all(np.array_equal(first, other) for other in others):
+            raise error.Error(
+                f"{name} must be the same in all environments, got different values"
+            )
+        setattr(self, name, first)
 
     # attributes that differ between the environments
     row_attributes: tuple[str, ...] = ("instance", "number", "problem")

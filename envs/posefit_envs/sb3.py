@@ -84,7 +84,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             self._check_all(indices)
             base: Any = vector.unwrapped
-            base.set_attr(attr_name, value)
+            base.set_attr(attr_name, [value] * self.num_envs)
 
         def env_method(
             self, method_name: str, *arguments: Any, indices: Any = None, **named: Any

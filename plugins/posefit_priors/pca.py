@@ -1,6 +1,7 @@
 """The compact pose space: principal components, a range, clusters. SAPSO section 2."""
 
 import warnings
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -128,9 +129,21 @@ def clusters_of(latents: Array, clusters: int, quantile: float) -> tuple[Array, 
 
     K-means finds the centres.
     """
+    centres = _centres_of(latents.tobytes(), latents.shape[1], clusters).copy()
+    # Interpretation S5
+    return centres, np.array(np.quantile(distances(latents, centres), quantile))
+
+
+@lru_cache(maxsize=8)
+def _centres_of(latents_bytes: bytes, m: int, clusters: int) -> Array:
+    """Return the centres (K, m) among latents (n, m), given as their bytes.
+
+    They are kept, as pictures that are fitted one by one learn from the same motions.
+    """
     # gives the same as scikit-learn, whose import takes two seconds
     from scipy.cluster.vq import kmeans2
 
+    latents = np.frombuffer(latents_bytes).reshape(-1, m)
     count = min(clusters, len(np.unique(latents, axis=0)))
     rng = np.random.default_rng(CLUSTERING_SEED)
     with warnings.catch_warnings():
@@ -141,9 +154,7 @@ def clusters_of(latents: Array, clusters: int, quantile: float) -> tuple[Array, 
             for _ in range(CLUSTERING_STARTS)
         ]
     best, _ = min(runs, key=lambda run: float(((latents - run[0][run[1]]) ** 2).sum()))
-    centres = rounded(best)
-    # Interpretation S5
-    return centres, np.array(np.quantile(distances(latents, centres), quantile))
+    return rounded(best)
 
 
 def principal(centred: Array, components: float) -> tuple[Array, Array]:

@@ -229,6 +229,12 @@ TRACK: tuple[Any, ...] = (
         metavar="DIR",
         help="Write poses, table, video and picture to this new folder.",
     ),
+    _result(
+        "--write",
+        default="",
+        metavar="KIND,...",
+        help="Write only these files, such as bvh,trc,html, and summary.json. Default: all.",
+    ),
     _result("--force", is_flag=True, help="Replace earlier results in DIR."),
     _result(
         "--resume",

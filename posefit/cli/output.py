@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from posefit.errors import InputError, printable
+from posefit.errors import STOPPED, InputError, printable
 from posefit.limits import allowed_bytes
 
 MISTAKE = 2  # exit status of a user's mistake, which is shown in one line
@@ -65,6 +65,10 @@ class Command(click.Command):
                 raise
             say(f"posefit: {' '.join(_mistake(error).split())}")
             context.exit(MISTAKE)
+        except KeyboardInterrupt:
+            # click would end with 1, as after an error
+            say("Aborted!")
+            context.exit(STOPPED)
 
 
 def _mistake(error: BaseException) -> str:

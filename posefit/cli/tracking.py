@@ -28,7 +28,13 @@ if TYPE_CHECKING:
     from posefit.footage.source import Medium
     from posefit.output.content import Content
 
-_OF_FILES = ("source", "out", "force", "resume")
+_OF_FILES = ("source", "out", "force", "resume", "write")
+# what a user looks at first
+HINTS = {
+    "html": "open track.html",
+    "mp4": "watch overlay.mp4",
+    "png": "look at summary.png",
+}
 COLOURS = {"good": "green", "doubtful": "yellow", "do not use": "red"}
 
 
@@ -66,8 +72,7 @@ def track(
         "took "
         + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items())
     )
-    hint = "open track.html, watch overlay.mp4, look at summary.png"
-    _print(result.content, as_json, {}, options["out"], verbose, hint)
+    _print(result.content, as_json, {}, options, verbose, HINTS)
 
 
 @click.command(cls=TrackCommand)
@@ -75,10 +80,8 @@ def track(
 @under("What is seen")(
     "--frame",
     type=int,
-    default=0,
-    show_default=True,
     metavar="K",
-    help="The frame, after resampling.",
+    help="The frame: its number as filmed, of a motion after resampling; by default the first.",
 )
 def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.
@@ -99,9 +102,9 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
         result.track.content,
         as_json,
         more,
-        options["out"],
+        options,
         verbose,
-        "open track.html, look at summary.png",
+        {kind: HINTS[kind] for kind in ("html", "png")},
     )
 
 
@@ -115,7 +118,9 @@ def _track_live(
             f"SOURCE must be left out with --live, got {' '.join(options['source'])}"
         )
     if useless := [
-        name for name in ("force", "resume", "without_subject") if options[name]
+        name
+        for name in ("force", "resume", "write", "without_subject")
+        if options[name]
     ]:
         raise InputError(
             f"--{useless[0].replace('_', '-')} must be left out with --live"
@@ -143,11 +148,12 @@ def _print(
     content: "Content",
     as_json: bool,
     more: Mapping[str, Any],
-    out: str | None,
+    options: Mapping[str, Any],
     verbose: bool,
-    hint: str,
+    hints: Mapping[str, str],
 ) -> None:
-    """Print what a track is: as JSON with something more, in three lines, or whole."""
+    """Print what a track is: as JSON with something more, in three lines, or whole; then which file to look at."""
+    from posefit.output.files import WRITERS, chosen_kinds
     from posefit.output.text import brief, table
 
     if as_json:
@@ -160,9 +166,12 @@ def _print(
         grade = "good" if content.trust is None else content.trust.grade
         click.secho(worth, bold=True, fg=COLOURS[grade])
         click.echo("\n".join(work))
+    out = options["out"]
+    kinds = chosen_kinds(options["write"])
+    shown = [hint for kind, hint in hints.items() if kind in kinds]
     if out or not verbose:
         click.echo(
-            f"written to {out}: {hint}"
+            f"written to {out}: {', '.join(shown or [WRITERS[kind][0] for kind in kinds])}"
             if out
             else "--verbose prints all figures; --out DIR writes files"
         )

@@ -3,14 +3,14 @@
 `FRAME` defines the columns of frames.csv, and `evaluated` computes them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evaluation.measures import MEASURES, Measure, Measures, Spread
+from posefit.evaluation.measures import MEASURES, Effort, Measure, Measures, Spread
 from posefit.fitting import metrics
 from posefit.fitting.prior import Latents
 from posefit.fitting.tracker import Frame, Observation
@@ -120,8 +120,7 @@ def evaluated(
     prior: Latents | None,
     training: Array | None,
     beta: float,
-    clock: Array,
-    effort: Mapping[str, int] | None = None,
+    effort: Effort,
 ) -> tuple[Table, Measures]:
     """Return the figures of each frame, and of the whole track.
 
@@ -140,8 +139,7 @@ def evaluated(
         prior: The prior of the method, or None.
         training: The training poses (n, 63). Only errors against a truth need them.
         beta: The weight in the cost of a pose.
-        clock: The seconds and the CPU seconds that the track took (2,).
-        effort: The evaluations of each stage. By default all are of the frames.
+        effort: The seconds and the evaluations that the track took.
 
     Returns:
         The columns of frames.csv, and the figures of the track.
@@ -171,9 +169,8 @@ def evaluated(
         "evaluations": evaluations,
         "wall_seconds": np.array([frame.seconds for frame in frames]),
     }
-    seconds, cpu_seconds = clock.tolist()
-    effort = effort or {"frames": int(evaluations.sum())}
-    total = sum(effort.values())
+    stages = effort.evaluations or {"frames": int(evaluations.sum())}
+    total = sum(stages.values())
     measures = Measures(
         **error_measures,
         **certainty_measures,
@@ -181,11 +178,11 @@ def evaluated(
         iou=float(iou[usable].mean()),
         cost=float(cost[usable].mean()),
         held_frames=int(held.sum()),
-        seconds_per_frame=seconds / len(frames),
-        cpu_seconds_per_frame=cpu_seconds / len(frames),
+        seconds_per_frame=effort.seconds / len(frames),
+        cpu_seconds_per_frame=effort.cpu_seconds / len(frames),
         evaluations=total,
-        effort=effort,
-        evaluations_per_second=total / seconds,
+        effort=stages,
+        evaluations_per_second=total / effort.seconds,
     )
     return table, measures
 

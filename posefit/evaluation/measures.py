@@ -70,6 +70,16 @@ class Spread:
     max: float
 
 
+@dataclass(frozen=True)
+class Effort:
+    """What a track took, from the first mask that was read."""
+
+    seconds: float
+    cpu_seconds: float
+    # of each stage: first_pose, build, frames, later_passes; empty where all are of the frames
+    evaluations: Mapping[str, int] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Measures:
     """The figures of one track, which `MEASURES` defines.

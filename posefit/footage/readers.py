@@ -61,6 +61,7 @@ LAST = 1_000_000_000  # number of a frame
 MOST_MISSING = 9.0
 COUNTED_VALUES = 4_096
 SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
+PERCENT = 100.0
 # times a scale: degrees may go a little beyond, as resampling makes them
 NEAR_SCALE = 1.25
 # of the highest value, where that is no usual scale: degrees go no farther below 0
@@ -102,6 +103,12 @@ def read_npz(path: Path, frames: Range, label: int | None, fps: float | None) ->
     with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
         check_decoded(str(path), sum(array.nbytes for array in arrays.values()))
         return _packed(str(path), arrays, frames, label, fps)
+
+
+def first_number(path: Path) -> int:
+    """Return the number of the first frame of an .npz file, which it may state; else 0."""
+    with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
+        return int(np.asarray(arrays["first"])) if "first" in arrays else 0
 
 
 def images_in(folder: Path) -> list[Path]:
@@ -641,8 +648,9 @@ class ValueCounts:
     def _half(self) -> tuple[float, str]:
         """The value half way to a whole person, 127 of 255, as whole numbers have no middle; and what the values are.
 
-        Signed ones are a network's logits, of which 0 is the middle. Degrees that were resampled go a little below 0,
-        and reach about a whole person. An alpha channel that is nowhere half opaque is a translucent colour.
+        Numbers up to about 100 are percentages. Signed ones are a network's logits, of which 0 is the middle. Degrees
+        that were resampled go a little below 0, and reach about a whole person. An alpha channel that is nowhere half
+        opaque is a translucent colour.
         """
         usual = any(
             0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
@@ -656,6 +664,9 @@ class ValueCounts:
         # of no usual scale
         if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:
             return self.highest / 2.0, "degrees"
+        # above half of 255 there is nothing
+        if 0.5 * PERCENT < self.highest <= NEAR_SCALE * PERCENT:
+            return 0.5 * PERCENT, "percentages"
         full = next(
             (scale for scale in SCALES if self.highest <= NEAR_SCALE * scale),
             self.highest,

@@ -34,6 +34,7 @@ from posefit.footage.people import Choice
 from posefit.footage.readers import (
     ARRAYS,
     Images,
+    first_number,
     images_in,
     numbered_together,
     read_array,
@@ -185,6 +186,19 @@ def resolve(source: Any) -> Resolved:
             for place in places
         ]
     return Resolved(medium, named, [*map(_name_of, places)], places, kinds)
+
+
+def first_of(source: Resolved) -> int:
+    """Return the number of the first frame that all cameras have.
+
+    An .npz file of masks may state its own; other sources begin at 0.
+    """
+    archives = [
+        place
+        for kind, place in zip(source.kinds, source.places, strict=True)
+        if kind.view is read_npz
+    ]
+    return max((first_number(Path(str(place))) for place in archives), default=0)
 
 
 def _place(source: Footage) -> Place:
@@ -345,7 +359,8 @@ def _placed(
         else camera.in_metres(metres).camera(camera.size or size, world)
         for camera in known
     ]
-    return cameras, [*guesses.values()]
+    # bodies are drawn with square pixels
+    return [camera.squared() for camera in cameras], [*guesses.values()]
 
 
 def logged(scene: Scene, progress: Progress) -> Scene:
@@ -449,7 +464,13 @@ def _taken_out(
         progress.log(f"taking the person out of {part.video.path} by {part.how.name}")
         choose = None
         if views:
-            choose = partial(same_person, [known[0], known[k]], views[0], part.size)
+            choose = partial(
+                same_person,
+                [known[0], known[k]],
+                views[0],
+                part.size,
+                filmed=part.video.size,
+            )
         view, _, doubt = part.read(progress.steps, choose)
         if doubt is not None and doubt.refused:
             raise NoPersonError(doubt.text)

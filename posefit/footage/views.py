@@ -19,6 +19,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Observation
 from posefit.geometry.calibration import Calibration
+from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import allowed_bytes
 from posefit.motion.clips import FPS
@@ -145,22 +146,40 @@ def full_planes(count: int, size: tuple[int, int]) -> Planes:
     return planes
 
 
-def undistorted(view: View, calibration: Calibration, maps: tuple[Any, Any]) -> View:
-    """Return a view as of a pinhole camera; pixels that the lens did not cover are unknown.
+def undistorted(
+    view: View,
+    calibration: Calibration,
+    maps: tuple[Any, Any],
+    straight: Camera | None = None,
+) -> View:
+    """Return a view, and its landmarks, as of a pinhole camera; pixels that the lens did not cover are unknown.
 
-    `maps` are those of the calibration for pictures of the masks' size.
+    Args:
+        view: Of the camera that was calibrated.
+        calibration: That camera's.
+        maps: The calibration's, for pictures of the view's size and for `straight`.
+        straight: The pinhole camera; by default the calibration's, of the view's size.
+
+    Returns:
+        A view of the size of `maps`.
+
     """
-    straight = empty_planes(len(view), view.size)
-    known = empty_planes(len(view), view.size)
+    size = (maps[0].shape[1], maps[0].shape[0])
+    bits = empty_planes(len(view), size)
+    known = empty_planes(len(view), size)
     for k in range(len(view)):
         silhouette = view.silhouette(k)
-        for planes, plane in ((straight, silhouette.mask), (known, silhouette.valid)):
-            planes[k] = np.packbits(
-                cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) != 0
-            )
-    bent = view.landmarks
-    landmarks = None if bent is None else calibration.straightened(bent, view.size)
-    return replace(view, bits=straight, known=known, landmarks=landmarks)
+        # between four pixels the border is where half of them is the person
+        share = cv2.remap(
+            255 * silhouette.mask.astype(np.uint8), *maps, cv2.INTER_LINEAR
+        )
+        covered = cv2.remap(silhouette.valid.astype(np.uint8), *maps, cv2.INTER_NEAREST)
+        bits[k] = np.packbits(share > 127)
+        known[k] = np.packbits(covered != 0)
+    landmarks = view.landmarks
+    if landmarks is not None:
+        landmarks = calibration.straightened(landmarks, view.size, straight)
+    return replace(view, size=size, bits=bits, known=known, landmarks=landmarks)
 
 
 class Observations(Sequence[Observation]):

@@ -52,6 +52,7 @@ def activity_of(name: str) -> str:
     return re.sub(r"-[a-z]$", "", name)
 
 
+@lru_cache
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind: the default training motions."""
     _check(name)

@@ -184,11 +184,12 @@ def training_clips(
     """
     clips = []
     poses = 0
+    most = allowed_bytes()
     for source in sources:
         for clip in _clips(source, stated, followed):
             clips.append(clip)
             poses += clip.count(FPS)
-            _check_memory(poses, FPS)
+            _check_memory(poses, FPS, most)
     return clips
 
 
@@ -198,13 +199,12 @@ def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
     Raises:
         InputError: they would take more memory than this process may use.
     """
-    _check_memory(sum(clip.count(fps) for clip in clips), fps)
+    _check_memory(sum(clip.count(fps) for clip in clips), fps, allowed_bytes())
     return [clip.motion(fps) for clip in clips]
 
 
-def _check_memory(poses: int, fps: float) -> None:
-    """Raise InputError if learning from poses would take more memory than allowed."""
-    most = allowed_bytes()
+def _check_memory(poses: int, fps: float, most: int) -> None:
+    """Raise InputError if learning from poses would take more memory than `most` bytes."""
     if poses * POSE_BYTES > most:
         took = f"{poses * POSE_BYTES / 1e9:.1f} GB for {poses:,} poses"
         raise InputError(

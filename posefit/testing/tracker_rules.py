@@ -123,9 +123,8 @@ class Case(PluginCase):
         inputs_unchanged = unchanged(*masks, task.anchor)
         random = global_random_state()
         try:
-            for frame in drive(
-                tracker, task, stream(), np.random.default_rng(0), audit
-            ):
+            rng = np.random.default_rng(0)
+            for frame in drive(lambda _task: tracker, audit, task, stream(), rng):
                 frames.append(frame)
                 taken.append(count)
         except BrokenRuleError as broken:

@@ -14,6 +14,7 @@ from posefit.footage.source import (
     Footage,
     Resolved,
     check_used,
+    first_of,
     resolve,
     scene_of,
 )
@@ -25,6 +26,7 @@ from posefit.motion.clips import (
     training_motions,
 )
 from posefit.motion.motion import Motion
+from posefit.output.files import chosen_kinds
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
@@ -35,7 +37,13 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
-_ARGUMENTS = ("out", "force", "resume", "progress")  # of a track, besides its options
+_ARGUMENTS = (
+    "out",
+    "force",
+    "resume",
+    "write",
+    "progress",
+)  # of a track, besides its options
 # options that may name files, whose content counts
 _FILES = ("source", "train", "asf", "camera", "extraction")
 
@@ -46,6 +54,7 @@ def track(
     out: str | Path | None = None,
     force: bool = False,
     resume: bool = False,
+    write: str | Sequence[str] = (),
     progress: Progress | None = None,
     **options: Any,
 ) -> Track:
@@ -57,8 +66,9 @@ def track(
     Other options are listed below; `posefit.tracking.defaults.completed` has the defaults that depend on the source.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
-    not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
-    go to `progress`, by default a terminal or a notebook. Raises InputError for any mistake in the arguments or files.
+    not at all. `write` chooses some of these files, such as "bvh,trc" or ["bvh", "trc"]. The frames of a track that
+    ended too early are kept, and `resume` goes on from there. Messages and bars go to `progress`, by default a terminal
+    or a notebook. Raises InputError for any mistake in the arguments or files.
     """
     _check_names("track", options, [option.name for option in fields(TrackOptions)])
     chosen = TrackOptions(**options)
@@ -77,7 +87,8 @@ def track(
     chosen = completed(chosen, followed if known else None)
     # before the work, as a name may be wrong
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)
-    for name, value in (("resume", resume), ("force", force)):
+    kinds = chosen_kinds(write)
+    for name, value in (("resume", resume), ("force", force), ("write", len(write))):
         if value and out is None:
             raise InputError(
                 f"{name} must be given with out, the folder of the track, got none"
@@ -91,6 +102,7 @@ def track(
             resume,
             _identity(resolved, chosen, options.get("train", ())),
             progress.log,
+            kinds,
         )
     with recorder:
         with progress.phase("masks"):
@@ -120,11 +132,19 @@ def track(
 
 
 def fit(
-    source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any
+    source: Footage | Sequence[Any] = "walk",
+    *,
+    frame: int | None = None,
+    **options: Any,
 ) -> Fit:
-    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
+    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`.
+
+    The frame has its number as filmed, of a motion that after resampling; by default it is the first.
+    """
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])
+    if frame is None:
+        frame = first_of(_resolved(source))
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
 

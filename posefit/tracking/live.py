@@ -16,12 +16,11 @@ from threadpoolctl import threadpool_limits
 from posefit.errors import InputError
 from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.cameras import calibrated, combined
+from posefit.footage.cameras import calibrated, combined, straightening
 from posefit.footage.live import Stream, live_views
 from posefit.footage.scene import Scene
 from posefit.footage.source import body_of, check_used, logged
-from posefit.footage.views import Observations, View, joined, undistorted
-from posefit.geometry.calibration import Calibration
+from posefit.footage.views import Observations, View, joined
 from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress
 from posefit.tracking.defaults import completed
@@ -137,18 +136,10 @@ def _scene_of(
     view = replace(joined(first), warnings=notes)
     scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
     scene = replace(scene, guesses=[*scene.guesses, *of_height])
-    bent = next(
-        (
-            (each, each.maps(view.size))
-            for each in known
-            if isinstance(each, Calibration) and each.distorted
-        ),
-        None,
-    )
+    _, how, _ = straightening(known[0], view.size) if known else (None, None, None)
 
     def observed(live: View) -> Observation:
-        straight = live if bent is None else undistorted(live, *bent)
-        return Observations([straight])[0]  # type: ignore[no-any-return]
+        return Observations([live if how is None else how.of(live)])[0]  # type: ignore[no-any-return]
 
     return scene, observed
 

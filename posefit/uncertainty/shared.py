@@ -63,15 +63,18 @@ def in_footage(model: Recalibration, cameras: int, height_known: bool) -> Recali
     return replace(model, joint_spreads=about_root, place_spreads=in_world, depth=depth)
 
 
+_PART_OF = {name: part for part, names in PARTS.items() for name in names}
+_PARTS_OF_JOINTS = [_PART_OF[kind(joint)] for joint in JOINTS]
+
+
 def shared_spreads(cameras: int, world: bool = False) -> Array:
     """Return the standard deviations (27,) of joints' shared errors, in metres.
 
     They are along each axis about the root, or in the world without the error of depth.
     """
-    part_of = {name: part for part, names in PARTS.items() for name in names}
     column = min(cameras, 3) - 1
     return np.array(
-        [1e-3 * SHARED_MM[part_of[kind(joint)]][world][column] for joint in JOINTS]
+        [1e-3 * SHARED_MM[part][world][column] for part in _PARTS_OF_JOINTS]
     )
 
 

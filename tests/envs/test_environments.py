@@ -156,7 +156,7 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
     following = iter(populations)
     made = instance(env.world, 5, 3, 4)
     tracker = SynthesisTracker(
-        made.task, env.world.learned, lambda space, rng: OnePopulation(next(following))
+        made.task, env.world.learned, lambda *_: OnePopulation(next(following))
     )
     frames = list(tracker.track(made.observations, np.random.default_rng(0)))
     poses = []

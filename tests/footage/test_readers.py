@@ -251,6 +251,18 @@ def test_logits_are_cut_at_zero_and_degrees_half_way(
         assert guess.endswith(f"are degrees: the person is above {threshold:g}")
 
 
+@each("kind", [np.uint8, np.int32, np.float32])
+@each("most", [100.0, 80.0])
+def test_percentages_are_cut_at_fifty(
+    walk: list[Any], tmp_path: Path, kind: Any, most: float
+) -> None:
+    soft = [cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) for mask in walk]
+    percentages = (most * np.stack(soft)).astype(kind)
+    np.save(tmp_path / "a.npy", percentages)
+    (guess,) = check(tmp_path / "a.npy", list(percentages > 50.0))
+    assert guess.endswith("are percentages: the person is above 50")
+
+
 def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", np.stack(walk))
     np.savez(tmp_path / "b.npz", silhouettes=np.stack(walk))
