@@ -41,7 +41,7 @@ COLOURS = {"good": "green", "doubtful": "yellow", "do not use": "red"}
 @click.command(cls=TrackCommand)
 @options(TRACK)
 @FRAMES
-@under("What is seen")(
+@under("Source and camera")(
     "--live",
     metavar="DEVICE|URL|-",
     help="Track live frames instead of SOURCE. - reads PGM masks or PPM pictures "
@@ -77,7 +77,7 @@ def track(
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
-@under("What is seen")(
+@under("Source and camera")(
     "--frame",
     type=int,
     metavar="K",

@@ -169,7 +169,7 @@ class _Attempt:
         self.failure = ""  # the message of the step that failed
 
     def run(self, step: Callable[..., _Made], *arguments: Any) -> _Made | None:
-        """Return the result of a step, or None if a step failed or none is wanted."""
+        """Return the result of a step, or None if one failed or nothing is wanted."""
         if self.failure or not self._wanted:
             return None
         try:

@@ -204,9 +204,7 @@ def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
     """Return the latest unfinished folder of a track with the same arguments."""
     interrupted = Unfinished.interrupted(path)
     if not interrupted:
-        raise InputError(
-            f"{path}: expected a track that was interrupted to resume, got none"
-        )
+        raise InputError(f"{path}: expected an interrupted track to resume, got none")
     try:
         others = [difference(folder.info, spec) for folder in interrupted]
     except (AttributeError, TypeError):

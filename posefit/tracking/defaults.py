@@ -20,12 +20,12 @@ BODY_FRAMES = 12  # the build is fitted to this many frames
 def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
     """Return options with every default filled in.
 
-    The default method is `exemplars`. It learns from the library of recorded motions
-    and has another budget. A built-in motion is tracked by `annealed@pca`, and so is
-    any source if settings of an optimiser or a prior are given. The optimiser is then
-    the one that the settings name, and the prior for footage is `loose`. These and
-    other trackers learn from the other styles of a built-in motion, or else from the
-    built-in walks.
+    The default method is `exemplars`, with the library of recorded motions and its own
+    default budget. The method is `annealed@pca` for a built-in motion, and for any
+    source if an optimiser, a prior, or settings of other plugins are given. A given
+    optimiser or prior replaces `annealed` or `pca`. For footage the default prior is
+    `loose` instead of `pca`. Methods other than `exemplars` learn from the other styles
+    of a built-in motion, or else from the built-in walks.
 
     Args:
         options: The options that the user chose.

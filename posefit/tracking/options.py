@@ -333,7 +333,7 @@ class TrackOptions:
     )
     fps: float | None = _float(
         "Frame rate of masks, or the rate to which a motion is resampled. "
-        "Default: theirs, or 30.",
+        "Default: the masks' own rate; 30 for motions.",
         RATES,
         "HZ",
     )
@@ -427,8 +427,8 @@ class TrackOptions:
     )
     restarts: int | None = _int(
         None,
-        "Most searches for an unknown first pose. Default: 8, or 0 for a tracker that "
-        "looks ahead.",
+        "Largest number of searches for an unknown first pose. Default: 8, or 0 for "
+        "a tracker that looks ahead.",
         0,
     )
     body_frames: int | None = _int(

@@ -145,9 +145,9 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
 
 
 def _verdict(content: Content) -> str:
-    """Return what was not determined, after the trust in the track.
+    """Return what was not determined, preceded by the trust in the track.
 
-    There is no trust if the truth is known.
+    If the truth is known, no trust is reported.
     """
     trust = "" if content.trust is None else f"{content.trust.sentence} "
     if not_determined := undetermined(content):
