@@ -29,7 +29,7 @@ NAME = "subject"
 
 def written(folder: Path) -> dict[str, bytes]:
     """Return a valid content for each of `readers`, which need what is left in `folder`."""
-    made = [result(cells(1)[0], 1.0).row, search_result(search_cell("sapso"), 9).row]
+    made = [result(cells(1)[0], 1.0), search_result(search_cell("sapso"), 9)]
     figures = [
         {name: value for name, value in row.items() if name not in NAMES}
         for row in made
