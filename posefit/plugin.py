@@ -12,6 +12,7 @@ with a space is a function here.
 | tracker | `Tracker`: a `Task` and `Observation`s in, `Frame`s out | `posefit_register_trackers` |
 | start | `Initialiser` of a `Task`: an `Observation` in, a `Posterior` of poses out | `posefit_register_starts` |
 | segmenter | `Segmenter` of a `Film` | `posefit_register_segmenters` |
+| device | `Device`, which draws poses and counts their areas | `posefit_register_devices` |
 | command | a `click.Command` | `posefit_register_commands` |
 
 A name is imported when it is first used, so that a command line that lists plugins stays quick.

@@ -1,4 +1,4 @@
-"""The list of the settings: every optimiser, prior, tracker and segmenter that posefit brings, read from the code.
+"""The list of the settings of all optimisers, priors, trackers, starts, segmenters and devices, read from the code.
 
 Of optimisers that only adapt a library the page has the names.
 """

@@ -12,7 +12,7 @@ from posefit.cli.output import print_result, results_alone
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def plugins(context: click.Context, as_json: bool) -> None:
-    """List the optimisers, priors, trackers, starts and segmenters that are installed, with their settings.
+    """List the optimisers, priors, trackers, starts, segmenters and devices that are installed, with their settings.
 
     `show NAME` says what the settings of one mean.
     """
@@ -114,9 +114,9 @@ def check(
     same cause, the others are not checked.
     """
     from posefit.fitting.check import one_of
-    from posefit.registry import KINDS
+    from posefit.registry import CHECKED_KINDS
 
-    one_of("kind", kind, KINDS)
+    one_of("kind", kind, CHECKED_KINDS)
     with results_alone():
         from posefit.testing.process import check_in_process
 

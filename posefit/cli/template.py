@@ -13,7 +13,7 @@ from posefit.files import new_folder
 from posefit.fitting.check import one_of
 from posefit.hooks import PROJECT
 from posefit.reading import quoted
-from posefit.registry import COMMAND, KINDS, Registrable, plugins_of, registry
+from posefit.registry import CHECKED_KINDS, COMMAND, Registrable, plugins_of, registry
 
 TAKEN = {"Frame"}  # names that a template's module has already
 
@@ -29,7 +29,7 @@ def write_plugin(
     `commands` are the names of posefit's own, which a new one cannot have. Raises ValueError where the name cannot
     be a plugin's, or the folder is there already.
     """
-    one_of("kind", kind, (*KINDS, COMMAND))
+    one_of("kind", kind, (*CHECKED_KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(
             f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}"

@@ -157,8 +157,8 @@ class SilhouetteCost:
 
     @cached_property
     def on_device(self) -> bool:
-        """Whether a GPU draws the poses: then all of them at once, and threads have nothing to share."""
-        return any(silhouette.device != "cpu" for silhouette in self.silhouettes)
+        """Whether a device draws the poses: then all of them at once, and threads have nothing to share."""
+        return any(silhouette.device is not None for silhouette in self.silhouettes)
 
     @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
