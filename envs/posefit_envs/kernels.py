@@ -23,8 +23,8 @@ from posefit.silhouette.rasteriser import (
     View,
     fill_pose,
     outline_poses,
-    scratch,
     set_scene,
+    work_arrays,
 )
 
 
@@ -100,7 +100,7 @@ def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures
     height, width = pictures.shape[1:3]
     flat = poses.reshape(-1, poses.shape[2])
     places = translations.reshape(-1, 3)
-    work = scratch(scenes.observed.shape[2], scenes.observed.shape[3])
+    work = work_arrays(scenes.observed.shape[2], scenes.observed.shape[3])
     block = np.empty(LANES, np.int64)
     drawn = np.empty(LANES, np.int64)
     for v in range(views):

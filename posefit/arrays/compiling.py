@@ -131,12 +131,13 @@ def compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         config.CACHE_DIR = str(folder)
         try:
             dispatcher = numba.njit(cache=True, **options)(function)
+            # if numba chose another place, stale files may be there
+            usable = Path(dispatcher.stats.cache_path).is_relative_to(folder)
+        except RuntimeError:  # the function is not from a file
+            usable = False
         finally:
             config.CACHE_DIR = before
-    # if numba chose another place, stale files may be there
-    if Path(dispatcher.stats.cache_path).is_relative_to(folder):
-        return dispatcher
-    return numba.njit(**options)(function)
+    return dispatcher if usable else numba.njit(**options)(function)
 
 
 def _usable_folder(module: str) -> Path | None:

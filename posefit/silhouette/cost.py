@@ -153,8 +153,10 @@ def costs_in(
     """
     drawn.count_poses(len(poses), silhouette)
     counted = np.empty((len(poses), 3), dtype=np.int64)
+    costs = np.zeros(len(poses))
     kernels.count_areas(*drawing, poses, translations, counted)
-    return mismatch(counted, beta)
+    kernels.add_mismatch(counted, SCALE, beta, costs)
+    return costs
 
 
 def compile_kernels() -> None:

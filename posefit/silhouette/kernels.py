@@ -13,8 +13,8 @@ from posefit.silhouette.rasteriser import (
     NONE,
     fill_pose,
     outline_poses,
-    scratch,
     set_scene,
+    work_arrays,
 )
 from posefit.silhouette.spans import STRIP_PIXELS, popcount
 
@@ -80,7 +80,7 @@ def count_areas(chain, radii, view, observed, images, poses, translations, areas
     person = observed.person
     valid = observed.valid
     rows = np.empty(LANES, np.int64)
-    work = scratch(person.shape[0], person.shape[1])
+    work = work_arrays(person.shape[0], person.shape[1])
     set_scene(work, 0, LANES, chain.offsets, radii, view)
     for first in range(0, n, LANES):
         set_rows(rows, first, n)
