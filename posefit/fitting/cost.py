@@ -16,14 +16,18 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.silhouette.cost import (
     BETA,
-    Areas,
     costs_in,
     drawing_of,
     known_views,
     mean_over_views,
     pose_costs,
 )
-from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import (
+    Areas,
+    Silhouette,
+    coarser_camera,
+    coarser_silhouette,
+)
 from posefit.silhouette.sharing import parts_of, work_through
 
 
