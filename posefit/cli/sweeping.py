@@ -26,7 +26,7 @@ from posefit.cli.output import print_result, results_alone, say
 @click.option(
     "--dry-run",
     is_flag=True,
-    help="Print what cells there are, and run none; with --json each cell.",
+    help="Print the cells and about how long they take; run a few frames of each method alone.",
 )
 @click.option(
     "--retry-quarantined", is_flag=True, help="Try cells again that were quarantined."
@@ -50,25 +50,20 @@ def sweep(
     Exit status 1 where cells were quarantined after three attempts, 130 where it was stopped.
     """
     from posefit.sweep import command
+    from posefit.sweep import preview as previewing
     from posefit.sweep.engine import Limits
     from posefit.sweep.plan import Plan
+    from posefit.sweep.pool import cores
 
     seconds = places.pop("cell_seconds")
     gigabytes = places.pop("cell_gigabytes")
     start = command.engine(Limits(seconds, gigabytes), **places)
     if dry_run:
         with results_alone() if as_json else nullcontext():  # a plugin may print, too
-            previewed = command.previewed(plan, out, shard)
-            listed = (
-                [
-                    {"key": cell.key, "done": done, **cell.spec}
-                    for cell, done in previewed
-                ]
-                if as_json
-                else []
-            )
-            lines = command.preview_lines(previewed)
-        return print_result(lines, {"cells": listed}, as_json)
+            preview = previewing.preview(plan, out, shard)
+        line = previewing.time_line(preview.seconds, places["workers"] or cores())
+        value = {"cells": preview.cells, "seconds": preview.seconds}
+        return print_result([*preview.lines, line], value, as_json)
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():

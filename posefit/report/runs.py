@@ -84,7 +84,11 @@ class _Rows:
                     f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one"
                 )
             if row["status"] == "done":
-                self._add(row, shared)
+                try:
+                    self._add(row, shared)
+                # a figure of another type, or one that is not there
+                except (ValueError, TypeError, LookupError, AttributeError) as error:
+                    raise ledger.damaged_row(row["key"], error) from None
         if not kinds:
             raise InputError(
                 f"{ledger.path}: expected a ledger with finished rows, got one with none"
@@ -99,10 +103,11 @@ class _Rows:
             {name: value for name, value in spec.items() if name not in LAST_FIELDS}
         )
         self.numbers.append((place, method, head))
-        self.seeds.append(spec["seed"])
+        self.seeds.append(int(spec["seed"]))
         self.keys.append(row["key"])
         self.warnings.append(tuple(row["warnings"]))
-        self.measured.append(KINDS[spec["kind"]].read(row, shared))
+        figures, data = KINDS[spec["kind"]].read(row, shared)
+        self.measured.append((figures.astype(float), data))
 
 
 def runs_of(

@@ -1,10 +1,10 @@
 """A cell: one run of a sweep, a track or a search, described completely by names and numbers; and its result."""
 
 import hashlib
-import io
 import json
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,7 +15,6 @@ from posefit.settings import settings_text
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
-    from posefit.arrays import Array
     from posefit.footage.scene import Scene
 
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
@@ -23,15 +22,6 @@ RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
 # that a row has under another name, or not at all
 RENAMED_MEASURES = ("evaluations", "evaluations_per_second")
-
-
-@dataclass(frozen=True)
-class CellResult:
-    """What a cell measured; but for the times, the same bits wherever it ran."""
-
-    row: dict[str, Any]  # as JSON holds it: the key, the spec, and the figures
-    # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
-    joints: bytes = field(repr=False)
 
 
 class Cell:
@@ -75,8 +65,11 @@ class Cell:
         """The evaluations of the whole cell."""
         return self.evaluations
 
-    def measure(self) -> CellResult:
-        """Run it. Raises ValueError where a file has changed since it was planned."""
+    def measure(self) -> dict[str, Any]:
+        """Run it, and return its figures as JSON holds them: the same bits wherever it ran, but for the times.
+
+        Raises ValueError where a file has changed since it was planned.
+        """
         raise NotImplementedError
 
 
@@ -125,7 +118,7 @@ class TrackCell(Cell):
         """The evaluations of all frames, by every hypothesis."""
         return self.hypotheses * self.frames * self.evaluations
 
-    def measure(self) -> CellResult:
+    def measure(self) -> dict[str, Any]:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
         from posefit.evaluation.errors import anytime_trace, mode_reliability
         from posefit.evaluation.measures import MEASURES
@@ -161,7 +154,7 @@ class TrackCell(Cell):
         # both roots at one point, as in `mpjpe_mm`
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)
         measured = asdict(result.measures)
-        row = {
+        return {
             **{
                 name: measured[name]
                 for name in MEASURES
@@ -176,7 +169,6 @@ class TrackCell(Cell):
             ),
             "trace": anytime_trace(result.frames),
         }
-        return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 
 
 @dataclass(frozen=True)
@@ -200,8 +192,8 @@ class SearchCell(Cell):
         problem = f"f{self.function} in {self.dimension}D, instance {self.instance}"
         return f"{self.name or self.method} on {problem}, seed {self.seed}"
 
-    def measure(self) -> CellResult:
-        """Search the problem."""
+    def measure(self) -> dict[str, Any]:
+        """Search the problem, and return the figures."""
         from posefit.suites.problem import suite
         from posefit.suites.running import run_on
 
@@ -219,7 +211,7 @@ class SearchCell(Cell):
             evaluations=self.evaluations,
             seed=self.seed,
         )
-        row = {
+        return {
             "cost": run.cost,
             "truth_cost": run.truth_cost,
             "evaluations_used": problem.evaluations,
@@ -230,7 +222,6 @@ class SearchCell(Cell):
             },
             "warnings": [],
         }
-        return CellResult(row, b"")
 
 
 KINDS: dict[str, type[TrackCell] | type[SearchCell]] = {
@@ -248,8 +239,8 @@ def cell_from(spec: Mapping[str, Any]) -> Cell:
     return KINDS[spec["kind"]](**values)
 
 
-def run_cell(cell: Cell) -> CellResult:
-    """Return the result of a cell, with its key and spec.
+def run_cell(cell: Cell) -> dict[str, Any]:
+    """Return a cell's row: its key, its spec, its figures and the seconds it took.
 
     Raises ValueError where this posefit, on a remote worker perhaps, or one of its plugins is not the planned one.
     """
@@ -257,12 +248,13 @@ def run_cell(cell: Cell) -> CellResult:
     for planned in cell.version.split(", "):
         if installed := other_version(planned):
             raise InputError(f"a worker must have {planned}, got {installed}")
-    result = cell.measure()
+    with _guarded(cell):
+        figures = cell.measure()
     row = {
         "key": cell.key,
         "spec": cell.spec,
         "status": "done",
-        **result.row,
+        **figures,
         "seconds": time.perf_counter() - began,
     }
     try:
@@ -271,7 +263,26 @@ def run_cell(cell: Cell) -> CellResult:
         raise InputError(
             f"what {cell.method} measures must be finite numbers, got some that are not"
         ) from None
-    return replace(result, row=row)
+    return row
+
+
+def _guarded(cell: Cell) -> AbstractContextManager[None]:
+    """Return a context that undoes what a plugin from elsewhere does to libraries; posefit's own do nothing to them."""
+    from posefit.sweep.worker import functions_kept
+
+    if _own_origins().issuperset(cell.version.split(", ")[1:]):
+        return nullcontext()
+    return functions_kept()
+
+
+@lru_cache(maxsize=1)
+def _own_origins() -> frozenset[str]:
+    """Return the origins of what posefit's own plugins offer."""
+    from posefit.hooks import PROJECT
+    from posefit.registry import registry
+
+    offers = (offer for named in registry().offers.values() for offer in named.values())
+    return frozenset(offer.origin for offer in offers if offer.distribution == PROJECT)
 
 
 def other_version(origin: str) -> str | None:
@@ -351,17 +362,3 @@ def digest_of(path: str | Path) -> str:
         raise InputError(f"{path}: expected a file, got none")
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def packed_joints(**arrays: "Array") -> bytes:
-    """Return arrays in metres as an .npz, float32."""
-    import numpy as np
-
-    buffer = io.BytesIO()
-    # to half a millimetre: the digits after that do not compress, and no picture shows them
-    rounded: dict[str, Any] = {
-        name: (np.round(array * 1024.0) / 1024.0).astype(np.float32)
-        for name, array in arrays.items()
-    }
-    np.savez_compressed(buffer, **rounded)
-    return buffer.getvalue()

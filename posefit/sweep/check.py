@@ -1,22 +1,20 @@
-"""Checks a cell's spec before anything runs, and a row of a ledger where it is read.
+"""Checks a cell's spec before anything runs.
 
 Options of a track are checked by their one declaration, all other fields here.
 """
 
 import json
 import os
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import fields
-from functools import lru_cache, partial
+from functools import lru_cache
 from math import inf
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any
 
 from posefit import settings
 from posefit.errors import InputError
-from posefit.evaluation.measures import Measures, Spread
-from posefit.fitting.check import between, one_of, whole
-from posefit.geometry.skeleton import JOINTS
+from posefit.fitting.check import between, whole
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
 from posefit.reading import SHOWN, quoted, suggestion
@@ -27,7 +25,6 @@ from posefit.suites.problem import INFEASIBLE
 from posefit.sweep.cell import (
     ALL_AROUND,
     DROPPED,
-    KINDS,
     SearchCell,
     TrackCell,
     digest_of,
@@ -45,14 +42,6 @@ FIELDS = tuple(
 MAX_VIEWS = 100
 MAX_FRAMES = 100_000
 MAX_BODY_OFF = 50.0  # percent that a body may be off
-# of a figure in a row: its square is finite, and so is itself in 32 bits
-LARGEST = 1e30
-# the measures that are a table of numbers: a spread over frames, or one for each baseline or level
-SEVERAL = {
-    name
-    for name, hint in get_type_hints(Measures).items()
-    if any(kind is Spread or get_origin(kind) is Mapping for kind in get_args(hint))
-}
 
 
 def cell_of(spec: Mapping[str, Any]) -> TrackCell:
@@ -379,143 +368,3 @@ SEARCH_CHECKS: Checks = {
     "seed": _whole(0),
     "name": _label,
 }
-
-
-def _plain(outer: type, *inner: type) -> Check:
-    """Return the check of a value of type `outer`, whose parts, if it is a list or a table, are of `inner` types."""
-
-    def check(field: str, value: Any) -> Any:
-        parts = (
-            value.values()
-            if isinstance(value, dict)
-            else value
-            if isinstance(value, list)
-            else [value]
-        )
-        if type(value) is not outer or not all(type(part) in inner for part in parts):
-            raise InputError(
-                f"{field} must be what posefit writes, got {quoted(value)}"
-            )
-        return value
-
-    return check
-
-
-def _number(field: str, value: Any) -> float:
-    if type(value) not in (int, float) or not -LARGEST < value < LARGEST:
-        raise InputError(
-            f"{field} must be a number that a cell can measure, got {quoted(value)}"
-        )
-    return float(value)
-
-
-def _figure(field: str, value: Any) -> None:
-    """Check a figure: a number, or a table of numbers if the measure has several; or None, as any part may be."""
-    if value is None:
-        return
-    parts = [value]
-    if field in SEVERAL:
-        parts = list(_plain(dict, int, float, type(None))(field, value).values())
-    for part in parts:
-        if part is not None:
-            _number(field, part)
-
-
-def _numbers(field: str, value: Any, count: int | None = None) -> list[float]:
-    numbers = [_number(field, part) for part in _plain(list, int, float)(field, value)]
-    if count is not None and len(numbers) != count:
-        raise InputError(f"{field} must be {count} numbers, got {len(numbers)}")
-    return numbers
-
-
-def _trace(field: str, value: Any) -> None:
-    trace = _plain(dict, list)(field, value)
-    used, costs = (_numbers(field, trace.get(name)) for name in ("evaluations", "cost"))
-    rising = (
-        used == sorted(set(used))
-        and costs == sorted(costs, reverse=True)
-        and all(number >= 1 for number in used)
-    )
-    if not rising or len(used) != len(costs):
-        raise InputError(
-            f"{field} must be rising evaluations from 1 and the best cost after each, got {quoted(value)}"
-        )
-
-
-def _modes(field: str, value: Any) -> None:
-    for part in _plain(list, list)(field, value):
-        between(f"the probability of {field}", _numbers(field, part, 3)[1], 0.0, 1.0)
-
-
-# what a ledger holds of a cell: names of methods, motions and files as they were wherever it was written
-WRITTEN: Checks = {
-    **CHECKS,
-    **SEARCH_CHECKS,
-    **dict.fromkeys(("kind", "method", "motion", "version"), _plain(str, str)),
-    "train": _plain(list, str),
-    "files": _plain(dict, str),
-    "settings": _plain(dict, int, float, str, bool, type(None), list),
-    "evaluations": _whole(1),
-}
-# the figures that a row must have; others are numbers
-FIGURES: Mapping[str, Checks] = {
-    "track": {
-        "warnings": _plain(list, str),
-        "trace": _trace,
-        "joint_errors_mm": partial(_numbers, count=len(JOINTS)),
-        "mode_reliability": _modes,
-    },
-    "search": {"warnings": _plain(list, str), "trace": _trace, "truth_cost": _number},
-}
-
-
-def checked_row(
-    key: str, spec: str, status: str, faults: str, row: str | None
-) -> dict[str, Any]:
-    """Return a row of a ledger as a mapping. Raises InputError saying what was expected instead."""
-    values = _parsed(spec)
-    one_of("kind", kind := str(values.get("kind")), KINDS)
-    _check_names(values, {"kind", *(field.name for field in fields(KINDS[kind]))})
-    for name, value in values.items():
-        checked = WRITTEN[name](name, value)
-        if (list(checked) if isinstance(checked, tuple) else checked) != value:
-            raise InputError(f"{name} must be what posefit writes, got {quoted(value)}")
-    if kind == "search":
-        checked_address(
-            *(values[name] for name in ("suite", "function", "instance", "dimension"))
-        )
-    if status != "done":
-        reasons = _plain(list, str)(
-            "reasons", _parsed(f'{{"reasons": {faults}}}').get("reasons")
-        )
-        return {"key": key, "spec": values, "status": "quarantined", "reasons": reasons}
-    figures = _parsed(row or "")
-    _check_names(figures, FIGURES[kind].keys() | figures.keys())
-    for name, value in figures.items():
-        check: Check = FIGURES[kind].get(name, _figure)
-        check(name, value)
-    if kind == "search" and not figures["trace"]["cost"]:
-        raise InputError("trace must have an evaluation, got none")
-    return {"key": key, "spec": values, "status": "done", **figures}
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    try:
-        values = json.loads(text)
-        # finite numbers, whole characters
-        json.dumps(values, ensure_ascii=False, allow_nan=False).encode()
-    except (ValueError, TypeError, RecursionError) as error:
-        raise InputError(
-            f"expected JSON of finite numbers and whole characters, got {quoted(str(error))}"
-        ) from None
-    if not isinstance(values, dict):
-        raise InputError(f"expected a table of values, got {quoted(values)}")
-    return values
-
-
-def _check_names(values: Mapping[str, Any], names: Set[str]) -> None:
-    if values.keys() != names:
-        came = "one more" if (wrong := min(values.keys() ^ names)) in values else "none"
-        raise InputError(
-            f"a row must hold what posefit writes, got {came}: {quoted(wrong)}"
-        )

@@ -6,21 +6,19 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
-from itertools import islice
 from pathlib import Path
 
 from posefit.errors import InputError
 from posefit.progress import bars_shown
 from posefit.reading import counted, cut
-from posefit.sweep.cell import Cell, json_of, other_version, run_cell
+from posefit.sweep.cell import Cell, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Run
 from posefit.sweep.ledger import FILE, Ledger, Writer
-from posefit.sweep.plan import MAX_CELLS, Plan
+from posefit.sweep.plan import MAX_CELLS
 from posefit.sweep.pool import Pool, cores
 
 SHARDS = "ledger-*-of-*.sqlite"  # the names that `file_of` gives
-VALUES = 12  # of a field, that a preview lists
 
 
 def swept(
@@ -111,53 +109,6 @@ def done_elsewhere(out: Path) -> set[str]:
         return set()
     with Ledger(*files) as ledger:
         return ledger.done()
-
-
-def previewed(
-    plan: str, out: str | None, shard: str | None
-) -> Iterator[tuple[Cell, bool]]:
-    """Yield the cells of a plan or of a shard, and whether each is done."""
-    name = file_of(shard)
-    cells = cells_of(Plan.read(plan), shard)
-    done = set[str]()
-    if out is not None:
-        if shard is None:
-            done |= done_elsewhere(Path(out))
-        if (path := Path(out) / name).exists():
-            with Ledger(path) as ledger:
-                done |= ledger.done()
-    yield from ((cell, cell.key in done) for cell in cells)
-
-
-def preview_lines(cells: Iterable[tuple[Cell, bool]]) -> list[str]:
-    """Return how many cells have which values, and how many are to run."""
-    counts: dict[str, Counter[str]] = {}
-    total = to_run = evaluations = 0
-    for cell, done in cells:
-        total += 1
-        to_run = to_run + (not done)
-        evaluations = evaluations + (not done) * cell.total_evaluations
-        for name, value in cell.spec.items():
-            counts.setdefault(name, Counter())[
-                value if isinstance(value, str) else json_of(value)
-            ] += 1
-    lines = []
-    for name, values in counts.items():
-        if name in ("method", "motion") or (
-            len(values) > 1 and name not in ("version", "files")
-        ):
-            shown = [
-                f"{count:,} x {cut(value)}"
-                for value, count in islice(values.items(), VALUES)
-            ]
-            more = [f"and {len(values) - VALUES:,} other values"] * (
-                len(values) > VALUES
-            )
-            lines.append(f"{name:16}  {', '.join(shown + more)}")
-    return [
-        *lines,
-        f"{total:,} cells, {to_run:,} of them to run, {evaluations:,} evaluations",
-    ]
 
 
 def engine(

@@ -4,20 +4,18 @@
         rows = list(ledger.rows())
 
 Cells are in the table `cells`: key, kind ("track" or "search"), spec (JSON: what was run), status ("planned", "done" or
-"quarantined"), faults (JSON: the reasons of failed attempts), losses (times that something outside ended it), row
-(JSON: the figures) and arrays (an .npz). The view `runs` has what queries ask for most as columns.
+"quarantined"), faults (JSON: the reasons of failed attempts), losses (how often it was killed from outside) and row
+(JSON: the figures). The view `runs` has what queries ask for most as columns.
 
 One driver writes a file: it holds a lock on a second one beside it, FILE.driver, which names its process. The operating
 system drops that lock when the process ends in any way.
 """
 
-import io
 import json
 import os
 import socket
 import sqlite3
 import stat
-import zipfile
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -28,14 +26,12 @@ from typing import TYPE_CHECKING, Any, Self
 from posefit.errors import InputError
 from posefit.files import lock, made_folders, remove_empty
 from posefit.reading import counted, cut, quoted
-from posefit.sweep.cell import Cell, CellResult, cell_from
-from posefit.sweep.check import checked_row
+from posefit.sweep.cell import Cell, cell_from
+from posefit.sweep.engine import text_of
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from posefit.arrays import Array
 
 FILE = "ledger.sqlite"
 SUFFIX = ".sqlite"
@@ -48,10 +44,10 @@ LOSSES = 50  # attempts that something outside ended
 # to wait for another program that locks a file: where it is opened, and in the middle of a sweep
 OPEN_SECONDS = 5.0
 BUSY_SECONDS = 60.0
-MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
 MAX_VALUE_BYTES = 200_000_000  # of a value in a file
 MIN_FILE_BYTES = 512  # a page of SQLite, at least
-COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row", "arrays"}
+PAGE_BYTES = 8192
+COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row"}
 NAMES = ("key", "spec", "status")  # that a row has beside its figures
 # What queries ask for most: where each stands, and its type. A view's expressions have no declared type, and a program
 # that asks for one, such as DuckDB, would take numbers for bytes: 10 would be less than 9. So the view begins with an
@@ -75,12 +71,13 @@ _VALUES = ", ".join(
     f"CAST(json_extract({column}, '{path}') AS {kind})"
     for column, path, kind in VIEWED.values()
 )
-# What brings a file to a format, its user_version, from the one before. A row has been the same since the first.
+# What brings a file to a format, its user_version, from the one before. A row has been the same since the first. Until
+# format 2 a column `arrays` held the joints of each frame, which nothing read: an older file keeps its own.
 MIGRATIONS = {
     1: """
     CREATE TABLE cells (
         key TEXT PRIMARY KEY, kind TEXT NOT NULL, spec TEXT NOT NULL, status TEXT NOT NULL DEFAULT 'planned',
-        faults TEXT NOT NULL DEFAULT '[]', losses INTEGER NOT NULL DEFAULT 0, row TEXT, arrays BLOB);
+        faults TEXT NOT NULL DEFAULT '[]', losses INTEGER NOT NULL DEFAULT 0, row TEXT);
     CREATE INDEX by_status ON cells (status);
     """,
     # the columns of the view have types
@@ -90,6 +87,8 @@ MIGRATIONS = {
     CREATE VIEW runs AS SELECT * FROM run_types
         UNION ALL SELECT key, kind, status, faults, {_VALUES} FROM cells;
     """,
+    # a new file has no column `arrays`
+    3: "",
 }
 FORMAT = max(MIGRATIONS)
 
@@ -173,35 +172,6 @@ class Ledger:
         yield from self.rows()
         yield from self.quarantined()
 
-    def joints(self, key: str) -> dict[str, "Array"]:
-        """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
-        import numpy as np
-
-        k, done = self._places.get(key, (0, False))
-        if not done:
-            raise InputError(
-                f"{self.path}: expected the key of a finished cell, got {quoted(key)}"
-            )
-        query = "SELECT kind, arrays FROM cells WHERE key = ?"
-        ((kind, data),) = self._query(k, query, key)
-        if kind != "track":
-            raise InputError(
-                f"{self._open[k][0]}: cell {key[:8]} is a search, which has no joints"
-            )
-        try:
-            with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                if (
-                    sum(member.file_size for member in archive.infolist())
-                    > MAX_JOINTS_BYTES
-                ):
-                    raise ValueError("more than a cell has")
-            with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-                return {name: stored[name] for name in ("estimate", "truth")}
-        except Exception:  # whatever a hostile archive raises
-            raise InputError(
-                f"{self._open[k][0]}: the joints of cell {key[:8]} must be whole, got damaged ones"
-            ) from None
-
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
         from posefit.sweep.table import dataframe
@@ -213,26 +183,26 @@ class Ledger:
         for _, database in self._open:
             database.close()
 
-    def _rows(self, status: str) -> Iterator[dict[str, Any]]:
-        for k in range(len(self._open)):
-            for values in self._query(
-                k, f"{SELECT} WHERE status = ? ORDER BY rowid", status
-            ):
-                if self._places.get(values[0]) == (k, status == "done"):
-                    yield self._checked(k, *values)
+    def damaged_row(self, key: str, error: Exception) -> InputError:
+        """Return the error of a row that posefit did not write as it is, and what to do about it."""
+        name = quoted(key[:8])[1:-1]
+        file = self._open[self._places[key][0]][0]
+        fix = f"sqlite3 {FILE} \"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'\""
+        return InputError(
+            f"{file}: the row of cell {name} must be one that posefit wrote: {cut(text_of(error))}; "
+            f"to run it again: {fix}"
+        )
 
-    def _checked(
-        self, k: int, key: Any, spec: Any, status: Any, faults: Any, row: Any
-    ) -> dict[str, Any]:
-        try:
-            return checked_row(str(key), spec, status, faults, row)
-        except ValueError as error:
-            name = quoted(str(key)[:8])[1:-1]
-            fix = f"sqlite3 {FILE} \"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'\""
-            raise InputError(
-                f"{self._open[k][0]}: the row of cell {name} must be one that posefit wrote: {cut(str(error))}; "
-                f"to run it again: {fix}"
-            ) from None
+    def _rows(self, status: str) -> Iterator[dict[str, Any]]:
+        query = f"{SELECT} WHERE status = ? ORDER BY rowid"
+        for k in range(len(self._open)):
+            for key, *texts in self._query(k, query, status):
+                if self._places.get(key) != (k, status == "done"):
+                    continue
+                try:
+                    yield _parsed_row(key, status, *texts)
+                except (ValueError, TypeError, KeyError, RecursionError) as error:
+                    raise self.damaged_row(str(key), error) from None
 
     def _query(self, k: int, query: str, *values: Any) -> Iterator[Any]:
         file, database = self._open[k]
@@ -242,7 +212,18 @@ class Ledger:
             raise _unreadable(file, error) from None
 
 
-SELECT = "SELECT key, spec, status, faults, row FROM cells"
+SELECT = "SELECT key, spec, faults, row FROM cells"
+
+
+def _parsed_row(
+    key: str, status: str, spec: str, faults: str, row: str | None
+) -> dict[str, Any]:
+    """Return a row as a mapping. Raises an error that says what no row of this format has."""
+    parsed = {"key": str(key), "spec": json.loads(spec), "status": status}
+    cell_from(parsed["spec"])  # knows each field
+    if status == "done":
+        return {**parsed, **json.loads(row or "")}
+    return {**parsed, "reasons": list(map(str, json.loads(faults)))}
 
 
 class Writer:
@@ -283,6 +264,8 @@ class Writer:
             (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
+        # Before the first table: a row takes more than half of a page of SQLite's usual size, and would have one alone.
+        self._db.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         self._db.executescript("PRAGMA journal_mode = WAL")
         for later in range(form + 1, FORMAT + 1):
             self._db.executescript(
@@ -360,14 +343,12 @@ class Writer:
         ).fetchone()
         return cell_from(json.loads(spec))
 
-    def finish(self, key: str, result: CellResult) -> bool:
-        """Write what a cell measured, and return whether it is the first: of what ran twice the first counts."""
-        row = json.dumps(
-            {name: value for name, value in result.row.items() if name not in NAMES},
-            allow_nan=False,
-        )
-        query = "UPDATE cells SET status = 'done', row = ?, arrays = ? WHERE key = ? AND status != 'done'"
-        return self._db.execute(query, [row, result.joints, key]).rowcount == 1
+    def finish(self, key: str, row: Mapping[str, Any]) -> bool:
+        """Write a cell's row, and return whether it is the first: if a cell ran twice, the first row counts."""
+        figures = {name: value for name, value in row.items() if name not in NAMES}
+        text = json.dumps(figures, allow_nan=False)
+        query = "UPDATE cells SET status = 'done', row = ? WHERE key = ? AND status != 'done'"
+        return self._db.execute(query, [text, key]).rowcount == 1
 
     def fail(self, key: str, reason: str, is_own_fault: bool = True) -> bool:
         """Note a failed attempt, and return whether the cell is in quarantine for it."""

@@ -45,6 +45,7 @@ SEARCH_LISTS = {  # and what they are by default
     "budgets": ("budget", [EVALUATIONS]),
     "methods": ("method", []),
 }
+PARTS = {"optimisers": "optimiser", "priors": "prior"}  # that make methods
 TABLES = ("defaults", "product", "grid", "cells")
 DEFAULT = "default"  # the name of the plan that posefit brings along
 INPUT = "-"  # the name of a plan that is read from standard input
@@ -132,7 +133,9 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
         raise InputError(f"cells must be a list of tables, got {quoted(listed)}")
     single = [_mapping("cells", spec) for spec in listed]
     crossed = _mapping("product", tables.get("product") or {})
-    _check_names("product", crossed, LISTS)
+    _check_names("product", crossed, [*LISTS, *PARTS])
+    if any(part in crossed for part in PARTS):
+        crossed = _with_methods(crossed)
     lists = {
         LISTS[name]: _listed(f"product.{name}", LISTS[name], values)
         for name, values in crossed.items()
@@ -183,6 +186,36 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
 
     _check_count(lists)
     return cells
+
+
+def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the lists of a product with `methods`: each of its optimisers with each of its priors."""
+    if "methods" in crossed or not all(part in crossed for part in PARTS):
+        raise InputError(
+            f"product must hold methods, or both optimisers and priors, got {', '.join(crossed)}"
+        )
+    parts = []
+    for plural, singular in PARTS.items():
+        entries = _listed(f"product.{plural}", singular, crossed[plural])
+        tables = [_fields(singular, entry) for entry in entries]
+        for table in tables:
+            _check_names(f"an entry of {plural}", table, (singular, "settings"))
+            if not isinstance(table.get(singular), str):
+                raise InputError(
+                    f"an entry of {plural} must be a name, or a table with {singular}, got {quoted(dict(table))}"
+                )
+        parts.append(tables)
+    methods = []
+    for optimiser, prior in product(*parts):
+        settings: dict[str, Any] = {}
+        for kind, table in (("optimiser", optimiser), ("prior", prior)):
+            name = table[kind].partition(":")[0]
+            for key, value in flattened("settings", table.get("settings", {})).items():
+                settings[key if "." in key else f"{name}.{key}"] = value
+        method = f"{optimiser['optimiser']}@{prior['prior']}"
+        methods.append({"method": method, "settings": settings})
+    lists = {name: values for name, values in crossed.items() if name not in PARTS}
+    return {**lists, "methods": methods}
 
 
 def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ from posefit.sweep.engine import single_thread
 
 EXIT_ZERO_STATUS = 64  # the status of a process that a job ended with 0
 _starting = threading.Lock()
+# by a module's name: its members, and those that can be called as they were when it was first seen
+_functions: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
 # which a process may handle
 _SIGNALS = sorted(
     signal.valid_signals()
@@ -153,6 +156,29 @@ class _State:
         if mtrand.get_bit_generator() is not self._bits:
             mtrand.set_bit_generator(self._bits)
         np.random.set_state(self._numpy)  # noqa: NPY002
+
+
+@contextmanager
+def functions_kept() -> Iterator[None]:
+    """Put back afterwards the functions and classes of modules that the body has replaced.
+
+    A plugin that replaces `numpy.linalg.norm`, say, would change what the next method computes in this process.
+    Modules that the body loads itself are left as they are.
+    """
+    for name, module in tuple(sys.modules.items()):
+        if name not in _functions and isinstance(module, ModuleType):
+            members = vars(module)
+            _functions[name] = (
+                members,
+                {member: value for member, value in members.items() if callable(value)},
+            )
+    try:
+        yield
+    finally:
+        for members, functions in _functions.values():
+            for member, function in functions.items():
+                if members.get(member) is not function:
+                    members[member] = function
 
 
 def _handlers() -> list[Any]:

@@ -75,6 +75,26 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
     ]
 
 
+def test_each_optimiser_is_paired_with_each_prior() -> None:
+    few = {"prior": "pca", "settings": {"components": 4}}
+    cold = {"optimiser": "sapso", "settings": {"sapso.cooling": 0.8}}
+    product = {
+        "optimisers": ["cma", cold],
+        "priors": ["full", few],
+        "motions": ["walk"],
+    }
+    made = [(cell.method, dict(cell.settings)) for cell in planned(product=product)]
+    assert made == [
+        ("cma@full", {}),
+        ("cma@pca", {"pca.components": 4}),
+        ("sapso@full", {"sapso.cooling": 0.8}),
+        ("sapso@pca", {"pca.components": 4, "sapso.cooling": 0.8}),
+    ]
+    grid = {"pca.components": [4, 5]}
+    product = {"optimisers": ["cma"], "priors": ["pca"], "motions": ["walk"]}
+    assert len(planned(product=product, grid=grid)) == 2
+
+
 def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant_has_a_name() -> (
     None
 ):
@@ -128,6 +148,10 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"defaults": [1]}, "defaults must be a table, got"),
         ({"cells": 3}, "cells must be a list of tables, got 3"),
         ({"cells": [{"method": "sapso@pca", "motion": "walk"}]}, "must differ, got sapso@pca on walk, .* seed 0 twice"),
+        ({"product": {**PRODUCT, "priors": ["pca"]}}, "product must hold methods, or both optimisers and priors, got methods, motions, priors"),
+        ({"product": {"optimisers": ["cma"]}}, "both optimisers and priors, got optimisers"),
+        ({"product": {"optimisers": ["cma"], "priors": [{"name": "pca"}]}}, "an entry of priors must hold prior, settings, got 'name'"),
+        ({"product": {"optimisers": ["cma"], "priors": [3]}}, "an entry of priors must be a name"),
         ({"product": {**PRODUCT, "methods": ["sapzo@pca"]}}, "did you mean 'sapso'"),
         ({"product": {**PRODUCT, "methods": ["vsnm"]}}, "method must be OPTIMISER@PRIOR, .*, got 'vsnm'; did you mean 'vsmm'"),
         ({"product": {**PRODUCT, "views": [[]]}}, "view_degrees must be 1 to 100 angles, got 0"),
@@ -278,7 +302,7 @@ def test_a_file_that_changed_after_it_was_planned_is_not_followed(
     spec = {**SMALL, "motion": str(amc), "frames": 1, "fps": 120}
     cell = cell_of(spec)
     assert cell.files == {str(path): digest_of(path) for path in (amc, asf)}
-    assert run_cell(cell).row["status"] == "done"
+    assert run_cell(cell)["status"] == "done"
     with pytest.raises(ValueError, match=r"frames must be at most \d+, the length of"):
         cell_of({**spec, "frames": 500})
     amc.write_text(amc.read_text() + "\n")
@@ -336,7 +360,7 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
         cell.version
         == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     )
-    row = run_cell(cell).row
+    row = run_cell(cell)
     # it does not search
     assert (row["prior_floor_degrees"], row["trace"]) == (
         None,
