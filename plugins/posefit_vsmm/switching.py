@@ -24,15 +24,15 @@ from posefit_vsmm.state import AT, inverse_tangents, unit
 _UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right knee")]
 _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
 Structure = Literal["variable", "all"]
-MOST = 3  # of the four lower limbs. Interpretation V15
+MIN_LIMBS = 3  # of thighs and shanks: most of the four. Interpretation V15
 FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
 # by default: within ten cycles the filter has not converged yet. Interpretation V19
 FIRST_SECONDS = 1.0
-ENDED = 0.9  # the ratio, new to old, below which a new group ends
+MIN_RATIO = 0.9  # of a new group to the old one; below it the new one ends
 
 
 def requested_group(points: Sequence[Array]) -> int | None:
-    """Return which group, 0 to 2, the points (17, 2) of the latest three frames ask for; None where it is no other.
+    """Return which group, 0 to 2, the points (17, 2) of the latest three frames ask for; None if they ask for none.
 
     Group 3 goes before 2 and 1 (Interpretation V10). The hips of rule a are both of them, and a hip's angle is that of
     its thigh to the vertical (Interpretation V15). No change at all is not doubled by another.
@@ -46,9 +46,9 @@ def requested_group(points: Sequence[Array]) -> int | None:
     halved = (now <= 0.5 * before) & (before > 0.0)
     if doubled[:2].all():  # VSMM 7a
         return 2
-    if doubled.sum() >= MOST:  # VSMM 7b
+    if doubled.sum() >= MIN_LIMBS:  # VSMM 7b
         return 1
-    if halved.sum() >= MOST:  # VSMM 7c
+    if halved.sum() >= MIN_LIMBS:  # VSMM 7c
         return 0
     return None
 
@@ -319,7 +319,7 @@ class Switching:
         # VSMM 9
         self._log_ratio += _log_ratio(after.log_likelihoods, old, new)
         smaller = min(_log_ratio(after.log_probabilities, old, new), self._log_ratio)
-        if smaller < np.log(ENDED):
+        if smaller < np.log(MIN_RATIO):
             return self.keep_only(self.group, after)
         if smaller > 0.0:
             return self.keep_only(self.candidate_group, after)

@@ -35,6 +35,9 @@ CAP = 2  # points on a half of the disc's arc at a bone's end
 # pixels within another bone from which on a point of a bone's border is hidden
 COVERED = 0.25
 TINY = 1e-9
+# columns of a row of `cones`: the first disc; by how much the last one is off it, and its radius is less; the length of
+# the bone, and that of the cone's sides, which is 0 if one of its discs covers the other
+X0, Y0, R0, DX, DY, TAPER, LENGTH, SIDE = range(8)
 
 
 class Contour(NamedTuple):
@@ -61,7 +64,7 @@ class Contours(NamedTuple):
 class Bones(NamedTuple):
     """The drawn bones of one view."""
 
-    cones: Array  # (B, 8) see `write_cones`
+    cones: Array  # (B, 8) with columns from X0 to SIDE
     discs: Array  # (B, 3) a disc about each bone: its middle and radius
     neighbours: NDArray[np.int64]  # (n,) those that may hide a bone's border
 
@@ -86,11 +89,7 @@ class BoneSquares(NamedTuple):
 
 @jit
 def write_cones(parents, centres, radii, cones, discs):
-    """Write what distances from bones need (B, 8), and a disc about each bone (B, 3): its middle and radius.
-
-    A cone is its first point and radius, by how much the last point is off it and the last radius is less, its length,
-    and that of its sides; 0 where one of its discs covers the other.
-    """
+    """Write what distances from bones need (B, 8), and a disc about each bone (B, 3): its middle and radius."""
     for b in range(parents.size):
         x = centres[parents[b], 0]
         y = centres[parents[b], 1]
@@ -102,8 +101,14 @@ def write_cones(parents, centres, radii, cones, discs):
         square = dx * dx + dy * dy
         length = math.sqrt(square)
         side = math.sqrt(square - dr * dr) if square > dr * dr + TINY else 0.0
-        for i, value in enumerate((x, y, r0, dx, dy, dr, length, side)):
-            cones[b, i] = value
+        cones[b, X0] = x
+        cones[b, Y0] = y
+        cones[b, R0] = r0
+        cones[b, DX] = dx
+        cones[b, DY] = dy
+        cones[b, TAPER] = dr
+        cones[b, LENGTH] = length
+        cones[b, SIDE] = side
         discs[b, 0] = x + 0.5 * dx
         discs[b, 1] = y + 0.5 * dy
         discs[b, 2] = 0.5 * length + max(r0, r1)
@@ -112,14 +117,14 @@ def write_cones(parents, centres, radii, cones, discs):
 @inlined
 def cone_distance(x, y, cone):
     """Return how far a point is outside a cone, below 0 within, the share of the bone it is at, and its normal."""
-    x0 = cone[0]
-    y0 = cone[1]
-    r0 = cone[2]
-    dx = cone[3]
-    dy = cone[4]
-    dr = cone[5]
-    length = cone[6]
-    side = cone[7]
+    x0 = cone[X0]
+    y0 = cone[Y0]
+    r0 = cone[R0]
+    dx = cone[DX]
+    dy = cone[DY]
+    dr = cone[TAPER]
+    length = cone[LENGTH]
+    side = cone[SIDE]
     if side == 0.0:
         share = 0.0 if dr >= 0.0 else 1.0
     else:
@@ -219,7 +224,7 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     neighbours = np.empty(count, np.int64)
     for b in range(count):
         # else one of its discs covers the other
-        if cones[b, 6] > abs(cones[b, 5]) + TINY:
+        if cones[b, LENGTH] > abs(cones[b, TAPER]) + TINY:
             others = neighbours[: _write_neighbours(b, discs, neighbours)]
             bones = Bones(cones, discs, others)
             axis = centres[parents[b]], centres[b + 1]

@@ -34,10 +34,10 @@ def count(image, observed, valid, box):
     """Return the pixels of the body and of its overlap with the observed silhouette, and clear the image."""
     body = NONE
     overlap = NONE
-    for strip in range(box[2], box[3] + 1):
-        words = image[strip][box[0] : box[1]]
-        person = observed[strip][box[0] : box[1]]
-        known = valid[strip][box[0] : box[1]]
+    for strip in range(box.first_strip, box.last_strip + 1):
+        words = image[strip][box.first_word : box.stop_word]
+        person = observed[strip][box.first_word : box.stop_word]
+        known = valid[strip][box.first_word : box.stop_word]
         for i in range(words.size):
             body += popcount(words[i] & known[i])
             overlap += popcount(words[i] & person[i])
@@ -56,8 +56,8 @@ def paint_bits(image, box, value, pixels):
     words = (
         image.reshape(-1).view(np.uint32).reshape(image.shape[0], 2 * image.shape[1])
     )
-    for y in range(2 * box[0], min(2 * box[1], height)):
-        for strip in range(box[2], box[3] + 1):
+    for y in range(2 * box.first_word, min(2 * box.stop_word, height)):
+        for strip in range(box.first_strip, box.last_strip + 1):
             first = STRIP_PIXELS * strip
             word = np.uint64(words[strip, y])
             # from set bit to set bit: a branch at every pixel would be mispredicted at each border

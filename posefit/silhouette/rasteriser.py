@@ -59,9 +59,9 @@ _NAN = np.float32(np.nan)
 # places with a cone, of the ROOM that a row has: a power of two, so that a place is the lowest bits of a number
 CONES = 26 * LANES
 
-# A block to fill is one number: its first word as uint32 in the upper half; in the lower its first row, counted from
-# BLOCK rows above the cone's top so that none is negative, and in the lowest bits the cone's place.
-_NEXT_BLOCK = (BLOCK << 32) + BLOCK * ROOM  # from a cone's block to the one below it
+_NEXT_BLOCK = (
+    BLOCK << 32
+) + BLOCK * ROOM  # from a cone's block to the one below it, see `block_number`
 
 Singles = NDArray[np.float32]
 Integers = NDArray[np.int32]
@@ -123,6 +123,15 @@ class Bounds(NamedTuple):
     row: Integers  # the first block's first row, counted from BLOCK rows above the cone's top
 
 
+class Box(NamedTuple):
+    """The words of a bit image that a pose may have set."""
+
+    first_word: int
+    stop_word: int  # the one after the last
+    first_strip: int
+    last_strip: int
+
+
 class Work(NamedTuple):
     """The arrays that one thread works in."""
 
@@ -133,9 +142,6 @@ class Work(NamedTuple):
     keys: NDArray[np.int64]  # (ROOM,) the number of each cone's first block
     steps: NDArray[np.int64]  # from the number of one block to fill to that of the next
     spans: Integers  # (2 BLOCK,) first columns, and those after the last, in eight rows
-    box: NDArray[
-        np.int64
-    ]  # (4,) first word, the one after the last, first strip, last strip
     image: Bits  # (strips, words) clear between poses
 
 
@@ -295,16 +301,13 @@ def outline_cones(ends, outlines, bounds, strips, width, height):
 
 
 @inlined
-def bounding_box(lane, bounds, box):
-    """Write a pose's bounding box in the bit image: its first and last + 1 word, its first and last strip.
-
-    Returns how many windows of two strips its widest cone has.
-    """
+def bounding_box(lane, bounds):
+    """Return a pose's bounding box in the bit image, and how many windows of two strips its widest cone has."""
     top = _NOWHERE
     bottom = 0
     left = _NOWHERE
     right = -1
-    most = 0
+    widest = 0
     for b in range(CONES // LANES):
         k = (LANES * b + lane) & NATURAL
         first = int(bounds.first_strip[k])
@@ -313,12 +316,26 @@ def bounding_box(lane, bounds, box):
         bottom = max(bottom, int(bounds.stop_block[k]))
         left = min(left, first)
         right = max(right, last)
-        most = max(most, last - first)
-    box[0] = top * (BLOCK // 2)
-    box[1] = bottom * (BLOCK // 2)
-    box[2] = left
-    box[3] = right
-    return most // 2 + 1
+        widest = max(widest, last - first)
+    words = BLOCK // 2
+    return Box(top * words, bottom * words, left, right), widest // 2 + 1
+
+
+@inlined
+def block_number(word, row, k):
+    """Return one number for a block to fill, so that a list of blocks is one array that is added up.
+
+    Its upper half is the block's first word, as uint32, in the bit image. The lower half is its first row, counted from
+    BLOCK rows above the cone's top so that none is negative, times ROOM, and the cone's place k.
+    """
+    return (np.int64(word) << 32) + np.int64(row * ROOM + k)
+
+
+@inlined
+def block_parts(block):
+    """Return the word, the row and the place of a block's number."""
+    row = np.float32((block & 0xFFFFFFFF) // ROOM)
+    return block >> 32, row, block & (ROOM - 1)
 
 
 @inlined
@@ -329,7 +346,7 @@ def place_window(step, k, bounds, outlines, keys, strips, stride):
     """
     strip = min(bounds.first_strip[k] + 2 * step, strips - 2)
     word = strip * stride + BLOCK * bounds.first_block[k]
-    keys[k] = (np.int64(word) << 32) + np.int64(bounds.row[k] * ROOM + k)
+    keys[k] = block_number(word, bounds.row[k], k)
     column = np.float32(np.int32(STRIP_PIXELS * strip))
     stop = np.float32(np.int32(STRIP_PIXELS * (bounds.last_strip[k] + 1)))
     outlines.column[k] = column
@@ -419,7 +436,6 @@ def work_arrays(strips, words):
         np.empty(ROOM, np.int64),
         np.full(most_blocks + 1, _NEXT_BLOCK),
         np.empty(2 * BLOCK, np.int32),
-        np.empty(4, np.int64),
         image,
     )
 
@@ -472,13 +488,14 @@ def fill_pose(lane, work):
     spans = work.spans
     strips = image.shape[0]
     stride = 2 * image.shape[1]
-    for step in range(bounding_box(lane, bounds, work.box)):
+    box, windows = bounding_box(lane, bounds)
+    for step in range(windows):
         block = -_NEXT_BLOCK
         count = list_blocks(step, lane, bounds, outlines, keys, steps, strips, stride)
         for i in range(count):
             block += steps[i]
             steps[i] = _NEXT_BLOCK
-            row = np.float32((block & 0xFFFFFFFF) // ROOM)
-            span_rows(spans, outlines, block & (ROOM - 1), row)
-            set_spans(image, block >> 32, stride, spans)
-    return image, work.box
+            word, row, k = block_parts(block)
+            span_rows(spans, outlines, k, row)
+            set_spans(image, word, stride, spans)
+    return image, box
