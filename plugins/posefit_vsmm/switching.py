@@ -271,12 +271,12 @@ class Switching:
                 return after
             return self.keep_only(likely, after)  # VSMM 5
         if self.candidate_group is not None:
-            return self.judged(after)  # VSMM 9
+            return self.judged(after)
         requested = self._requested_group()
         if requested is None:
             return after
         union = self.union_with(requested)
-        after = self.form.cycle_over_both(union, before, measure)  # VSMM 8
+        after = self.form.cycle_over_both(union, before, measure)
         self.bring_in(requested)
         return self.judged(after) if self.form.judges_first_cycle else after
 
