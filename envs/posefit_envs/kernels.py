@@ -125,11 +125,11 @@ def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures
                         work, lane, lane + 1, scenes.offsets[i], scenes.radii[i], view
                     )
                     drawn[lane] = i
-            outline_poses(chain, flat, places, block, width, height, work)
+            stride = outline_poses(chain, flat, places, block, width, height, work)
             for lane in range(min(LANES, total - first)):
                 i = block[lane] // many
                 k = block[lane] % many
-                image, box = fill_pose(lane, work)
+                image, box = fill_pose(lane, stride, work)
                 if pictures.size:
                     paint_bits(image, box, value, pictures[i, :, :, v])
                 body, overlap = count(

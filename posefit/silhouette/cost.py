@@ -41,7 +41,8 @@ def _drawing(
         camera.width,
         camera.height,
     )
-    return body.skeleton.chain, body.radii, view, observed, images
+    chain = tuple(body.skeleton.chain)
+    return chain, body.radii, tuple(view), tuple(observed), images
 
 
 def areas(

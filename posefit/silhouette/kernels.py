@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Bits, inlined, jit
-from posefit.geometry.kernels import LANES, set_rows
+from posefit.geometry.kernels import LANES, Chain, set_rows
 from posefit.silhouette.rasteriser import (
     NONE,
+    View,
     fill_pose,
     outline_poses,
     set_scene,
@@ -73,8 +74,13 @@ def paint_bits(image, box, value, pixels):
 def count_areas(chain, radii, view, observed, images, poses, translations, areas):
     """Write the areas (n, 3) R, B, Y of poses (n, 66).
 
-    The bit images of the bodies are written to `images` (n, strips, words), where it is not empty.
+    The bit images of the bodies are written to `images` (n, strips, words), if it is not empty. `chain`, `view` and
+    `observed` are plain tuples of what a Chain, a View and an Observed have: each NamedTuple among the arguments takes
+    numba as long as filling half a pose.
     """
+    chain = Chain(chain[0], chain[1], chain[2], chain[3])
+    view = View(view[0], view[1], view[2], view[3], view[4], view[5])
+    observed = Observed(observed[0], observed[1], observed[2])
     n = poses.shape[0]
     silhouette = np.uint64(observed.pixels)
     person = observed.person
@@ -84,9 +90,11 @@ def count_areas(chain, radii, view, observed, images, poses, translations, areas
     set_scene(work, 0, LANES, chain.offsets, radii, view)
     for first in range(0, n, LANES):
         set_rows(rows, first, n)
-        outline_poses(chain, poses, translations, rows, view.width, view.height, work)
+        stride = outline_poses(
+            chain, poses, translations, rows, view.width, view.height, work
+        )
         for lane in range(min(LANES, n - first)):
-            image, box = fill_pose(lane, work)
+            image, box = fill_pose(lane, stride, work)
             i = first + lane
             if images.size:
                 for strip in range(image.shape[0]):

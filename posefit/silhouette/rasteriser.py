@@ -12,6 +12,8 @@ Poses are outlined LANES at a time. A number of theirs, such as the column of a 
 
 So loops over places run in vector registers, and place `LANES * bone + lane` is a cone of one pose. Joints lie in the
 same way: joint j of a lane is at place `LANES * j + lane`. Bone b ends in joint b + 1, which is LANES places further.
+A pose that is alone has its cones side by side instead, at place `bone`. From a bone to the next it is `stride` places,
+LANES or 1.
 
 A bit image is cut into strips of 32 columns. It is (strips, words) uint64, and one word has the bits of two rows. As
 uint32 it is (strips, rows): bit i of image[s, y] is the pixel in column 32 s + i of row y. Strips are even in number,
@@ -37,6 +39,7 @@ from posefit.geometry.kernels import (
     X,
     Y,
     Z,
+    all_same,
     empty_lanes,
     place_lanes,
     set_offsets,
@@ -56,8 +59,7 @@ WINDOW = np.float32(2 * STRIP_PIXELS)
 HUGE = np.float32(1e9)
 _NAN = np.float32(np.nan)
 
-# places with a cone, of the ROOM that a row has: a power of two, so that a place is the lowest bits of a number
-CONES = 26 * LANES
+BONES = 26  # at most LANES of each, in the ROOM of a row: a power of two, and a place is the lowest bits of a number
 
 _NEXT_BLOCK = (
     BLOCK << 32
@@ -84,11 +86,15 @@ class Ends(NamedTuple):
     start_u: Array  # column of the centre of the first disc
     start_v: Array  # row
     start_inverse_depth: Array  # 1 / metres; 0 where nothing is drawn
-    joint_u: Array  # the same of all joints: the second disc of a cone is LANES places further
+    joint_u: (
+        Array  # the same of all joints: the second disc of a cone is a stride further
+    )
     joint_v: Array
     joint_inverse_depth: Array
-    start_radius: Array  # pixels, where the depth is 1
+    start_radius: Array  # pixels
     end_radius: Array
+    start_size: Array  # pixels of radius where the depth is 1, at place `LANES * bone + lane` always
+    end_size: Array
 
 
 class Outlines(NamedTuple):
@@ -149,7 +155,18 @@ class Work(NamedTuple):
 def ends_in(work):
     """Return the rows of `Ends`."""
     rows = rows_of(work.ends)
-    return Ends(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7])
+    return Ends(
+        rows[0],
+        rows[1],
+        rows[2],
+        rows[3],
+        rows[4],
+        rows[5],
+        rows[6],
+        rows[7],
+        rows[8],
+        rows[9],
+    )
 
 
 @inlined
@@ -191,9 +208,14 @@ def strips_and_words(width: int, height: int) -> tuple[int, int]:
 
 
 @inlined
-def project_joints(parents, lanes, ends):
-    """Write where joints are in the picture, and those that bones start at; 1 / depth is 0 where nothing is drawn."""
-    for k in range(CONES + LANES):
+def project_joints(parents, lanes, ends, stride):
+    """Write the discs of all cones; 1 / depth is 0 where nothing is drawn."""
+    if stride == 1:
+        for j in range(BONES + 1):
+            lanes[X + j] = lanes[X + LANES * j]
+            lanes[Y + j] = lanes[Y + LANES * j]
+            lanes[Z + j] = lanes[Z + LANES * j]
+    for k in range((BONES + 1) * stride):
         z = lanes[Z + k]
         inside = (z >= NEAR) & (z <= FAR)  # false for nan as well
         inverse_depth = 1.0 / (z if inside else 1.0)
@@ -201,18 +223,24 @@ def project_joints(parents, lanes, ends):
         ends.joint_v[k] = lanes[Y + k] * inverse_depth if inside else 0.0
         ends.joint_inverse_depth[k] = inverse_depth if inside else 0.0
     # most bones start where the one before ends
-    for k in range(CONES):
+    for k in range(BONES * stride):
         ends.start_u[k] = ends.joint_u[k]
         ends.start_v[k] = ends.joint_v[k]
         ends.start_inverse_depth[k] = ends.joint_inverse_depth[k]
     for b in range(parents.size):
         if parents[b] != b:
-            at = LANES * b
-            start = LANES * (parents[b] & NATURAL)
-            for k in range(LANES):
+            at = stride * b
+            start = stride * (parents[b] & NATURAL)
+            for k in range(stride):
                 ends.start_u[at + k] = ends.joint_u[start + k]
                 ends.start_v[at + k] = ends.joint_v[start + k]
                 ends.start_inverse_depth[at + k] = ends.joint_inverse_depth[start + k]
+    size_stride = LANES // stride
+    for k in range(BONES * stride):
+        start = ends.start_inverse_depth[k] * ends.start_size[size_stride * k]
+        end = ends.joint_inverse_depth[stride + k] * ends.end_size[size_stride * k]
+        ends.start_radius[k] = start
+        ends.end_radius[k] = end
 
 
 @inlined
@@ -235,19 +263,19 @@ def tangent_segment(normal, gap, first, last, top):
 
 
 @inlined
-def outline_cones(ends, outlines, bounds, strips, width, height):
+def outline_cones(ends, outlines, bounds, stride, strips, width, height):
     """Write each cone's bounds, and the discs and tangent segments that border it, rows counted from its top.
 
     Blocks begin at every eighth row of the image: two cones' blocks are then the same words or none in common, and a
     processor that has just written one can read it again at once.
     """
-    for k in range(CONES):
+    for k in range(BONES * stride):
         u0 = ends.start_u[k]
         v0 = ends.start_v[k]
-        r0 = ends.start_inverse_depth[k] * ends.start_radius[k]
-        u1 = ends.joint_u[LANES + k]
-        v1 = ends.joint_v[LANES + k]
-        r1 = ends.joint_inverse_depth[LANES + k] * ends.end_radius[k]
+        r0 = ends.start_radius[k]
+        u1 = ends.joint_u[stride + k]
+        v1 = ends.joint_v[stride + k]
+        r1 = ends.end_radius[k]
         dx = u1 - u0
         dy = v1 - v0
         dr = r0 - r1
@@ -265,7 +293,7 @@ def outline_cones(ends, outlines, bounds, strips, width, height):
             (top < bottom)
             & (left < right)
             & (ends.start_inverse_depth[k] > 0.0)
-            & (ends.joint_inverse_depth[LANES + k] > 0.0)
+            & (ends.joint_inverse_depth[stride + k] > 0.0)
         )
         first_block = np.int32(top) // BLOCK
         stop_block = (np.int32(bottom) + (BLOCK - 1)) // BLOCK
@@ -301,15 +329,15 @@ def outline_cones(ends, outlines, bounds, strips, width, height):
 
 
 @inlined
-def bounding_box(lane, bounds):
+def bounding_box(lane, stride, bounds):
     """Return a pose's bounding box in the bit image, and how many windows of two strips its widest cone has."""
     top = _NOWHERE
     bottom = 0
     left = _NOWHERE
     right = -1
     widest = 0
-    for b in range(CONES // LANES):
-        k = (LANES * b + lane) & NATURAL
+    for b in range(BONES):
+        k = (stride * b + lane) & NATURAL
         first = int(bounds.first_strip[k])
         last = int(bounds.last_strip[k])
         top = min(top, int(bounds.first_block[k]))
@@ -339,13 +367,13 @@ def block_parts(block):
 
 
 @inlined
-def place_window(step, k, bounds, outlines, keys, strips, stride):
+def place_window(step, k, bounds, outlines, keys, image):
     """Write where the `step`-th window of two strips of the cone at place k lies, one that it has.
 
     Most cones are no wider than a window, so that their spans are computed once.
     """
-    strip = min(bounds.first_strip[k] + 2 * step, strips - 2)
-    word = strip * stride + BLOCK * bounds.first_block[k]
+    strip = min(bounds.first_strip[k] + 2 * step, image.shape[0] - 2)
+    word = strip * 2 * image.shape[1] + BLOCK * bounds.first_block[k]
     keys[k] = block_number(word, bounds.row[k], k)
     column = np.float32(np.int32(STRIP_PIXELS * strip))
     stop = np.float32(np.int32(STRIP_PIXELS * (bounds.last_strip[k] + 1)))
@@ -354,7 +382,7 @@ def place_window(step, k, bounds, outlines, keys, strips, stride):
 
 
 @inlined
-def list_blocks(step, lane, bounds, outlines, keys, steps, strips, stride):
+def list_blocks(step, lane, stride, bounds, outlines, keys, steps, image):
     """Write by how much the number of each block to fill of a pose is above that before it; return how many there are.
 
     `steps` are _NEXT_BLOCK all through: only where a cone begins is another one written. A loop over the blocks of each
@@ -362,11 +390,11 @@ def list_blocks(step, lane, bounds, outlines, keys, steps, strips, stride):
     """
     end = 0
     after = 0
-    for b in range(CONES // LANES):
-        k = (LANES * b + lane) & NATURAL
+    for b in range(BONES):
+        k = (stride * b + lane) & NATURAL
         if step == 0 or bounds.first_strip[k] + 2 * step <= bounds.last_strip[k]:
             if step:
-                place_window(step, k, bounds, outlines, keys, strips, stride)
+                place_window(step, k, bounds, outlines, keys, image)
             count = max(int(bounds.stop_block[k]) - int(bounds.first_block[k]), 0)
             # that of a cone without blocks is written over by the next cone's
             steps[end & NATURAL] = keys[k] - after + _NEXT_BLOCK
@@ -427,10 +455,10 @@ def work_arrays(strips, words):
     for strip in range(image.shape[0]):
         for i in range(image.shape[1]):
             image[strip, i] = NONE
-    most_blocks = (CONES // LANES) * (2 * words // BLOCK + 1)
+    most_blocks = BONES * (2 * words // BLOCK + 1)
     return Work(
         empty_lanes(),
-        np.empty((8, ROOM)),
+        np.empty((10, ROOM)),
         np.empty((16, ROOM), np.float32),
         np.empty((5, ROOM), np.int32),
         np.empty(ROOM, np.int64),
@@ -452,33 +480,35 @@ def set_scene(work, first, stop, offsets, radii, view):
     ends = ends_in(work)
     for b in range(radii.shape[0]):
         for lane in range(first, stop):
-            ends.start_radius[LANES * b + lane] = scale * radii[b, 0]
-            ends.end_radius[LANES * b + lane] = scale * radii[b, 1]
+            ends.start_size[LANES * b + lane] = scale * radii[b, 0]
+            ends.end_size[LANES * b + lane] = scale * radii[b, 1]
 
 
 @jit
 def outline_poses(chain, poses, places, rows, width, height, work):
     """Outline the poses (n, 66) at places (n, 3) that are in these rows (LANES,), each in the scene of its lane.
 
-    `work` is what `work_arrays` makes and `set_scene` fills.
+    `work` is what `work_arrays` makes and `set_scene` fills. Returns the stride of the outlines: 1 if the rows are all
+    the same, so that only the first lane has a pose to fill.
     """
     ends = ends_in(work)
     outlines = outlines_in(work)
     bounds = bounds_in(work)
     strips = work.image.shape[0]
-    stride = 2 * work.image.shape[1]
+    stride = 1 if all_same(rows) else LANES
     place_lanes(chain, poses, places, rows, work.lanes)
-    project_joints(chain.parents, work.lanes, ends)
-    outline_cones(ends, outlines, bounds, strips, float(width), float(height))
-    for k in range(CONES):
-        place_window(0, k, bounds, outlines, work.keys, strips, stride)
+    project_joints(chain.parents, work.lanes, ends, stride)
+    outline_cones(ends, outlines, bounds, stride, strips, float(width), float(height))
+    for k in range(BONES * stride):
+        place_window(0, k, bounds, outlines, work.keys, work.image)
+    return stride
 
 
 @jit
-def fill_pose(lane, work):
+def fill_pose(lane, stride, work):
     """Set the pixels of an outlined pose in the clear bit image of `work`; return it and its bounding box.
 
-    The lane's outline is used up.
+    The lane's outline is used up. `stride` is what `outline_poses` returned.
     """
     outlines = outlines_in(work)
     bounds = bounds_in(work)
@@ -486,16 +516,15 @@ def fill_pose(lane, work):
     keys = work.keys
     steps = work.steps
     spans = work.spans
-    strips = image.shape[0]
-    stride = 2 * image.shape[1]
-    box, windows = bounding_box(lane, bounds)
+    further = 2 * image.shape[1]
+    box, windows = bounding_box(lane, stride, bounds)
     for step in range(windows):
         block = -_NEXT_BLOCK
-        count = list_blocks(step, lane, bounds, outlines, keys, steps, strips, stride)
+        count = list_blocks(step, lane, stride, bounds, outlines, keys, steps, image)
         for i in range(count):
             block += steps[i]
             steps[i] = _NEXT_BLOCK
             word, row, k = block_parts(block)
             span_rows(spans, outlines, k, row)
-            set_spans(image, word, stride, spans)
+            set_spans(image, word, further, spans)
     return image, box
