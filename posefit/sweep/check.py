@@ -1,6 +1,7 @@
-"""Checks a cell's spec before anything runs.
+"""Checks the spec of a cell before anything runs.
 
-Options of a track are checked by their one declaration, all other fields here.
+The options of a track are checked as `posefit.tracking.options` declares them. All
+other fields are checked here.
 """
 
 import json
@@ -35,24 +36,35 @@ from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import Check, TrackOptions, choice, declared, within
 from posefit.version import source_digest
 
+# the fields of a track that a plan may set; posefit adds the other two
 FIELDS = tuple(
     field.name for field in fields(TrackCell) if field.name not in ("files", "version")
 )
-# of a cell
+# limits of one cell
 MAX_VIEWS = 100
 MAX_FRAMES = 100_000
-MAX_BODY_OFF = 50.0  # percent that a body may be off
+MAX_BODY_OFF = 50.0  # percent, the largest error of the body given to a method
 
 
 def cell_of(spec: Mapping[str, Any]) -> TrackCell:
-    """Return the cell that a spec describes, complete: settings as their types ask, training motions by name.
+    """Return the track that a spec describes.
 
-    Raises ValueError where a name is not known or a value makes no sense, and ImportError where a method needs a
-    library that is not installed.
+    Settings are converted to their types, and default training motions are filled in.
+
+    Args:
+        spec: The fields of a `posefit.sweep.cell.TrackCell` by name, except `files` and
+            `version`. `method` and `motion` are required.
+
+    Returns:
+        The complete cell.
+
+    Raises:
+        ValueError: A name is unknown or a value is invalid.
+        ImportError: The method needs a library that is not installed.
     """
     for name in ("method", "motion"):
         if name not in spec:
-            raise InputError(f"a cell must say its {name}, got none")
+            raise InputError(f"a cell must have a {name}, got none")
     values = _checked(spec, CHECKS)
     texts = tuple(settings.settings_text(values.get("settings", {})))
     offers, chosen = _of_method(values["method"], texts)
@@ -76,29 +88,39 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
             "version": version,
         }
     )
-    if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
+    size = _population(cell.method, texts, cell.evaluations)
+    if size > cell.evaluations:
         raise InputError(
             f"evaluations must hold one population of {size}, got {cell.evaluations}"
         )
-    if files.get(cell.motion) and cell.frames > (
-        length := _length(cell.motion, cell.fps)
-    ):
-        raise InputError(
-            f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}"
-        )
+    # only a motion that is read from a file has a length
+    if files.get(cell.motion):
+        length = _length(cell.motion, cell.fps)
+        if cell.frames > length:
+            raise InputError(
+                f"frames must be at most {length}, the length of {cell.motion}, "
+                f"got {cell.frames}"
+            )
     return cell
 
 
 def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
-    """Return the single search that a spec describes, whose evaluations are a `budget` for each dimension.
+    """Return the single search that a spec describes.
 
-    None where its function does not have the dimension. Raises ValueError where anything is wrong, and ImportError
-    where the method needs a library that is not installed.
+    Args:
+        spec: The fields of a `posefit.sweep.cell.SearchCell` by name, but with a
+            `budget`, in evaluations per dimension, instead of `evaluations`.
+
+    Returns:
+        The complete cell, or None if the function does not exist in that dimension.
+
+    Raises:
+        ValueError: A name is unknown or a value is invalid.
+        ImportError: The method needs a library that is not installed.
     """
     values = _checked(spec, SEARCH_CHECKS)
-    if (dimension := values["dimension"]) not in suite_function(
-        values["function"]
-    ).dimensions:
+    dimension = values["dimension"]
+    if dimension not in suite_function(values["function"]).dimensions:
         return None
     checked_address(
         *(values[name] for name in ("suite", "function", "instance", "dimension"))
@@ -111,7 +133,10 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
 
 
 def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an entry of a list of optimisers with its settings, checked, by their names alone."""
+    """Return an entry of a list of optimisers, with its settings checked.
+
+    Settings may be written `NAME.SETTING`; in the result they are named `SETTING`.
+    """
     method = _name("method", entry.get("method"))
     entered = flattened("settings", entry.get("settings", {})).items()
     chosen = {name.rpartition(".")[2]: value for name, value in entered}
@@ -122,11 +147,12 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def forget() -> None:
-    """Forget what is kept of methods and files between the cells of a plan, for the next plan to find it again.
+    """Clear the caches of methods and files that the cells of one plan share.
 
-    In between a file may have changed, or a comparison registered another factory under the same name.
+    Before the next plan a file may have changed, or a comparison may have registered
+    another factory under the same name.
     """
-    for kept in (
+    for cached in (
         _offers,
         _of_method,
         _of_search,
@@ -137,21 +163,27 @@ def forget() -> None:
         installed,
         source_digest,
     ):
-        kept.cache_clear()
+        cached.cache_clear()
 
 
 def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
-    """Return fields of a cell, each by itself checked. Raises ValueError where a name or a value makes no sense."""
+    """Return the fields of a cell after checking each one separately.
+
+    Raises InputError if a name is unknown or a value is invalid.
+    """
     if unknown := [name for name in spec if name not in checks]:
         known = suggestion(unknown[0], checks)
         raise InputError(
-            f"a cell must say {', '.join(checks)}, got {quoted(unknown[0])}{known}"
+            f"a cell must hold {', '.join(checks)}, got {quoted(unknown[0])}{known}"
         )
     return {name: checks[name](name, value) for name, value in spec.items()}
 
 
 def families(method: str) -> tuple[str, ...]:
-    """Return the names that settings of a method begin with. Raises ValueError where it is unknown."""
+    """Return the names that a method's settings begin with, such as `sapso` and `pca`.
+
+    Raises ValueError if the method is unknown.
+    """
     return tuple(places_of(_offers(method)))
 
 
@@ -160,49 +192,54 @@ def _offers(method: str) -> tuple[Offer, ...]:
     names = method_names(method)
     if names.tracker is not None:
         return (registry().offer("tracker", names.tracker),)
-    return registry().offer("optimiser", names.optimiser), registry().offer(
-        "prior", names.prior
-    )
+    optimiser = registry().offer("optimiser", names.optimiser)
+    prior = registry().offer("prior", names.prior)
+    return optimiser, prior
 
 
 @lru_cache(maxsize=1024)
 def _of_method(
     method: str, texts: tuple[str, ...]
 ) -> tuple[tuple[Offer, ...], dict[str, Any]]:
-    """Return a method's plugins, and the settings of texts such as `sapso.cooling=0.9`: sorted, as their types ask."""
+    """Return a method's plugins and its settings, sorted by name, with their types.
+
+    `texts` are settings such as `sapso.cooling=0.9`.
+    """
     offers = _offers(method)
     names = {kind: name for name, (kind, _) in places_of(offers).items()}
-    each = parsed_settings(offers, texts).items()
-    named = (
-        (f"{names[kind]}.{setting}", value)
-        for kind, values in each
-        for setting, value in values.items()
-    )
-    return offers, dict(sorted(named))
+    named: dict[str, Any] = {}
+    for kind, values in parsed_settings(offers, texts).items():
+        for setting, value in values.items():
+            named[f"{names[kind]}.{setting}"] = value
+    return offers, dict(sorted(named.items()))
 
 
 @lru_cache(maxsize=1024)
 def _of_search(method: str, chosen: str, evaluations: int) -> str:
-    """Return the version of an optimiser. Raises ValueError where its settings, a JSON text, need a larger budget."""
+    """Return the version of an optimiser.
+
+    `chosen` is the JSON text of its settings. Raises InputError if one population with
+    these settings takes more evaluations than there are.
+    """
     offer = registry().offer("optimiser", method)
-    if (
-        size := settings.population(offer.factory, json.loads(chosen), evaluations)
-    ) > evaluations:
+    size = settings.population(offer.factory, json.loads(chosen), evaluations)
+    if size > evaluations:
         raise InputError(
-            f"evaluations must hold one population of {size}, got {evaluations} of {method}"
+            f"evaluations must hold one population of {size}, "
+            f"got {evaluations} of {method}"
         )
     return version_of([offer.origin])
 
 
 @lru_cache(maxsize=1024)
 def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
-    """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
-    offer = _offers(method)[0]
+    """Return an optimiser's population size if it has such a setting, else 1."""
+    offers = _offers(method)
+    offer = offers[0]
     if offer.kind != "optimiser":
         return 1
-    return settings.population(
-        offer.factory, parsed_settings(_offers(method), texts)["optimiser"], evaluations
-    )
+    chosen = parsed_settings(offers, texts)["optimiser"]
+    return settings.population(offer.factory, chosen, evaluations)
 
 
 @lru_cache(maxsize=1024)
@@ -212,24 +249,27 @@ def _other_styles(motion: str) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1024)
 def _files(motion: str) -> tuple[tuple[str, str], ...]:
-    """Return the files that a motion is read from, each with its digest; none for a built-in one."""
+    """Return the files that a motion is read from, with their digests.
+
+    Motions that come with posefit or with a library of people have no files here.
+    """
     if (
         motion in built_in.names()
         or recorded.is_recorded(motion)
         or recorded.is_library(motion)
     ):
         return ()
-    if os.path.isdir(motion):
-        training_clips([motion])  # raises where one cannot be read
-        return tuple(
-            (str(file), digest_of(file))
-            for file in sorted(Path(motion).iterdir())
-            if file.is_file()
-        )
-    load_motion(motion, FPS)  # raises where it cannot be read
     path = Path(motion)
-    beside = sorted(path.parent.glob("*.asf")) if path.suffix.lower() == ".amc" else []
-    return tuple((str(file), digest_of(file)) for file in (path, *beside))
+    if path.is_dir():
+        training_clips([motion])  # raises if a file cannot be read
+        paths = [file for file in sorted(path.iterdir()) if file.is_file()]
+    else:
+        load_motion(motion, FPS)  # raises if it cannot be read
+        paths = [path]
+        # an .amc file has its skeleton in an .asf file of the same folder
+        if path.suffix.lower() == ".amc":
+            paths += sorted(path.parent.glob("*.asf"))
+    return tuple((str(file), digest_of(file)) for file in paths)
 
 
 @lru_cache(maxsize=1024)
@@ -252,7 +292,7 @@ def _label(field: str, value: Any) -> str:
 
 
 def _method(field: str, value: Any) -> str:
-    """Return a method by its whole name: `sapso` is `sapso@pca`."""
+    """Return a method's full name: `sapso@pca` for `sapso`."""
     return str(method_names(_name(field, value)))
 
 
@@ -263,9 +303,10 @@ def _motion(field: str, value: Any) -> str:
         and not recorded.is_recorded(name)
         and Path(name).suffix.lower() not in MOTIONS
     ):
+        known = built_in.names()
         raise InputError(
-            f"{field} must be an .amc file, a .bvh file or one of {', '.join(built_in.names())}, "
-            f"got {quoted(name)}{suggestion(name, built_in.names())}"
+            f"{field} must be an .amc file, a .bvh file or one of {', '.join(known)}, "
+            f"got {quoted(name)}{suggestion(name, known)}"
         )
     return name
 
@@ -277,15 +318,13 @@ def _train(field: str, value: Any) -> tuple[str, ...]:
 
 
 def _learned_from(field: str, value: Any) -> str:
-    """Return what a method learns from: a motion, people of the library, or a folder."""
+    """Return a source of training: a motion, people of the library, or a folder."""
     if recorded.is_library(value):
-        recorded.named(value)  # raises where a person is unknown
+        recorded.named(value)  # raises if a person is unknown
         return str(value)
-    return (
-        value
-        if isinstance(value, str) and os.path.isdir(value)
-        else _motion(field, value)
-    )
+    if isinstance(value, str) and os.path.isdir(value):
+        return value
+    return _motion(field, value)
 
 
 def _views(field: str, value: Any) -> tuple[float, ...]:
@@ -298,39 +337,49 @@ def _views(field: str, value: Any) -> tuple[float, ...]:
 def _corruption(field: str, value: Any) -> dict[str, float]:
     if not isinstance(value, Mapping):
         raise InputError(
-            f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}"
+            f"{field} must be a table of strengths such as {{holes = 0.3}}, "
+            f"got {quoted(value)}"
         )
     kinds = (*CORRUPTIONS, DROPPED)
     for kind in value:
         if kind not in kinds:
             raise InputError(
-                f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{suggestion(kind, kinds)}"
+                f"{field} must be of {', '.join(kinds)}, "
+                f"got {quoted(kind)}{suggestion(kind, kinds)}"
             )
-    strengths = {
-        kind: within(0.0, 1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)
-    }
-    return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
+    check = within(0.0, 1.0)
+    strengths = {}
+    for kind in sorted(value):
+        strength = check(f"{field} {kind}", value[kind])
+        # a cell with a strength of 0 is the same cell as without that corruption
+        if strength > 0.0:
+            strengths[kind] = strength
+    return strengths
 
 
 def flattened(field: str, value: Any) -> dict[str, Any]:
-    """Return settings whose names are NAME.SETTING, of a table that may hold a table for each NAME."""
+    """Return settings by their names NAME.SETTING.
+
+    In the table the settings of each NAME may also be a table inside it.
+    """
     if not isinstance(value, Mapping):
         raise InputError(
-            f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}"
+            f"{field} must be a table such as {{sapso.cooling = 0.9}}, "
+            f"got {quoted(value)}"
         )
     flat: dict[str, Any] = {}
     for name, inner in value.items():
-        flat |= (
-            {f"{name}.{setting}": chosen for setting, chosen in inner.items()}
-            if isinstance(inner, Mapping)
-            else {name: inner}
-        )
+        if isinstance(inner, Mapping):
+            flat |= {f"{name}.{setting}": chosen for setting, chosen in inner.items()}
+        else:
+            flat[name] = inner
     return flat
 
 
 def _whole(least: int, most: float = inf) -> Check:
     def check(field: str, value: Any) -> int:
-        between(field, number := whole(field, value, least), least, most)
+        number = whole(field, value, least)
+        between(field, number, least, most)
         return number
 
     return check

@@ -1,7 +1,7 @@
-"""What `posefit sweep --dry-run` shows: the cells of a plan, and about how long they take.
+"""The preview of `posefit sweep --dry-run`: a plan's cells and their approximate time.
 
-Each method runs a few frames first. So a setting that its factory refuses, which no plan can know, is found before the
-sweep begins.
+Each method runs a few frames. This also finds settings that a method's factory refuses,
+which checking a plan cannot find.
 """
 
 import time
@@ -21,24 +21,34 @@ from posefit.sweep.engine import text_of
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 
-VALUES = 12  # of a field, that a preview lists
-# frames of the two short runs of a method: their difference is the time of frames, the rest that of learning
+VALUES = 12  # the most values of a field that a preview lists
+# Frames of the two short runs of a method. The difference of their times is the time of
+# three frames; the rest is the time of learning.
 SHORT = 1
 LONGER = 4
 
 
 class Preview(NamedTuple):
-    """A plan as a preview shows it."""
+    """The preview of a plan."""
 
     lines: list[str]
     cells: list[dict[str, Any]]  # key, done and spec of each
-    seconds: float  # that those not done take, one after the other
+    seconds: float  # of the cells to run, one after the other
 
 
 def preview(plan: str, out: str | None, shard: str | None) -> Preview:
-    """Return the cells of a plan or of a shard: how many have which values, how many are to run, and for how long.
+    """Return the preview of a plan, or of one shard of it.
 
-    Raises ValueError where anything in the plan is wrong, or if a method fails in its first frames.
+    Args:
+        plan: The plan's file, as `posefit.sweep.plan.Plan.read` takes it.
+        out: The folder of the ledger, or None. Its finished cells will not run again.
+        shard: The shard as I/N, or None for all cells.
+
+    Returns:
+        The preview.
+
+    Raises:
+        ValueError: The plan is wrong, or a method fails in its first frames.
     """
     counts: dict[str, Counter[str]] = {}
     times: dict[str, _Times] = {}
@@ -62,7 +72,10 @@ def preview(plan: str, out: str | None, shard: str | None) -> Preview:
 
 
 def time_line(seconds: float, workers: int) -> str:
-    """Return a sentence about how long a sweep takes."""
+    """Return a line such as `about 3 hours on 2 workers`.
+
+    `seconds` is the time of all cells, one after the other.
+    """
     each = seconds / workers
     where = "one worker" if workers == 1 else f"{workers} workers"
     for unit, length in (("hours", 3600.0), ("minutes", 60.0)):
@@ -74,7 +87,7 @@ def time_line(seconds: float, workers: int) -> str:
 def _cells(
     plan: str, out: str | None, shard: str | None
 ) -> Iterator[tuple[Cell, bool]]:
-    """Yield the cells of a plan or of a shard, and whether each is done."""
+    """Yield the cells of a plan or of a shard, each with whether it is done."""
     name = file_of(shard)
     cells = cells_of(Plan.read(plan), shard)
     done = set[str]()
@@ -88,7 +101,7 @@ def _cells(
 
 
 def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
-    """Return a line for each field that varies, with how many cells have which value."""
+    """Return a line for each field with more than one value, with the cells of each."""
     lines = []
     for name, values in counts.items():
         is_varied = len(values) > 1 and name not in ("version", "files")
@@ -105,7 +118,7 @@ def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
 
 
 class _Times:
-    """The time of one method's cells, from two short runs of its first one."""
+    """Estimates the time of one method's cells from two short runs of its first one."""
 
     def __init__(self, first: Cell) -> None:
         self._first = first
@@ -117,7 +130,10 @@ class _Times:
         self._amount += _amount(cell)
 
     def seconds(self) -> float:
-        """Return about how many seconds the cells take. Raises InputError if a run fails."""
+        """Return about how many seconds the cells take.
+
+        Raises InputError if a run fails.
+        """
         if not isinstance(self._first, TrackCell):
             return _seconds(self._first) / _amount(self._first) * self._amount
         short = replace(self._first, frames=SHORT)
@@ -131,20 +147,20 @@ class _Times:
 
 
 def _amount(cell: Cell) -> float:
-    """Return what the time of a cell is proportional to: its evaluations in all views."""
+    """Return the evaluations of a cell times its views: its time is proportional."""
     views = len(cell.view_degrees) if isinstance(cell, TrackCell) else 1
     return float(cell.total_evaluations * views)
 
 
 def _seconds(cell: Cell) -> float:
     """Return how long a cell takes. Raises InputError naming its method if it fails."""
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     try:
         run_cell(cell)
     except Exception as error:
-        given = ", ".join(settings_text(cell.settings))
-        method = f"{cell.method} with {given}" if given else cell.method
+        settings = ", ".join(settings_text(cell.settings))
+        method = f"{cell.method} with {settings}" if settings else cell.method
         raise InputError(
             f"{method} fails in its first frames: {text_of(error)}"
         ) from error
-    return time.perf_counter() - began
+    return time.perf_counter() - start_time

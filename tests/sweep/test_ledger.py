@@ -153,7 +153,7 @@ def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(
         path.write_bytes(content)
         for read in (lambda: rows_in(folder), lambda: Writer(path)):
             with pytest.raises(
-                ValueError, match="expected a whole SQLite file, got "
+                ValueError, match="expected an intact SQLite file, got "
             ) as caught:
                 read()
             assert str(path) in str(caught.value)
@@ -336,7 +336,7 @@ def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
         (other, "expected a ledger that posefit sweep wrote, got another SQLite file"),
         (
             short,
-            "a whole SQLite file, got a file of 1 byte, too short to be one: take it",
+            "an intact SQLite file, got a file of 1 byte, too short to be one: use",
         ),
         (folder / FILE, "expected a ledger of format 1 to 3, got 9"),
     ):
@@ -368,7 +368,7 @@ def test_a_driver_that_was_killed_holds_nothing(tmp_path: Path) -> None:
         assert held.stdout.readline() == b"open\n"
         with pytest.raises(
             ValueError,
-            match=f"got one that process {held.pid} of .* drives; --shard I/N",
+            match=f"got one that process {held.pid} of .* writes to; use --shard I/N",
         ):
             Writer(path)
         held.send_signal(signal.SIGKILL)
@@ -418,7 +418,7 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_loss
         }
         assert reasons == {
             cell.key: ["its own"] * 3,
-            lost.key: ["something outside ended it 50 times", "killed"],
+            lost.key: ["killed from outside 50 times", "killed"],
         }
         assert ledger.release_quarantined() == 2
         assert len(ledger.planned()) == 2

@@ -139,7 +139,7 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"product": {**PRODUCT, "seeds": []}}, "product.seeds must hold at least one, got none: an empty product"),
         ({"product": {**PRODUCT, "seeds": "3"}}, "product.seeds must be a list, got '3'"),
         ({"product": {**PRODUCT, "colours": [1]}}, "product must hold methods, motions, .*, got 'colours'"),
-        ({"product": {"motions": ["walk"]}}, "a cell must say its method, got none"),
+        ({"product": {"motions": ["walk"]}}, "a cell must have a method, got none"),
         ({"product": {**PRODUCT, "motions": [{"motion": "walk", "seed": 1}], "seeds": [1]}}, "seed in one list, got it in"),
         ({"product": {**PRODUCT, "seeds": 10**12}}, "product.seeds must be at most 1,000,000, got 1,000,000,000,000"),
         ({"product": {**PRODUCT, "seeds": 2000, "instances": 2000}}, "product must hold at most 1,000,000 cells, got 4,"),
@@ -174,7 +174,7 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"grid": {"pca.components": [1]}, "product": None, "cells": [SMALL]}, "grid must come with the methods"),
         (
             {"grid": {"sapso.cooling": [1]}, "product": {**PRODUCT, "methods": [COLD]}},
-            "grid must hold what no entry of methods sets itself, got sapso.cooling, which one does",
+            "grid must hold settings that no entry of methods sets itself, got sapso.cooling, which one sets",
         ),
         ({"product": {**PRODUCT, "methods": [{**COLD, "name": 3}]}}, "name must be a text of at most 80 characters, got 3"),
     ],

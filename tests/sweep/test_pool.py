@@ -452,7 +452,7 @@ def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on
         ledger.plan(cells(10))
         with pytest.raises(
             ValueError,
-            match=r"127.*went away; \d+ of 10 cells are done and safe: the same command",
+            match=r"127.*went away; \d+ of 10 cells are done and safe: run the same",
         ):
             drive(ledger, engine, print, watch)
     assert swept(tmp_path / "results", cells(10), Pool(2, LIMITS, behave)).done == 10
