@@ -1,9 +1,10 @@
-"""Which models are in force, cycle by cycle: the variable structure. VSMM steps 7 to 9.
+"""The variable structure: which models are active in each cycle. VSMM steps 7 to 9.
 
-The field calls it model-set adaptation. A group comes into force beside the present one when the limbs change their
-speed, and a test of both ends one of them. `Switching` alone changes which models are in force. The two forms, the
-default and the patent's letter, differ in how the filter starts a new group's models: they get a `Union` of both groups
-and return a `Belief` in it.
+The field's term is model-set adaptation. When the limbs change their speed, a second
+group is activated next to the present one; a test then ends one of the two. Only
+`Switching` changes which models are active. There are two forms, the default and the
+patent's letter. They differ in how the filter starts a new group's models: they take a
+`Union` of both groups and return a `Belief` over it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,28 +21,29 @@ from posefit_vsmm.imm import IMM, QUATERNIONS, Belief, Measure, Measurement, sta
 from posefit_vsmm.motion import FPS, MotionModels, lifted
 from posefit_vsmm.state import AT, inverse_tangents, unit
 
-# where thighs and shanks begin and end
+# the upper and lower ends of thighs and shanks
 _UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right knee")]
 _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
 Structure = Literal["variable", "all"]
-MIN_LIMBS = 3  # of thighs and shanks: most of the four. Interpretation V15
-FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
-# by default: within ten cycles the filter has not converged yet. Interpretation V19
+MIN_LIMBS = 3  # most of the four thighs and shanks. Interpretation V15
+FIRST_CYCLES = 10  # the patent's cycles over all models before a group is chosen
+# the default's: ten cycles are too few for the filter to converge. Interpretation V19
 FIRST_SECONDS = 1.0
-MIN_RATIO = 0.9  # of a new group to the old one; below it the new one ends
+MIN_RATIO = 0.9  # of the new group to the old one; below it the new one ends
 
 
 def requested_group(points: Sequence[Array]) -> int | None:
-    """Return which group, 0 to 2, the points (17, 2) of the latest three frames ask for; None if they ask for none.
+    """Return which group, 0 to 2, the latest three frames ask for; None if none.
 
-    Group 3 goes before 2 and 1 (Interpretation V10). The hips of rule a are both of them, and a hip's angle is that of
-    its thigh to the vertical (Interpretation V15). No change at all is not doubled by another.
+    `points` are (17, 2) for each frame. The third group comes before the second and the
+    first (Interpretation V10). Rule a needs both hips; a hip's angle is between its
+    thigh and the vertical (Interpretation V15). A change from zero does not count as
+    doubling.
     """
     if len(points) < 3:
         return None
-    before, now = np.abs(
-        wrapped(np.diff([limb_angles(frame) for frame in points[-3:]], axis=0))
-    )
+    angles = [limb_angles(frame) for frame in points[-3:]]
+    before, now = np.abs(wrapped(np.diff(angles, axis=0)))
     doubled = (now >= 2.0 * before) & (now > 0.0)
     halved = (now <= 0.5 * before) & (before > 0.0)
     if doubled[:2].all():  # VSMM 7a
@@ -54,7 +56,10 @@ def requested_group(points: Sequence[Array]) -> int | None:
 
 
 def limb_angles(points: Array) -> Array:
-    """Return the angles (4,) to the vertical, in the image, of thighs and shanks, left and right."""
+    """Return the angles (4,) of thighs and shanks to the vertical in the image.
+
+    The order is left thigh, right thigh, left shank, right shank.
+    """
     limbs = points[_LOWER] - points[_UPPER]
     return np.asarray(np.arctan2(limbs[:, 0], limbs[:, 1]))
 
@@ -65,23 +70,36 @@ def regrouped(
     models: Sequence[str],
     new: Mapping[str, tuple[Array, Array, float]],
 ) -> Belief:
-    """Return a belief over other models: `new` has state, covariance and log-probability of those not in `old`."""
-    known = dict(
-        zip(
-            old,
-            zip(
-                belief.states, belief.covariances, belief.log_probabilities, strict=True
-            ),
-            strict=True,
+    """Return a belief over other models.
+
+    Args:
+        belief: the belief over the models `old`.
+        old: names of models.
+        models: names of the models of the result.
+        new: state, covariance and log-probability of each model that is not in `old`.
+
+    Returns:
+        The belief, with likelihoods of 1.
+
+    """
+    every = dict(new)
+    for row, name in enumerate(old):
+        every[name] = (
+            belief.states[row],
+            belief.covariances[row],
+            belief.log_probabilities[row],
         )
+    chosen = [every[name] for name in models]
+    return Belief(
+        np.array([state for state, _, _ in chosen]),
+        np.array([covariance for _, covariance, _ in chosen]),
+        np.array([probability for _, _, probability in chosen]),
+        np.zeros(len(models)),
     )
-    parts = zip(*({**new, **known}[name] for name in models), strict=True)
-    states, covariances, probabilities = (np.array(part) for part in parts)
-    return Belief(states, covariances, probabilities, np.zeros(len(models)))
 
 
 def normalised(belief: Belief) -> Belief:
-    """Return a belief whose probabilities sum to 1, all the same where none is above 0."""
+    """Return a belief with probabilities that sum to 1, equal if all were 0."""
     probabilities = np.maximum(belief.log_probabilities, -1e9)
     return replace(
         belief, log_probabilities=probabilities - np.logaddexp.reduce(probabilities)
@@ -89,23 +107,23 @@ def normalised(belief: Belief) -> Belief:
 
 
 class Union(NamedTuple):
-    """A group that comes into force, and the one that is."""
+    """The present group and a new one, together."""
 
     old_names: tuple[str, ...]  # the models of the present group
-    old_filter: IMM  # over them
+    old_filter: IMM  # over the present group
     names: tuple[str, ...]  # the models of both groups. VSMM 8.4
-    filter: IMM  # over these
-    models: MotionModels  # the same ones
+    filter: IMM  # over both groups
+    models: MotionModels  # of both groups
 
 
 class DefaultForm:
-    """The default: the filter holds covariances (33, 33) of errors. Interpretations V4 and V11."""
+    """The default: covariances (33, 33) of errors. Interpretations V4 and V11."""
 
-    # a new group has only the probability that the transitions gave it
+    # in its first cycle a new group has only the probability that transitions gave it
     judges_first_cycle: ClassVar[bool] = False
 
     def first_cycles(self, models: MotionModels) -> int:
-        """Return after how many cycles over all models a group is chosen."""
+        """Return the number of cycles over all models before a group is chosen."""
         return max(FIRST_CYCLES, round(FIRST_SECONDS * FPS / models.share))
 
     def imm(self, models: MotionModels, transition: Array) -> IMM:
@@ -113,19 +131,25 @@ class DefaultForm:
         return IMM(models.predict, transition, QUATERNIONS)
 
     def covariances(self, states: Array, covariance: Array) -> Array:
-        """Return the covariances of states (r, 43), each (33, 33) of its error, as the filter holds them."""
+        """Return the filter's covariances of states (r, 43).
+
+        `covariance` (33, 33) is that of each state's error.
+        """
         return np.tile(covariance, (len(states), 1, 1))
 
     def fused(self, state: Array, covariance: Array) -> tuple[Array, Array]:
-        """Return the filter's state as a state (43,) with the covariance (33, 33) of its error."""
+        """Return the filter's state (43,) and the covariance (33, 33) of its error."""
         return state, covariance
 
     def measure(self, measure: Measure) -> Measure:
-        """Return a measurement whose Jacobians are by what the filter's covariances are of."""
+        """Return a measurement with Jacobians by errors, as the covariances are."""
         return measure
 
     def cycle_over_both(self, union: Union, before: Belief, measure: Measure) -> Belief:
-        """Return the belief after a cycle over both groups; new models had a probability of 0."""
+        """Return the belief after a cycle over both groups.
+
+        The new models start with a probability of 0.
+        """
         state, covariance = union.old_filter.fused(before)
         new = dict.fromkeys(union.names, (state, covariance, -np.inf))
         both = regrouped(before, union.old_names, union.names, new)
@@ -133,12 +157,12 @@ class DefaultForm:
 
 
 class PatentForm:
-    """To the patent's letter: the filter holds covariances (43, 43) of numbers, and starts new models by step 8."""
+    """The patent's letter: covariances (43, 43) of numbers, new models by step 8."""
 
-    judges_first_cycle: ClassVar[bool] = True  # the likelihoods' ratio is from k0 on
+    judges_first_cycle: ClassVar[bool] = True  # the ratio of likelihoods starts at k0
 
     def first_cycles(self, models: MotionModels) -> int:
-        """Return ten, whatever the models."""
+        """Return ten for any models."""
         return FIRST_CYCLES
 
     def imm(self, models: MotionModels, transition: Array) -> IMM:
@@ -146,11 +170,11 @@ class PatentForm:
         return IMM(models.predict_numbers, transition, at_mixed=True)
 
     def covariances(self, states: Array, covariance: Array) -> Array:
-        """Return those of the numbers (r, 43, 43)."""
+        """Return the covariances (r, 43, 43) of the states' numbers."""
         return lifted(states, covariance)
 
     def fused(self, state: Array, covariance: Array) -> tuple[Array, Array]:
-        """Return the unit state, and what its covariance is of errors."""
+        """Return the state with unit quaternions, and the covariance of its error."""
         change = inverse_tangents(unit(state)[None])[0]
         return unit(state), change @ covariance @ change.T
 
@@ -166,12 +190,12 @@ class PatentForm:
         return by_numbers
 
     def cycle_over_both(self, union: Union, before: Belief, measure: Measure) -> Belief:
-        """Return the belief after a cycle over both groups, of which the new one begins in this cycle."""
+        """Return the belief after a cycle over both groups, the new one's first."""
         both = self.joined(union, before)
         return self.begun(union).cycle(both, measure)
 
     def joined(self, union: Union, belief: Belief) -> Belief:
-        """Return a belief with the new group's models beside the old one's. VSMM 8."""
+        """Return a belief over the models of both groups. VSMM 8."""
         state, _ = self.fused(*union.old_filter.fused(belief))
         top = belief.log_probabilities.max()  # VSMM 8.1
         new = {}
@@ -182,7 +206,7 @@ class PatentForm:
         return normalised(regrouped(belief, union.old_names, union.names, new))
 
     def begun(self, union: Union) -> IMM:
-        """Return the filter in which the prediction of new models has their noise as its covariance."""
+        """Return a filter that predicts new models with their noise as covariance."""
         rows = [k for k, name in enumerate(union.names) if name not in union.old_names]
         noises = union.models.noises
 
@@ -199,7 +223,7 @@ Form = DefaultForm | PatentForm
 
 @final
 class Switching:
-    """The models in force; at first all of them."""
+    """The active models; at first all of them."""
 
     def __init__(
         self,
@@ -217,11 +241,11 @@ class Switching:
         self.restart()
 
     def restart(self) -> None:
-        """Bring all models into force; a group will be chosen among them."""
+        """Activate all models; a group is chosen after the first cycles."""
         self.active = self.models.names
         self.group: str | None = None
         self.candidate_group: str | None = None
-        # of the likelihoods since the candidate group came into force, new to old
+        # of the likelihoods, new to old group, since the candidate was activated
         self._log_ratio = 0.0
         self._cycles = 0
         self._points: list[Array] = []
@@ -231,33 +255,42 @@ class Switching:
 
     @property
     def imm(self) -> IMM:
-        """The filter over the models in force."""
+        """The filter over the active models."""
         return self._filter(self.active)
 
     def start(self, state: Array, covariance: Array) -> Belief:
         """Return the belief in one state (43,) with a covariance (33, 33)."""
-        return start(
-            state, self.form.covariances(state[None], covariance)[0], len(self.active)
-        )
+        held = self.form.covariances(state[None], covariance)[0]
+        return start(state, held, len(self.active))
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
-        """Return the one state (43,), and the covariance (33, 33) of its error, that stand for all models."""
+        """Return the mean state (43,) of all models and its error's covariance."""
         return self.form.fused(*self.imm.fused(belief))
 
     def predicted(self, belief: Belief) -> tuple[Array, Array]:
-        """Return the state (43,) and covariance (33, 33) a frame later, by the most probable model."""
+        """Predict the state and its error's covariance by the most probable model."""
         state, covariance = self.fused(belief)
         likely = self.models.of([self.active[int(belief.probabilities.argmax())]])
         states, covariances = likely.predict(state[None], covariance[None])
         return states[0], covariances[0]
 
     def widened(self, belief: Belief, variances: Array) -> Belief:
-        """Return a belief whose errors have larger variances, by (33,)."""
+        """Return a belief with `variances` (33,) added to its errors'."""
         extra = self.form.covariances(unit(belief.states), np.diag(variances))
         return replace(belief, covariances=belief.covariances + extra)
 
     def cycle(self, before: Belief, measure: Measure, points: Array) -> Belief:
-        """Return the belief one frame later. Groups come and go by the joints (17, 2) detected in the frame."""
+        """Return the belief one frame later, and switch groups.
+
+        Args:
+            before: the belief.
+            measure: returns the measurement of states.
+            points: (17, 2) the joints detected in the frame, which decide about groups.
+
+        Returns:
+            The belief over the models that are then active.
+
+        """
         self._points = [*self._points, points][-3:]
         self._cycles += 1
         measure = self.form.measure(measure)
@@ -281,7 +314,10 @@ class Switching:
         return self.judged(after) if self.form.judges_first_cycle else after
 
     def _requested_group(self) -> str | None:
-        """Return the group that the latest points ask for; None if it is in force, or they ask for none. VSMM 7."""
+        """Return the group that the latest points ask for. VSMM 7.
+
+        None if they ask for none, or for the present group.
+        """
         number = requested_group(self._points)
         names = tuple(self.groups)
         if number is None or number >= len(names) or names[number] == self.group:
@@ -289,7 +325,7 @@ class Switching:
         return names[number]
 
     def union_with(self, candidate_group: str) -> Union:
-        """Return the union of the models in force and another group."""
+        """Return the union of the present group and another one."""
         assert self.group is not None
         names = self.topology.union([self.group, candidate_group])
         return Union(
@@ -301,16 +337,17 @@ class Switching:
         )
 
     def bring_in(self, candidate_group: str) -> None:
-        """Bring another group into force beside the present one."""
+        """Activate another group in addition to the present one."""
         assert self.group is not None
         self.active = self.topology.union([self.group, candidate_group])  # VSMM 8.4
         self.candidate_group = candidate_group
         self._log_ratio = 0.0
 
     def judged(self, after: Belief) -> Belief:
-        """Return the belief after a cycle over both groups: over one of them as soon as the other has to end.
+        """Return the belief after a cycle over both groups, and end one if it has lost.
 
-        The likelihoods' ratio is that of all cycles since the new group came. Interpretation V12.
+        The ratio of the likelihoods covers all cycles since the new group was
+        activated. Interpretation V12.
         """
         assert self.candidate_group is not None
         assert self.group is not None
@@ -326,7 +363,7 @@ class Switching:
         return after
 
     def keep_only(self, group: str, belief: Belief) -> Belief:
-        """Return the belief over one group, which alone stays in force."""
+        """End the other groups, and return the belief over the one that is kept."""
         old = self.active
         self.active = self.groups[group]
         self.group = group
@@ -335,6 +372,7 @@ class Switching:
 
 
 def _log_ratio(logarithms: Array, old: Sequence[int], new: Sequence[int]) -> float:
-    """Return the logarithm of the ratio of two sums, that of new models to that of old ones."""
-    total = np.logaddexp.reduce
-    return float(total(logarithms[new]) - total(logarithms[old]))
+    """Return the logarithm of the ratio of the new models' sum to the old ones'."""
+    new_sum = np.logaddexp.reduce(logarithms[new])
+    old_sum = np.logaddexp.reduce(logarithms[old])
+    return float(new_sum - old_sum)
