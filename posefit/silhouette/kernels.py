@@ -1,6 +1,6 @@
-"""Pixels of bodies counted against silhouettes: numba loops over arrays. Shapes are checked by the callers.
+"""Pixels of bodies counted against silhouettes: numba loops over arrays.
 
-Bit images are as `rasteriser` makes them.
+Bit images have the layout of `rasteriser`. The callers check shapes.
 """
 
 from typing import NamedTuple
@@ -23,16 +23,16 @@ ONE_BIT = np.uint64(1)
 
 
 class Observed(NamedTuple):
-    """A silhouette as the kernel wants it."""
+    """A silhouette, in the form that the kernels take."""
 
-    person: Bits  # the bit image of the person's pixels, all of them valid
-    valid: Bits  # that of the pixels that are known
-    pixels: int  # of the person
+    person: Bits  # bit image of the person's pixels, all of them valid
+    valid: Bits  # bit image of the known pixels
+    pixels: int  # number of the person's pixels
 
 
 @inlined
 def count(image, observed, valid, box):
-    """Return the pixels of the body and of its overlap with the observed silhouette, and clear the image."""
+    """Return the body's pixels and their overlap with the person; clear the image."""
     body = NONE
     overlap = NONE
     for strip in range(box.first_strip, box.last_strip + 1):
@@ -49,9 +49,9 @@ def count(image, observed, valid, box):
 
 @jit
 def paint_bits(image, box, value, pixels):
-    """OR `value` into the pixels (height, width) of the body in a bit image.
+    """OR `value` into pixels (height, width) where the body in a bit image is.
 
-    Bits past the image's right border may be set and count for nothing: no pixel stands for them.
+    Bits beyond the image's right border may be set; they have no pixel and are skipped.
     """
     height, width = pixels.shape
     words = (
@@ -61,7 +61,8 @@ def paint_bits(image, box, value, pixels):
         for strip in range(box.first_strip, box.last_strip + 1):
             first = STRIP_PIXELS * strip
             word = np.uint64(words[strip, y])
-            # from set bit to set bit: a branch at every pixel would be mispredicted at each border
+            # From set bit to set bit: a branch for every pixel would be mispredicted at
+            # every border.
             while word != NONE:
                 lowest = word & (~word + ONE_BIT)
                 x = first + np.intp(popcount(lowest - ONE_BIT))
@@ -74,9 +75,10 @@ def paint_bits(image, box, value, pixels):
 def count_areas(chain, radii, view, observed, images, poses, translations, areas):
     """Write the areas (n, 3) R, B, Y of poses (n, 66).
 
-    The bit images of the bodies are written to `images` (n, strips, words), if it is not empty. `chain`, `view` and
-    `observed` are plain tuples of what a Chain, a View and an Observed have: each NamedTuple among the arguments takes
-    numba as long as filling half a pose.
+    The bodies' bit images are written to `images` (n, strips, words), unless it is
+    empty. `chain`, `view` and `observed` are plain tuples of the fields of Chain, View
+    and Observed: each NamedTuple among the arguments takes numba as long as filling
+    half a pose.
     """
     chain = Chain(chain[0], chain[1], chain[2], chain[3])
     view = View(view[0], view[1], view[2], view[3], view[4], view[5])

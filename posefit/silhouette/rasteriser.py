@@ -1,29 +1,36 @@
-"""The rasteriser: numba loops over arrays. Shapes are checked by the callers.
+"""The rasteriser: numba loops over arrays. The callers check shapes.
 
-A body is 26 tapered cones, one for each bone. In the picture a cone is the convex hull of two discs. In one row of
-pixels it spans from the least to the greatest of at most six crossings: two with each disc, and one with each of the
-two tangent segments. A pixel belongs to the cone if its centre lies within that span, borders included.
+A body is 26 tapered cones, one per bone. In the image a cone is the convex hull of two
+discs. In one row of pixels it spans from the least to the greatest of at most six
+crossings: two with each disc, and one with each of the two tangent segments. A pixel
+belongs to the cone if its centre lies within that span, borders included.
 
-Poses are outlined LANES at a time. A number of theirs, such as the column of a disc's centre, is one row of an array:
+LANES poses are outlined at a time. Each quantity, such as the column of a disc's
+centre, is one row of an array:
 
-    place k    0       1      ...  15   | 16      17     ...  31   | ...  | 400    401    ...  415  | ...  511
-    cone       bone 0, bone 0,    bone 0| bone 1, bone 1,    bone 1|      | bone 25, ...    bone 25 | unused
-    of         pose 0  pose 1     pose 15 pose 0  pose 1     pose 15      | pose 0  ...     pose 15 |
+    place k   0   1  ...  15  |  16  17  ...  31  |  ...  |  400  ...  415  |  ...  511
+    bone      0   0  ...   0  |   1   1  ...   1  |  ...  |   25  ...   25  |  unused
+    pose      0   1  ...  15  |   0   1  ...  15  |  ...  |    0  ...   15  |
 
-So loops over places run in vector registers, and place `LANES * bone + lane` is a cone of one pose. Joints lie in the
-same way: joint j of a lane is at place `LANES * j + lane`. Bone b ends in joint b + 1, which is LANES places further.
-A pose that is alone has its cones side by side instead, at place `bone`. From a bone to the next it is `stride` places,
-LANES or 1.
+With this order, loops over places run in vector registers. The cone of a bone and a
+lane is at place `LANES * bone + lane`, and joint j of a lane at place `LANES * j +
+lane`. Bone b ends in joint b + 1, LANES places further. If there is only one pose, its
+cones are next to each other instead, at place `bone`. `stride` is the number of places
+from one bone to the next: LANES or 1.
 
-A bit image is cut into strips of 32 columns. It is (strips, words) uint64, and one word has the bits of two rows. As
-uint32 it is (strips, rows): bit i of image[s, y] is the pixel in column 32 s + i of row y. Strips are even in number,
-and rows a multiple of eight:
+A bit image is cut into strips of 32 columns. It is (strips, words) uint64; one word
+holds the bits of two rows. As uint32 it is (strips, rows): bit i of image[s, y] is the
+pixel in column 32 s + i of row y. The number of strips is even, the number of rows a
+multiple of eight:
 
             strip 0         strip 1
     row 0   bits 0 ... 31   bits 0 ... 31
-    row 1   bits 0 ... 31   bits 0 ... 31         a block is eight rows of one strip: one register of AVX2.
-    ...                                           Blocks are filled in a window of two strips, in columns 0 to 63.
+    row 1   bits 0 ... 31   bits 0 ... 31
+    ...
     row 7   bits 0 ... 31   bits 0 ... 31
+
+A block is eight rows of one strip: one register of AVX2. Blocks are filled in a window
+of two strips, whose columns are 0 to 63.
 """
 
 import math
@@ -47,30 +54,31 @@ from posefit.geometry.kernels import (
 )
 from posefit.silhouette.spans import BLOCK, ROOM, STRIP_PIXELS, rows_of, set_spans
 
-# metres; a bone with an end outside of this depth is not drawn
+# metres: a bone is drawn only if both ends are between these depths
 NEAR = 0.05
 FAR = 1e6
 NONE = np.uint64(0)
-_NOWHERE = 1 << 20  # a block or strip beyond every image
-FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
+_NOWHERE = 1 << 20  # the block and strip of an invisible cone: beyond every image
+FLAT = 1e-9  # a tangent flatter than this crosses no row of pixels
 ZERO = np.float32(0)
 ONE = np.float32(1)
 WINDOW = np.float32(2 * STRIP_PIXELS)
 HUGE = np.float32(1e9)
 _NAN = np.float32(np.nan)
 
-BONES = 26  # at most LANES of each, in the ROOM of a row: a power of two, and a place is the lowest bits of a number
+# LANES * BONES places fit into ROOM. ROOM is a power of two, so that the lowest bits of
+# a block's number are a place.
+BONES = 26
 
-_NEXT_BLOCK = (
-    BLOCK << 32
-) + BLOCK * ROOM  # from a cone's block to the one below it, see `block_number`
+# from the number of a cone's block to that of the block below: see `block_number`
+_NEXT_BLOCK = (BLOCK << 32) + BLOCK * ROOM
 
 Singles = NDArray[np.float32]
 Integers = NDArray[np.int32]
 
 
 class View(NamedTuple):
-    """A camera as the kernel wants it."""
+    """A camera, in the form that the kernels take."""
 
     rotation: Array  # (3, 3) camera_from_world
     translation: Array  # (3,)
@@ -81,24 +89,24 @@ class View(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """The discs at both ends of cones, as they are projected."""
+    """The projected discs at both ends of the cones."""
 
     start_u: Array  # column of the centre of the first disc
     start_v: Array  # row
-    start_inverse_depth: Array  # 1 / metres; 0 where nothing is drawn
-    joint_u: (
-        Array  # the same of all joints: the second disc of a cone is a stride further
-    )
+    start_inverse_depth: Array  # 1 / metres; 0 if not drawn
+    # the same for all joints: the second disc of a cone is `stride` places further
+    joint_u: Array
     joint_v: Array
     joint_inverse_depth: Array
     start_radius: Array  # pixels
     end_radius: Array
-    start_size: Array  # pixels of radius where the depth is 1, at place `LANES * bone + lane` always
+    # radius in pixels at depth 1; always at place `LANES * bone + lane`
+    start_size: Array
     end_size: Array
 
 
 class Outlines(NamedTuple):
-    """What borders each cone. Rows count from the cone's top."""
+    """The discs and tangent segments around each cone; rows are from the cone's top."""
 
     start_u: Singles  # centre and squared radius of the first disc
     start_v: Singles
@@ -107,8 +115,8 @@ class Outlines(NamedTuple):
     end_v: Singles
     end_square: Singles
     left_u: Singles  # column of the first tangent in row 0
-    left_slope: Singles  # columns a row
-    # the rows between which it is a tangent segment; none if the top is below the bottom
+    left_slope: Singles  # columns per row
+    # the rows that the segment spans; none if the top is below the bottom
     left_top: Singles
     left_bottom: Singles
     right_u: Singles  # the second tangent
@@ -120,13 +128,13 @@ class Outlines(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Where each cone is in the bit image; nowhere if it is not visible."""
+    """The blocks and strips of each cone in the bit image; _NOWHERE if invisible."""
 
     first_block: Integers  # of eight rows
     stop_block: Integers  # the one after the last
     first_strip: Integers
     last_strip: Integers
-    row: Integers  # the first block's first row, counted from BLOCK rows above the cone's top
+    row: Integers  # the first block's first row, from BLOCK rows above the cone's top
 
 
 class Box(NamedTuple):
@@ -139,15 +147,15 @@ class Box(NamedTuple):
 
 
 class Work(NamedTuple):
-    """The arrays that one thread works in."""
+    """The work arrays of one thread."""
 
     lanes: Array  # kinematics of LANES poses
-    ends: Array  # (rows, ROOM) the numbers of `Ends`
-    outlines: Singles  # (rows, ROOM) those of `Outlines`
-    bounds: Integers  # (rows, ROOM) those of `Bounds`
+    ends: Array  # (rows, ROOM) the fields of `Ends`
+    outlines: Singles  # (rows, ROOM) the fields of `Outlines`
+    bounds: Integers  # (rows, ROOM) the fields of `Bounds`
     keys: NDArray[np.int64]  # (ROOM,) the number of each cone's first block
-    steps: NDArray[np.int64]  # from the number of one block to fill to that of the next
-    spans: Integers  # (2 BLOCK,) first columns, and those after the last, in eight rows
+    steps: NDArray[np.int64]  # differences between the numbers of successive blocks
+    spans: Integers  # (2 BLOCK,) first columns and stop columns of eight rows
     image: Bits  # (strips, words) clear between poses
 
 
@@ -209,7 +217,7 @@ def strips_and_words(width: int, height: int) -> tuple[int, int]:
 
 @inlined
 def project_joints(parents, lanes, ends, stride):
-    """Write the discs of all cones; 1 / depth is 0 where nothing is drawn."""
+    """Write the discs of all cones; 1 / depth is 0 if a joint is not drawn."""
     if stride == 1:
         for j in range(BONES + 1):
             lanes[X + j] = lanes[X + LANES * j]
@@ -222,7 +230,7 @@ def project_joints(parents, lanes, ends, stride):
         ends.joint_u[k] = lanes[X + k] * inverse_depth if inside else 0.0
         ends.joint_v[k] = lanes[Y + k] * inverse_depth if inside else 0.0
         ends.joint_inverse_depth[k] = inverse_depth if inside else 0.0
-    # most bones start where the one before ends
+    # most bones start at the end of the previous one; correct the others below
     for k in range(BONES * stride):
         ends.start_u[k] = ends.joint_u[k]
         ends.start_v[k] = ends.joint_v[k]
@@ -245,10 +253,12 @@ def project_joints(parents, lanes, ends, stride):
 
 @inlined
 def tangent_segment(normal, gap, first, last, top):
-    """Return the column of a tangent in row `top`, its columns a row, and the rows from there where it begins and ends.
+    """Return a tangent's column in row `top`, its slope, and its first and last row.
 
-    It touches the first disc (u, v, radius) and the last one (v, radius) in the direction of a unit normal (x, y). A
-    flat one lies between rows of pixels and crosses none; if one disc covers the other, there is no tangent.
+    It touches the first disc (u, v, radius) and the last one (v, radius) in the
+    direction of a unit normal (x, y). The slope is in columns per row, and rows are
+    from `top`. The last row is above the first if the tangent crosses no row: if it is
+    flat, or if one disc covers the other.
     """
     x, y = normal
     u0, v0, r0 = first
@@ -264,10 +274,11 @@ def tangent_segment(normal, gap, first, last, top):
 
 @inlined
 def outline_cones(ends, outlines, bounds, stride, strips, width, height):
-    """Write each cone's bounds, and the discs and tangent segments that border it, rows counted from its top.
+    """Write each cone's bounds, discs and tangent segments, with rows from its top.
 
-    Blocks begin at every eighth row of the image: two cones' blocks are then the same words or none in common, and a
-    processor that has just written one can read it again at once.
+    Blocks begin at every eighth row of the image. So the blocks of two cones are the
+    same words or have none in common, and a processor can read a block again
+    immediately after it has written it.
     """
     for k in range(BONES * stride):
         u0 = ends.start_u[k]
@@ -281,7 +292,8 @@ def outline_cones(ends, outlines, bounds, stride, strips, width, height):
         dr = r0 - r1
         dd = dx * dx + dy * dy
         gap = dd - dr * dr
-        # the two unit normals n with n . (c1 - c0) = r0 - r1: along the axis, plus or minus across it
+        # the two unit normals n with n . (c1 - c0) = r0 - r1: along the axis, plus or
+        # minus across it
         length = 1.0 / max(dd, 1e-30)
         along = dr * length
         across = math.sqrt(max(gap, 0.0)) * length
@@ -330,7 +342,10 @@ def outline_cones(ends, outlines, bounds, stride, strips, width, height):
 
 @inlined
 def bounding_box(lane, stride, bounds):
-    """Return a pose's bounding box in the bit image, and how many windows of two strips its widest cone has."""
+    """Return a pose's box in the bit image, and how many windows its widest cone has.
+
+    A window is two strips wide.
+    """
     top = _NOWHERE
     bottom = 0
     left = _NOWHERE
@@ -351,26 +366,28 @@ def bounding_box(lane, stride, bounds):
 
 @inlined
 def block_number(word, row, k):
-    """Return one number for a block to fill, so that a list of blocks is one array that is added up.
+    """Return a block's position as one number, so that a list of blocks is one array.
 
-    Its upper half is the block's first word, as uint32, in the bit image. The lower half is its first row, counted from
-    BLOCK rows above the cone's top so that none is negative, times ROOM, and the cone's place k.
+    The upper half is the index of the block's first uint32 word in the bit image. The
+    lower half is the block's first row times ROOM, plus the cone's place k. Rows are
+    from BLOCK rows above the cone's top, so that they are not negative.
     """
     return (np.int64(word) << 32) + np.int64(row * ROOM + k)
 
 
 @inlined
 def block_parts(block):
-    """Return the word, the row and the place of a block's number."""
+    """Return the word, the row and the place in a block's number."""
     row = np.float32((block & 0xFFFFFFFF) // ROOM)
     return block >> 32, row, block & (ROOM - 1)
 
 
 @inlined
 def place_window(step, k, bounds, outlines, keys, image):
-    """Write where the `step`-th window of two strips of the cone at place k lies, one that it has.
+    """Write the position of the `step`-th window of the cone at place k.
 
-    Most cones are no wider than a window, so that their spans are computed once.
+    The cone must have that many windows. Most cones are no wider than one, so that
+    their spans are computed once.
     """
     strip = min(bounds.first_strip[k] + 2 * step, image.shape[0] - 2)
     word = strip * 2 * image.shape[1] + BLOCK * bounds.first_block[k]
@@ -383,10 +400,11 @@ def place_window(step, k, bounds, outlines, keys, image):
 
 @inlined
 def list_blocks(step, lane, stride, bounds, outlines, keys, steps, image):
-    """Write by how much the number of each block to fill of a pose is above that before it; return how many there are.
+    """Write the differences between the numbers of a pose's blocks; return the count.
 
-    `steps` are _NEXT_BLOCK all through: only where a cone begins is another one written. A loop over the blocks of each
-    cone would end for every cone at another number, and a mispredicted branch costs as much as a block.
+    All `steps` are _NEXT_BLOCK already; a different one is written only for the first
+    block of a cone. A loop over the blocks of each cone would have a different length
+    for every cone, and a mispredicted branch costs as much as filling a block.
     """
     end = 0
     after = 0
@@ -396,7 +414,7 @@ def list_blocks(step, lane, stride, bounds, outlines, keys, steps, image):
             if step:
                 place_window(step, k, bounds, outlines, keys, image)
             count = max(int(bounds.stop_block[k]) - int(bounds.first_block[k]), 0)
-            # that of a cone without blocks is written over by the next cone's
+            # if the cone has no blocks, the next cone overwrites this
             steps[end & NATURAL] = keys[k] - after + _NEXT_BLOCK
             after = keys[k] + count * _NEXT_BLOCK if count > 0 else after
             end += count
@@ -406,12 +424,14 @@ def list_blocks(step, lane, stride, bounds, outlines, keys, steps, image):
 
 @inlined
 def span_rows(spans, outlines, k, row):
-    """Write the first column of the cone at place k, and the one after its last, in the rows of a block.
+    """Write the first and the stop column of the cone at place k in a block's rows.
 
-    `row` is the first of them. Columns are counted from the first pixel of the cone's window. Rows above and below the
-    cone are empty: what a row does not cross is nan, which min and max pass over.
+    `row` is the block's first row. Columns are from the first pixel of the cone's
+    window. Rows above and below the cone are empty: the square roots are nan there, and
+    min and max ignore nan.
     """
-    # read before the loop: for all that the compiler knows, writing a span could change them
+    # Read before the loop: the compiler cannot know that writing a span leaves them as
+    # they are.
     column = outlines.column[k]
     stop = outlines.stop[k]
     start_u = outlines.start_u[k]
@@ -470,7 +490,7 @@ def work_arrays(strips, words):
 
 @inlined
 def set_scene(work, first, stop, offsets, radii, view):
-    """Give some lanes a body, of bones (26, 3) and radii (26, 2), and a camera."""
+    """Set the body, bones (26, 3) and radii (26, 2), and the camera of some lanes."""
     set_offsets(work.lanes, first, stop, offsets)
     centre = view.centre[0] - 0.5, view.centre[1] - 0.5
     set_view(
@@ -486,10 +506,11 @@ def set_scene(work, first, stop, offsets, radii, view):
 
 @jit
 def outline_poses(chain, poses, places, rows, width, height, work):
-    """Outline the poses (n, 66) at places (n, 3) that are in these rows (LANES,), each in the scene of its lane.
+    """Outline up to LANES poses, each in the scene of its lane; return the stride.
 
-    `work` is what `work_arrays` makes and `set_scene` fills. Returns the stride of the outlines: 1 if the rows are all
-    the same, so that only the first lane has a pose to fill.
+    `rows` (LANES,) selects the poses among poses (n, 66) at places (n, 3). `work` comes
+    from `work_arrays` and `set_scene`. The stride is 1 if all rows are the same; then
+    only the first lane has a pose to fill.
     """
     ends = ends_in(work)
     outlines = outlines_in(work)
@@ -506,9 +527,10 @@ def outline_poses(chain, poses, places, rows, width, height, work):
 
 @jit
 def fill_pose(lane, stride, work):
-    """Set the pixels of an outlined pose in the clear bit image of `work`; return it and its bounding box.
+    """Fill an outlined pose in the bit image of `work`; return it and its bounding box.
 
-    The lane's outline is used up. `stride` is what `outline_poses` returned.
+    The bit image must be clear. A lane can be filled once, since this changes its
+    outline. `stride` comes from `outline_poses`.
     """
     outlines = outlines_in(work)
     bounds = bounds_in(work)
