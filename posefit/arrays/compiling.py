@@ -1,13 +1,15 @@
-"""Where numba keeps what it compiled: a folder for each state of a module's sources, with checksums of its files.
+"""The cache of compiled functions: one folder per module and state of its sources.
 
-The cache is numba's own (`cache=True`). For itself it would look at the one file that a function is in, but compiled
-code holds copies of functions and constants of other modules. So the folder is named after a digest of all of these
-and of numba's version. It is in NUMBA_CACHE_DIR if that is set, else in the user's cache.
+The cache is numba's (`cache=True`). numba itself only checks the file that a function
+is in, but compiled code holds copies of functions and constants of other modules. So
+the name of the folder has a digest of all their sources and of numba's version. The
+folder is in NUMBA_CACHE_DIR if that is set, otherwise in the user's cache.
 
-numba trusts its files: a damaged one raises an exception or crashes the process. So a folder lists the SHA-256 of each
-file. A process that begins to use a folder removes the files that are not as listed, and what was in them is compiled
-again. numba saves one function at a time without a lock, and two processes may write the same file. So a function is
-saved, and its files are listed, under a lock on the folder.
+numba trusts its files: a damaged one raises an exception or crashes the process. So
+each folder lists the SHA-256 of its files. A process that starts to use a folder
+removes files that differ from the list, and their functions are compiled again. numba
+saves one function at a time without a lock, and two processes may write the same file.
+So functions are saved and listed under a lock on the folder.
 """
 
 import hashlib
@@ -31,54 +33,64 @@ from numba.core import event  # numba's documented interface for applications
 from posefit.arrays.stored import cache_folder
 
 config: Any = numba.config
-MAX_FOLDERS = 256  # of a user's cache: those of older sources are removed
-# bytes: with less room on the disk, nothing is saved, as numba would raise an error in the middle of a call
+MAX_FOLDERS = 256  # in the user's cache: the oldest ones beyond this are removed
+# bytes: with less free space nothing is saved, since numba would raise an error in the
+# middle of a call
 MIN_FREE = 64 << 20
 SUMS = "SHA256SUMS"
-# of each module whose functions are compiled here; None if nothing can be saved
+# the folder of each module with compiled functions; None if nothing can be saved
 _folders: dict[str, Path | None] = {}
 _choosing_folder = threading.Lock()
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]
-    """Logs once that a function of posefit's is compiled, but not in a process that another one started."""
+    """Logs once that posefit's functions are compiled.
+
+    A process started by another one logs nothing.
+    """
 
     announced = False
 
     def on_start(self, event: Any) -> None:
-        """Log a warning, which is printed on stderr unless logging is configured otherwise."""
+        """Log a warning, which goes to stderr unless logging is configured."""
         if self.announced or multiprocessing.parent_process() is not None:
             return
         if event.data["dispatcher"].py_func.__module__.startswith("posefit"):
             self.announced = True
-            message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
-            logging.getLogger("posefit").warning(message)
+            logging.getLogger("posefit").warning(
+                "compiling the kernels, once on this machine; "
+                "this takes ten seconds or more ..."
+            )
 
     def on_end(self, event: Any) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 class _Saving(event.Listener):  # type: ignore[misc]
     """Locks a function's folder while numba saves the function, and lists its files.
 
-    numba saves a function after it has been compiled and before the lock of its compiler is released.
+    numba saves a function after it is compiled and before the compiler's lock is
+    released.
     """
 
     def __init__(self) -> None:
         self._thread = threading.local()
 
     def on_start(self, event: Any) -> None:
-        """Wait until a function is compiled."""
+        """Do nothing: only the end of a compilation matters."""
 
     def on_end(self, event: Any) -> None:
-        """Lock the folder of the function that has been compiled, or unlock that of the one that has been saved."""
+        """Lock a function's folder once it is compiled; unlock it once it is saved."""
         if event.kind == "numba:compile":
             folder = _folders.get(event.data["dispatcher"].py_func.__module__)
             if folder is not None:
-                self._thread.saving = saving = ExitStack()
+                saving = ExitStack()
+                self._thread.saving = saving
                 saving.enter_context(_locked(folder))
                 saving.callback(_list_files, folder)
-        elif (saving := self._thread.__dict__.pop("saving", None)) is not None:
+            return
+        saving = self._thread.__dict__.pop("saving", None)
+        if saving is not None:
             saving.close()
 
 
@@ -90,9 +102,10 @@ event.register("numba:compiler_lock", _saving)  # type: ignore[no-untyped-call]
 
 @lru_cache
 def state_of(module: str) -> str:
-    """Return a module's name and a digest of its state, on which all depends that its functions compile or compute.
+    """Return a module's name with a digest of everything that its functions depend on.
 
-    That is the module's source, the constants that it imports, and the same of the modules whose functions it imports.
+    That is the module's source, the constants that it imports, and the same for the
+    modules of the functions that it imports.
     """
     digest = hashlib.sha256(numba.__version__.encode())
     modules = [module]
@@ -101,23 +114,22 @@ def state_of(module: str) -> str:
         loaded = sys.modules[name]
         digest.update(Path(str(loaded.__file__)).read_bytes())
         for key, value in sorted(vars(loaded).items()):
+            constant = isinstance(value, int | float | str | tuple | np.generic)
+            owner = getattr(value, "__module__", None)
             if isinstance(value, np.ndarray):
                 digest.update(key.encode() + value.tobytes())
-            elif isinstance(
-                value, int | float | str | tuple | np.generic
-            ) and not key.startswith("__"):
+            elif constant and not key.startswith("__"):
                 digest.update(f"{key} {value!r}".encode())
-            elif (
-                (owner := getattr(value, "__module__", None))
-                and owner.startswith(own)
-                and owner not in modules
-            ):
+            elif owner and owner.startswith(own) and owner not in modules:
                 modules.append(owner)
     return f"{module}-{digest.hexdigest()[:16]}"
 
 
 def compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """Return a function compiled by numba with these options, saved for later processes if there is a place for it."""
+    """Return a function compiled by numba with these options.
+
+    It is saved for later processes if that is possible.
+    """
     if config.DISABLE_JIT:
         return function
     module = function.__module__
@@ -131,7 +143,7 @@ def compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         config.CACHE_DIR = str(folder)
         try:
             dispatcher = numba.njit(cache=True, **options)(function)
-            # if numba chose another place, stale files may be there
+            # numba may choose another folder, with stale files
             usable = Path(dispatcher.stats.cache_path).is_relative_to(folder)
         except RuntimeError:  # the function is not from a file
             usable = False
@@ -141,7 +153,10 @@ def compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
 
 
 def _usable_folder(module: str) -> Path | None:
-    """Return the folder of a module's compiled functions, without damaged files; None if nothing can be saved."""
+    """Return the folder of a module's compiled functions, without damaged files.
+
+    None if nothing can be saved.
+    """
     try:
         base = cache_folder()
         folder = base / state_of(module)
@@ -155,12 +170,12 @@ def _usable_folder(module: str) -> Path | None:
         with _locked(folder):
             _remove_damaged(folder)
     except (OSError, RuntimeError):
-        return None  # no home, no room, or the module is not a file
+        return None  # no home directory, no free space, or a module without a file
     return folder
 
 
 def _remove_oldest(base: Path) -> None:
-    """Remove the folders of older sources from the user's cache; a chosen folder is the user's affair."""
+    """Remove the oldest folders from the user's cache, not from NUMBA_CACHE_DIR."""
     if config.CACHE_DIR:
         return
     folders = sorted(base.iterdir(), key=os.path.getmtime)
@@ -170,14 +185,14 @@ def _remove_oldest(base: Path) -> None:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold other processes off a folder, where the operating and file systems can."""
+    """Lock a folder against other processes, if the operating and file systems can."""
     with ExitStack() as stack:
         with suppress(ImportError, OSError):
             import fcntl
 
             file = stack.enter_context((folder / "lock").open("ab"))
             fcntl.flock(file, fcntl.LOCK_EX)
-            # closing the file would not unlock it if a child process has it, too
+            # if a child process has the file open too, closing it would not unlock it
             stack.callback(fcntl.flock, file, fcntl.LOCK_UN)
         yield
 
@@ -191,7 +206,10 @@ def _sum_of(path: Path) -> str:
 
 
 def _list_files(folder: Path) -> None:
-    """List the SHA-256 of a folder's files, as `sha256sum` does; without room, the next process removes them."""
+    """List the SHA-256 of a folder's files in the format of `sha256sum`.
+
+    If the list cannot be written, the next process removes the files.
+    """
     with suppress(OSError):
         lines = [
             f"{_sum_of(path)}  {path.relative_to(folder)}\n"
@@ -201,7 +219,7 @@ def _list_files(folder: Path) -> None:
 
 
 def _remove_damaged(folder: Path) -> None:
-    """Remove the files of a folder that are not as they are listed; to numba they were never there."""
+    """Remove the files of a folder that differ from the list."""
     try:
         listed = set((folder / SUMS).read_text(errors="replace").splitlines())
     except OSError:
