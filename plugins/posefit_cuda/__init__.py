@@ -1,13 +1,13 @@
-"""The device `cuda`: poses are drawn and counted on an NVIDIA GPU. No GPU has run it yet.
+"""The device `cuda`: draws and counts poses on an NVIDIA GPU. Not yet run on a GPU.
 
-The loops are those of posefit's rasteriser, one block of threads a pose. They are tested in numba's simulator alone,
-where they count the areas that a CPU counts; their speed on a GPU is unknown. The handbook's page "How do I draw poses
-on a GPU?" says how to install it.
+It follows posefit's rasteriser, with one block of threads per pose. It is only tested
+in numba's simulator, where its areas equal those of a CPU; its speed on a GPU is
+unknown. The handbook's page "How do I draw poses on a GPU?" describes the installation.
 
 | looking for | file |
 |---|---|
-| whether there is a GPU | device.py |
-| thousands of poses in parts, there and back; arrays that stay there | areas.py |
+| the device, and the check for a GPU | device.py |
+| copies of poses and areas in parts; arrays that stay on the device | areas.py |
 | one pose: the steps of its threads, compiled | launch.py |
 """
 

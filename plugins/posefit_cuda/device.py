@@ -1,4 +1,4 @@
-"""The device `cuda`, and whether there is one."""
+"""The device `cuda`, and the check for a GPU."""
 
 from dataclasses import dataclass
 from typing import final
@@ -13,13 +13,14 @@ from posefit.silhouette.mask import Areas, Silhouette
 @final
 @dataclass(frozen=True)
 class Cuda:
-    """An NVIDIA GPU, by numba-cuda. No GPU has run it yet; numba's simulator has.
+    """An NVIDIA GPU, programmed with numba-cuda. Only run in numba's simulator so far.
 
     Raises InputError if there is no GPU.
     """
 
     def __post_init__(self) -> None:
-        if missing := _missing():
+        missing = _missing()
+        if missing:
             raise InputError(f"device cuda needs an NVIDIA GPU, got {missing}")
 
     def areas(
@@ -37,7 +38,7 @@ class Cuda:
 
 
 def _missing() -> str | None:
-    """Return why there is no GPU; None if there is one, or numba's simulator of one."""
+    """Return why there is no GPU; None if there is one, or numba's simulator."""
     try:
         from numba import cuda
     except ImportError as error:
