@@ -24,7 +24,7 @@ class Pieces(NamedTuple):
     mask: Mask  # (height, width)
     # pieces large enough to be part of a person, in the mask without larger people
     pieces: int
-    # area of the largest piece outside this person, as a share of the person's area
+    # area of the largest other piece in that mask, as a share of the person's area
     rival: float
 
 
@@ -66,7 +66,7 @@ def people_in(mask: Mask, known: Mask | None = None) -> list[Pieces]:
         person = np.zeros_like(mask)
         person[box] = (owners == owner)[labels]
         large = int(np.count_nonzero(others > MIN_PIECE_AREA * others.max()))
-        others[owners == owner] = 0
+        others[owners == owner] = 0  # the next people do not count this one's pieces
         result.append(Pieces(person, large, float(others.max() / totals[owner])))
     return result
 
@@ -85,6 +85,7 @@ def _owners(
     large = np.flatnonzero(areas > MIN_PIECE_AREA * areas.max())
     reach = PIECE_REACH * stats[large, cv2.CC_STAT_HEIGHT]
     shown = labels > 0
+    # pixels from each large piece to every piece
     distances = np.full((len(large), count), np.inf)
     for row, number in enumerate(large.tolist()):
         apart = (labels != number).astype(np.uint8)
@@ -92,6 +93,7 @@ def _owners(
         np.minimum.at(distances[row], labels[shown], away[shown])
     joined = distances[:, large] <= np.maximum(reach[:, None], reach)
     if known is not None:
+        # pieces are joined if they are one component together with the unknown pixels
         through = (shown | ~known).astype(np.uint8)
         numbers = cv2.connectedComponents(through, connectivity=8)[1]
         parts = np.zeros(count, dtype=np.int64)
@@ -102,6 +104,7 @@ def _owners(
                 joined[row, column] |= _is_above(stats[first], stats[second])
     owners = np.zeros(count, dtype=np.int64)
     owners[large] = large
+    # joining two pieces joins everything that is already joined to either
     for row, column in np.argwhere(joined).tolist():
         owners[owners == owners[large[row]]] = owners[large[column]]
     specks = np.setdiff1d(np.arange(1, count), large)

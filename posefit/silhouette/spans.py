@@ -149,18 +149,21 @@ def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> 
         words = lanes_at(signature.args[0], image, at)
         builder.store(builder.or_(builder.load(words, align=4), bits), words, align=4)
 
-    first, stop = (
-        builder.load(
-            lanes_at(signature.args[3], spans, ir.Constant(ir.IntType(64), at)), align=4
-        )
-        for at in (0, BLOCK)
-    )
+    def loaded(at: int) -> Any:
+        index = ir.Constant(ir.IntType(64), at)
+        return builder.load(lanes_at(signature.args[3], spans, index), align=4)
+
+    first = loaded(0)
+    stop = loaded(BLOCK)
+    # a span with its stop before its first bit is empty
     stop = builder.select(builder.icmp_signed(">", stop, first), stop, first)
-    # bits from k on
+    # the bits from `first` on, without the bits from `stop` on; in the right strip both
+    # are counted from the window's end
     add_bits(
         place, builder.xor(shifted(builder.shl, first), shifted(builder.shl, stop))
     )
-    first, stop = (builder.sub(splat(2 * STRIP_PIXELS), k) for k in (first, stop))
+    first = builder.sub(splat(2 * STRIP_PIXELS), first)
+    stop = builder.sub(splat(2 * STRIP_PIXELS), stop)
     add_bits(
         builder.add(place, stride),
         builder.xor(shifted(builder.lshr, first), shifted(builder.lshr, stop)),
