@@ -202,7 +202,7 @@ def optimal_pairs(distances: Array) -> tuple[Indices, Indices]:
 def nearest_pairs(distances: Array) -> tuple[Indices, Indices]:
     """Return rows and columns of pairs by distance (n, m), the nearest pair first.
 
-    Each row and each column is used once.
+    Each row and each column is used at most once.
     """
     pairs: list[tuple[int, int]] = []
     for place in distances.argsort(axis=None, kind="stable"):

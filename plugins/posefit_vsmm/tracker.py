@@ -51,8 +51,8 @@ MAX_BLIND_FRAMES = 15
 LOST_IOU = 0.35
 LOST_FRAMES = 8
 # A limb is missing if it is not detected for this many frames while some end point is
-# unassigned. Its joints' deviation then grows by MISSING_DEVIATION per frame, so that
-# the limb is searched for in a larger area.
+# unassigned. The variance of its joints then grows by MISSING_DEVIATION**2 per frame,
+# so that the limb is searched for in a larger area.
 MISSING_FRAMES = 2
 MISSING_DEVIATION = np.radians(15.0)
 # the bones that move a limb's end
@@ -113,8 +113,11 @@ class TrackFilter:
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
         self._belief: Belief | None = None
+        self._evaluations = 0  # in the current frame
         self._blind_frames = 0
         self._bad_frames = 0
+        # for each limb, the frames since it was last detected; see MISSING_FRAMES
+        self._missing: dict[str, int] = {}
 
     def frame(self, observation: Observation) -> Frame:
         """Return the frame of the next observation."""
@@ -289,27 +292,30 @@ class TrackFilter:
             known = known_views(list(counts[:, 0]), observation.silhouettes)
             iou = metrics.iou(np.array(known)).mean()
             self._bad_frames = self._bad_frames + 1 if iou < LOST_IOU else 0
-        models = {
-            name: getattr(switching, name)
-            for name in ("group", "candidate_group", "groups")
+        models: dict[str, Any] = {
+            "group": switching.group,
+            "candidate_group": switching.candidate_group,
+            "groups": switching.groups,
+            "lost": belief is None,
+            "models": switching.active,
         }
-        models |= {"lost": belief is None, "models": switching.active}
         activity = None
         if belief is not None:
-            models |= {"probabilities": belief.probabilities}
+            models["probabilities"] = belief.probabilities
             activity = most_probable(
                 switching.topology.activities, switching.active, belief.probabilities
             )
         cost = float(costs[0])
-        figures = (
-            pose,
-            place,
-            cost,
-            counts[:, 0],
-            self._evaluations,
-            np.array([[self._evaluations, cost]]),
+        self._latest = Frame(
+            pose=pose,
+            translation=place,
+            cost=cost,
+            areas=counts[:, 0],
+            evaluations=self._evaluations,
+            trace=np.array([[self._evaluations, cost]]),
+            activity=activity,
+            details={**details, **models},
         )
-        self._latest = Frame(*figures, details={**details, **models}, activity=activity)
         return self._latest
 
 
