@@ -155,9 +155,9 @@ def _is_whole(value: Any) -> bool:
 
 
 def _device(_name: str, value: Any) -> str:
-    from posefit.silhouette.cuda.device import check_device
+    from posefit.footage.device import device_of
 
-    check_device(value)
+    device_of(value)
     return str(value)
 
 
@@ -458,9 +458,9 @@ class TrackOptions:
     )
     device: str = option(
         "cpu",
-        "Device that rasterises poses: cpu, or cuda with a GPU.",
+        "Where poses are rasterised: cpu, or a plugin's device, such as a GPU.",
         _device,
-        "cpu|cuda",
+        "NAME",
         identifies=False,
     )
 
