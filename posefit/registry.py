@@ -35,9 +35,11 @@ if TYPE_CHECKING:
 
 BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
-Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter"]
+Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter", "device"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-# distribution of an optimiser that no plugin but the program itself has registered
+# those that `posefit check` has rules for, and `posefit plugins new` a template
+CHECKED_KINDS = tuple(kind for kind in KINDS if kind != "device")
+# instead of the distribution of an optimiser that no plugin registered
 OWN = "this process"
 COMMAND: Literal["command"] = "command"  # what a plugin may register besides KINDS
 Registrable: TypeAlias = Kind | Literal["command"]

@@ -1,13 +1,15 @@
 """Which models are in force, cycle by cycle: the variable structure. VSMM steps 7 to 9.
 
-The field calls it model-set adaptation. A group comes into force beside the present one where the limbs change their
-speed, and a test of both ends one of them.
+The field calls it model-set adaptation. A group comes into force beside the present one when the limbs change their
+speed, and a test of both ends one of them. `Switching` alone changes which models are in force. The two forms, the
+default and the patent's letter, differ in how the filter starts a new group's models: they get a `Union` of both groups
+and return a `Belief` in it.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, final
+from typing import ClassVar, Literal, NamedTuple, final
 
 import numpy as np
 
@@ -22,15 +24,15 @@ from posefit_vsmm.state import AT, inverse_tangents, unit
 _UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right knee")]
 _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
 Structure = Literal["variable", "all"]
-MOST = 3  # of the four lower limbs. Interpretation V15
+MIN_LIMBS = 3  # of thighs and shanks: most of the four. Interpretation V15
 FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
 # by default: within ten cycles the filter has not converged yet. Interpretation V19
 FIRST_SECONDS = 1.0
-ENDED = 0.9  # the ratio, new to old, below which a new group ends
+MIN_RATIO = 0.9  # of a new group to the old one; below it the new one ends
 
 
 def requested_group(points: Sequence[Array]) -> int | None:
-    """Return which group, 0 to 2, the points (17, 2) of the latest three frames ask for; None where it is no other.
+    """Return which group, 0 to 2, the points (17, 2) of the latest three frames ask for; None if they ask for none.
 
     Group 3 goes before 2 and 1 (Interpretation V10). The hips of rule a are both of them, and a hip's angle is that of
     its thigh to the vertical (Interpretation V15). No change at all is not doubled by another.
@@ -44,9 +46,9 @@ def requested_group(points: Sequence[Array]) -> int | None:
     halved = (now <= 0.5 * before) & (before > 0.0)
     if doubled[:2].all():  # VSMM 7a
         return 2
-    if doubled.sum() >= MOST:  # VSMM 7b
+    if doubled.sum() >= MIN_LIMBS:  # VSMM 7b
         return 1
-    if halved.sum() >= MOST:  # VSMM 7c
+    if halved.sum() >= MIN_LIMBS:  # VSMM 7c
         return 0
     return None
 
@@ -86,8 +88,21 @@ def normalised(belief: Belief) -> Belief:
     )
 
 
+class Union(NamedTuple):
+    """A group that comes into force, and the one that is."""
+
+    old_names: tuple[str, ...]  # the models of the present group
+    old_filter: IMM  # over them
+    names: tuple[str, ...]  # the models of both groups. VSMM 8.4
+    filter: IMM  # over these
+    models: MotionModels  # the same ones
+
+
 class DefaultForm:
     """The default: the filter holds covariances (33, 33) of errors. Interpretations V4 and V11."""
+
+    # a new group has only the probability that the transitions gave it
+    judges_first_cycle: ClassVar[bool] = False
 
     def first_cycles(self, models: MotionModels) -> int:
         """Return after how many cycles over all models a group is chosen."""
@@ -109,25 +124,18 @@ class DefaultForm:
         """Return a measurement whose Jacobians are by what the filter's covariances are of."""
         return measure
 
-    def cycle_over_both(
-        self,
-        switching: "Switching",
-        before: Belief,
-        candidate_group: str,
-        measure: Measure,
-    ) -> Belief:
-        """Return the belief after the cycle, run again over both groups; new models had a probability of 0."""
-        old = switching.active
-        fused = switching.imm.fused(before)
-        switching.bring_in(candidate_group)
-        new = dict.fromkeys(switching.active, (*fused, -np.inf))
-        return switching.imm.cycle(
-            regrouped(before, old, switching.active, new), measure
-        )
+    def cycle_over_both(self, union: Union, before: Belief, measure: Measure) -> Belief:
+        """Return the belief after a cycle over both groups; new models had a probability of 0."""
+        state, covariance = union.old_filter.fused(before)
+        new = dict.fromkeys(union.names, (state, covariance, -np.inf))
+        both = regrouped(before, union.old_names, union.names, new)
+        return union.filter.cycle(both, measure)
 
 
 class PatentForm:
     """To the patent's letter: the filter holds covariances (43, 43) of numbers, and starts new models by step 8."""
+
+    judges_first_cycle: ClassVar[bool] = True  # the likelihoods' ratio is from k0 on
 
     def first_cycles(self, models: MotionModels) -> int:
         """Return ten, whatever the models."""
@@ -157,54 +165,33 @@ class PatentForm:
 
         return by_numbers
 
-    def cycle_over_both(
-        self,
-        switching: "Switching",
-        before: Belief,
-        candidate_group: str,
-        measure: Measure,
-    ) -> Belief:
-        """Return the belief after the cycle, run again over both groups and judged."""
-        old = switching.active
-        both = self.joined(switching, before, candidate_group)
-        return switching.decided(self.beside(switching, old).cycle(both, measure))
+    def cycle_over_both(self, union: Union, before: Belief, measure: Measure) -> Belief:
+        """Return the belief after a cycle over both groups, of which the new one begins in this cycle."""
+        both = self.joined(union, before)
+        return self.begun(union).cycle(both, measure)
 
-    def joined(
-        self, switching: "Switching", belief: Belief, candidate_group: str
-    ) -> Belief:
-        """Return a belief with another group's models beside those in force. VSMM 8."""
-        old, models, (state, _) = (
-            switching.active,
-            switching.models,
-            switching.fused(belief),
-        )
-        switching.bring_in(candidate_group)
+    def joined(self, union: Union, belief: Belief) -> Belief:
+        """Return a belief with the new group's models beside the old one's. VSMM 8."""
+        state, _ = self.fused(*union.old_filter.fused(belief))
         top = belief.log_probabilities.max()  # VSMM 8.1
-        noises = dict(zip(models.names, models.noises, strict=True))
-        # VSMM 8.3
-        poses = {
-            name: models.captured_nearest(name, state)
-            for name in switching.active
-            if name not in old
-        }
-        new = {
-            name: (pose, lifted(pose[None], noises[name])[0], top)
-            for name, pose in poses.items()
-        }
-        return normalised(regrouped(belief, old, switching.active, new))
+        new = {}
+        for name, noise in zip(union.names, union.models.noises, strict=True):
+            if name not in union.old_names:
+                pose = union.models.captured_nearest(name, state)  # VSMM 8.3
+                new[name] = pose, lifted(pose[None], noise)[0], top
+        return normalised(regrouped(belief, union.old_names, union.names, new))
 
-    def beside(self, switching: "Switching", old: Sequence[str]) -> IMM:
-        """Return the filter in which the prediction of models that are not `old` has their noise as its covariance."""
-        imm = switching.imm
-        rows = [k for k, name in enumerate(switching.active) if name not in old]
-        noises = switching.models.of(switching.active).noises
+    def begun(self, union: Union) -> IMM:
+        """Return the filter in which the prediction of new models has their noise as its covariance."""
+        rows = [k for k, name in enumerate(union.names) if name not in union.old_names]
+        noises = union.models.noises
 
         def predict(states: Array, covariances: Array) -> tuple[Array, Array]:
-            states, covariances = imm.predict(states, covariances)
+            states, covariances = union.filter.predict(states, covariances)
             covariances[rows] = lifted(states[rows], noises[rows])  # VSMM 8.2
             return states, covariances
 
-        return replace(imm, predict=predict)
+        return replace(union.filter, predict=predict)
 
 
 Form = DefaultForm | PatentForm
@@ -224,11 +211,9 @@ class Switching:
         self.topology = topology
         self.groups = topology.groups
         self.models = models.of(topology.union(topology.groups))
-        self.form, self._structure, self._filter = (
-            form or DefaultForm(),
-            structure,
-            lru_cache(self._filter_of),
-        )
+        self.form = form or DefaultForm()
+        self._structure = structure
+        self._filter = lru_cache(self._filter_of)
         self.restart()
 
     def restart(self) -> None:
@@ -273,64 +258,83 @@ class Switching:
 
     def cycle(self, before: Belief, measure: Measure, points: Array) -> Belief:
         """Return the belief one frame later. Groups come and go by the joints (17, 2) detected in the frame."""
-        self._points, measure = [*self._points, points][-3:], self.form.measure(measure)
-        after = self.imm.cycle(before, measure)
+        self._points = [*self._points, points][-3:]
         self._cycles += 1
-        likely = most_probable(self.groups, self.active, after.probabilities)  # VSMM 5
+        measure = self.form.measure(measure)
+        after = self.imm.cycle(before, measure)
+        likely = most_probable(self.groups, self.active, after.probabilities)
         if self._structure == "all":
             self.group = likely
             return after
         if self.group is None:
-            return (
-                after
-                if self._cycles < self.form.first_cycles(self.models)
-                else self._only(likely, after)
-            )
+            if self._cycles < self.form.first_cycles(self.models):
+                return after
+            return self.keep_only(likely, after)  # VSMM 5
         if self.candidate_group is not None:
-            return self.decided(after)
+            return self.judged(after)
+        requested = self._requested_group()
+        if requested is None:
+            return after
+        union = self.union_with(requested)
+        after = self.form.cycle_over_both(union, before, measure)
+        self.bring_in(requested)
+        return self.judged(after) if self.form.judges_first_cycle else after
+
+    def _requested_group(self) -> str | None:
+        """Return the group that the latest points ask for; None if it is in force, or they ask for none. VSMM 7."""
         number = requested_group(self._points)
         names = tuple(self.groups)
         if number is None or number >= len(names) or names[number] == self.group:
-            return after
-        return self.form.cycle_over_both(self, before, names[number], measure)
+            return None
+        return names[number]
+
+    def union_with(self, candidate_group: str) -> Union:
+        """Return the union of the models in force and another group."""
+        assert self.group is not None
+        names = self.topology.union([self.group, candidate_group])
+        return Union(
+            self.active,
+            self.imm,
+            names,
+            self._filter(names),
+            self.models.of(names),
+        )
 
     def bring_in(self, candidate_group: str) -> None:
         """Bring another group into force beside the present one."""
+        assert self.group is not None
+        self.active = self.topology.union([self.group, candidate_group])  # VSMM 8.4
         self.candidate_group = candidate_group
         self._log_ratio = 0.0
-        # VSMM 8.4
-        self.active = self.topology.union(
-            [self.group or candidate_group, candidate_group]
-        )
 
-    def decided(self, after: Belief) -> Belief:
+    def judged(self, after: Belief) -> Belief:
         """Return the belief after a cycle over both groups: over one of them as soon as the other has to end.
 
         The likelihoods' ratio is that of all cycles since the new group came. Interpretation V12.
         """
         assert self.candidate_group is not None
         assert self.group is not None
-        old, new = (
-            [self.active.index(name) for name in self.groups[group]]
-            for group in (self.group, self.candidate_group)
-        )
+        old = [self.active.index(name) for name in self.groups[self.group]]
+        new = [self.active.index(name) for name in self.groups[self.candidate_group]]
+        # VSMM 9
+        self._log_ratio += _log_ratio(after.log_likelihoods, old, new)
+        smaller = min(_log_ratio(after.log_probabilities, old, new), self._log_ratio)
+        if smaller < np.log(MIN_RATIO):
+            return self.keep_only(self.group, after)
+        if smaller > 0.0:
+            return self.keep_only(self.candidate_group, after)
+        return after
 
-        def log_ratio(logarithms: Array) -> float:
-            return float(
-                np.logaddexp.reduce(logarithms[new])
-                - np.logaddexp.reduce(logarithms[old])
-            )
-
-        self._log_ratio += log_ratio(after.log_likelihoods)  # VSMM 9
-        smaller = min(log_ratio(after.log_probabilities), self._log_ratio)
-        if smaller < np.log(ENDED):
-            return self._only(self.group, after)
-        return self._only(self.candidate_group, after) if smaller > 0.0 else after
-
-    def _only(self, group: str, belief: Belief) -> Belief:
+    def keep_only(self, group: str, belief: Belief) -> Belief:
         """Return the belief over one group, which alone stays in force."""
         old = self.active
         self.active = self.groups[group]
         self.group = group
         self.candidate_group = None
         return normalised(regrouped(belief, old, self.active, {}))
+
+
+def _log_ratio(logarithms: Array, old: Sequence[int], new: Sequence[int]) -> float:
+    """Return the logarithm of the ratio of two sums, that of new models to that of old ones."""
+    total = np.logaddexp.reduce
+    return float(total(logarithms[new]) - total(logarithms[old]))

@@ -36,21 +36,17 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def _compiled(function: Callable[..., Any], inline: str) -> Any:
-    import numba
+    from posefit.arrays.compiling import compiled
 
-    from posefit.arrays.compiling import cached
-
-    options: dict[str, Any] = {
+    options = {
         "nogil": True,
         "error_model": "numpy",
         "fastmath": {"contract", "nsz"},
         "inline": inline,
+        # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
+        "no_cfunc_wrapper": True,
     }
-    # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
-    options["no_cfunc_wrapper"] = True
-    compiled: Any = numba.njit(**options)(function)
-    # NUMBA_DISABLE_JIT: nothing is compiled
-    return compiled if compiled is function else cached(compiled)
+    return compiled(function, options)
 
 
 def writeable(values: ArrayLike) -> Array:

@@ -1,31 +1,43 @@
-"""Where numba keeps what it compiled: a folder for each state of a module, so that nothing there is stale.
+"""Where numba keeps what it compiled: a folder for each state of a module's sources, with checksums of its files.
 
-numba's own cache looks at the one file that a function stands in, and what is compiled holds copies of functions and
-constants of others. So the folder's name is a digest of all of these and of numba's version. It is in NUMBA_CACHE_DIR
-where that is set, else in the user's cache.
+The cache is numba's own (`cache=True`). For itself it would look at the one file that a function is in, but compiled
+code holds copies of functions and constants of other modules. So the folder is named after a digest of all of these
+and of numba's version. It is in NUMBA_CACHE_DIR if that is set, else in the user's cache.
+
+numba trusts its files: a damaged one raises an exception or crashes the process. So a folder lists the SHA-256 of each
+file. A process that begins to use a folder removes the files that are not as listed, and what was in them is compiled
+again. numba saves one function at a time without a lock, and two processes may write the same file. So a function is
+saved, and its files are listed, under a lock on the folder.
 """
 
 import hashlib
 import logging
 import multiprocessing
 import os
-import pickle
 import shutil
 import sys
-from contextlib import suppress
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core import event
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core import event  # numba's documented interface for applications
 
 from posefit.arrays.stored import cache_folder
 
 config: Any = numba.config
 MAX_FOLDERS = 256  # of a user's cache: those of older sources are removed
+# bytes: with less room on the disk, nothing is saved, as numba would raise an error in the middle of a call
+MIN_FREE = 64 << 20
+SUMS = "SHA256SUMS"
+# of each module whose functions are compiled here; None if nothing can be saved
+_folders: dict[str, Path | None] = {}
+_choosing_folder = threading.Lock()
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]
@@ -46,53 +58,34 @@ class _Announcement(event.Listener):  # type: ignore[misc]
         """Say nothing."""
 
 
-event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
+class _Saving(event.Listener):  # type: ignore[misc]
+    """Locks a function's folder while numba saves the function, and lists its files.
 
-
-class CheckedFile(IndexDataCacheFile):
-    """A file of numba's cache that begins with a digest of the rest: what is damaged is never run."""
-
-    def _save_data(self, name: str, data: Any) -> None:
-        dumped = self._dump(data)  # type: ignore[no-untyped-call]
-        with self._open_for_write(self._data_path(name)) as file:  # type: ignore[no-untyped-call]
-            file.write(hashlib.sha256(dumped).digest() + dumped)
-
-    def _load_data(self, name: str) -> Any:
-        content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
-        digest = content[:32]
-        dumped = content[32:]
-        if hashlib.sha256(dumped).digest() != digest:
-            raise ValueError(f"{name} is damaged")
-        return pickle.loads(dumped)
-
-
-class TolerantCache(FunctionCache):
-    """numba's cache, for which a file that is damaged, or cannot be read or written, is a miss.
-
-    Each signature has an index of its own: of one index two processes may write, one loses what the other compiled.
+    numba saves a function after it has been compiled and before the lock of its compiler is released.
     """
 
-    def open_index(self, sig: Any) -> None:
-        """Use the index of a signature."""
-        base = f"{self._impl.filename_base}-{hashlib.sha256(str(sig).encode()).hexdigest()[:12]}"
-        stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = CheckedFile(self.cache_path, base, stamp)  # type: ignore[no-untyped-call]
+    def __init__(self) -> None:
+        self._thread = threading.local()
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what was compiled for a signature; None where it is not there."""
-        self.open_index(sig)
-        try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except Exception:  # whatever a damaged file raises
-            with suppress(OSError):
-                self.flush()  # type: ignore[no-untyped-call]
-            return None
+    def on_start(self, event: Any) -> None:
+        """Wait until a function is compiled."""
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Write what was compiled for a signature, if there is room."""
-        self.open_index(sig)
-        with suppress(OSError):
-            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+    def on_end(self, event: Any) -> None:
+        """Lock the folder of the function that has been compiled, or unlock that of the one that has been saved."""
+        if event.kind == "numba:compile":
+            folder = _folders.get(event.data["dispatcher"].py_func.__module__)
+            if folder is not None:
+                self._thread.saving = saving = ExitStack()
+                saving.enter_context(_locked(folder))
+                saving.callback(_list_files, folder)
+        elif (saving := self._thread.__dict__.pop("saving", None)) is not None:
+            saving.close()
+
+
+_saving = _Saving()
+event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
+event.register("numba:compile", _saving)  # type: ignore[no-untyped-call]
+event.register("numba:compiler_lock", _saving)  # type: ignore[no-untyped-call]
 
 
 @lru_cache
@@ -123,27 +116,100 @@ def state_of(module: str) -> str:
     return f"{module}-{digest.hexdigest()[:16]}"
 
 
-def cached(dispatcher: Any) -> Any:
-    """Return a function of numba's, which finds in its folder what any process compiled before."""
-    before = config.CACHE_DIR
+def compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return a function compiled by numba with these options, saved for later processes if there is a place for it."""
+    if config.DISABLE_JIT:
+        return function
+    module = function.__module__
+    if module not in _folders:
+        _folders[module] = _usable_folder(module)
+    folder = _folders[module]
+    if folder is None:
+        return numba.njit(**options)(function)
+    with _choosing_folder:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(folder)
+        try:
+            dispatcher = numba.njit(cache=True, **options)(function)
+            # if numba chose another place, stale files may be there
+            usable = Path(dispatcher.stats.cache_path).is_relative_to(folder)
+        except RuntimeError:  # the function is not from a file
+            usable = False
+        finally:
+            config.CACHE_DIR = before
+    return dispatcher if usable else numba.njit(**options)(function)
+
+
+def _usable_folder(module: str) -> Path | None:
+    """Return the folder of a module's compiled functions, without damaged files; None if nothing can be saved."""
     try:
-        name = state_of(dispatcher.py_func.__module__)
-        base = Path(before) if before else cache_folder()
-        if not (base / name).is_dir():
-            (base / name).mkdir(parents=True)
-            for old in (
-                sorted(base.iterdir(), key=os.path.getmtime)[:-MAX_FOLDERS]
-                if not before
-                else ()
-            ):
-                shutil.rmtree(old, ignore_errors=True)
-        config.CACHE_DIR = str(base / name)
-        cache = TolerantCache(dispatcher.py_func)  # type: ignore[no-untyped-call]
-        # else numba chose a place where stale files may be
-        if Path(cache.cache_path).is_relative_to(base):
-            dispatcher._cache = cache
+        base = cache_folder()
+        folder = base / state_of(module)
+        if not folder.is_dir():
+            folder.mkdir(parents=True)
+            _remove_oldest(base)
+        if shutil.disk_usage(folder).free < MIN_FREE:
+            return None
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"room for a file")
+        with _locked(folder):
+            _remove_damaged(folder)
     except (OSError, RuntimeError):
-        pass  # no home, no room, or no file of the function: every process compiles
-    finally:
-        config.CACHE_DIR = before
-    return dispatcher
+        return None  # no home, no room, or the module is not a file
+    return folder
+
+
+def _remove_oldest(base: Path) -> None:
+    """Remove the folders of older sources from the user's cache; a chosen folder is the user's affair."""
+    if config.CACHE_DIR:
+        return
+    folders = sorted(base.iterdir(), key=os.path.getmtime)
+    for old in folders[:-MAX_FOLDERS]:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold other processes off a folder, where the operating and file systems can."""
+    with ExitStack() as stack:
+        with suppress(ImportError, OSError):
+            import fcntl
+
+            file = stack.enter_context((folder / "lock").open("ab"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+            # closing the file would not unlock it if a child process has it, too
+            stack.callback(fcntl.flock, file, fcntl.LOCK_UN)
+        yield
+
+
+def _files_in(folder: Path) -> Iterator[Path]:
+    yield from folder.rglob("*.nb[ic]")  # numba's indices and compiled functions
+
+
+def _sum_of(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _list_files(folder: Path) -> None:
+    """List the SHA-256 of a folder's files, as `sha256sum` does; without room, the next process removes them."""
+    with suppress(OSError):
+        lines = [
+            f"{_sum_of(path)}  {path.relative_to(folder)}\n"
+            for path in _files_in(folder)
+        ]
+        (folder / SUMS).write_text("".join(lines))
+
+
+def _remove_damaged(folder: Path) -> None:
+    """Remove the files of a folder that are not as they are listed; to numba they were never there."""
+    try:
+        listed = set((folder / SUMS).read_text(errors="replace").splitlines())
+    except OSError:
+        listed = set()
+    for path in list(_files_in(folder)):
+        try:
+            intact = f"{_sum_of(path)}  {path.relative_to(folder)}" in listed
+        except OSError:
+            intact = False
+        if not intact:
+            path.unlink()

@@ -123,6 +123,45 @@ def set_offsets(lanes, first, stop, offsets):
 
 
 @inlined
+def all_same(rows):
+    """Return whether all lanes have the same pose, as for the last of n poses."""
+    same = True
+    for lane in range(1, LANES):
+        same &= rows[lane] == rows[0]
+    return same
+
+
+@inlined
+def write_sines(poses, rows, lanes):
+    """Write the sines and cosines of the angles of a pose for each lane."""
+    for lane in range(LANES):
+        for a in range(_ANGLES):
+            lanes[_ANGLE + LANES * a + lane] = poses[rows[lane], a]
+    for k in range(LANES * _ANGLES):
+        sine, cosine = sine_cosine(lanes[_ANGLE + k])
+        lanes[_SINE + k] = sine
+        lanes[_COSINE + k] = cosine
+
+
+@inlined
+def write_sines_of_one(pose, lanes):
+    """Write those of one pose that is in all lanes, each of them computed once."""
+    # one angle after another, in the room of the angles of all lanes
+    sines = _ANGLE + _ANGLES
+    cosines = sines + _ANGLES
+    for a in range(_ANGLES):
+        lanes[_ANGLE + a] = pose[a]
+    for a in range(_ANGLES):
+        sine, cosine = sine_cosine(lanes[_ANGLE + a])
+        lanes[sines + a] = sine
+        lanes[cosines + a] = cosine
+    for a in range(_ANGLES):
+        for lane in range(LANES):
+            lanes[_SINE + LANES * a + lane] = lanes[sines + a]
+            lanes[_COSINE + LANES * a + lane] = lanes[cosines + a]
+
+
+@inlined
 def place_roots(places, rows, lanes):
     """Write the frames of the root joints: Ry @ Rx @ Rz of yaw, pitch and roll, at places (n, 3)."""
     for k in range(LANES):
@@ -207,11 +246,10 @@ def place_bones(chain, lanes):
 @jit
 def place_lanes(chain, poses, places, rows, lanes):
     """Write frames and joints of the poses (n, 66), their roots at places (n, 3), that are in these rows (LANES,)."""
-    for lane in range(LANES):
-        for a in range(_ANGLES):
-            lanes[_ANGLE + LANES * a + lane] = poses[rows[lane], a]
-    for k in range(LANES * _ANGLES):
-        lanes[_SINE + k], lanes[_COSINE + k] = sine_cosine(lanes[_ANGLE + k])
+    if all_same(rows):
+        write_sines_of_one(poses[rows[0]], lanes)
+    else:
+        write_sines(poses, rows, lanes)
     place_roots(places, rows, lanes)
     place_bones(chain, lanes)
     for j in range(_JOINTS):

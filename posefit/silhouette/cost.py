@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array, Bits, writeable
 from posefit.errors import InputError
@@ -12,14 +11,13 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.silhouette import drawn, kernels
-from posefit.silhouette.mask import Mask, Silhouette, unpack
+from posefit.silhouette.mask import Areas, Mask, Silhouette, unpack
 from posefit.silhouette.rasteriser import View, strips_and_words
 from posefit.silhouette.sharing import parts_of, work_through
 
 SCALE = 100.0  # S
 BETA = 0.5  # beta
 
-Areas = NDArray[np.int64]  # (..., 3): R, B, Y
 # where only the areas are wanted
 _NO_IMAGES: Bits = np.empty((0, 0, 0), dtype=np.uint64)
 T = TypeVar("T")
@@ -43,7 +41,8 @@ def _drawing(
         camera.width,
         camera.height,
     )
-    return body.skeleton.chain, body.radii, view, observed, images
+    chain = tuple(body.skeleton.chain)
+    return chain, body.radii, tuple(view), tuple(observed), images
 
 
 def areas(
@@ -77,10 +76,8 @@ def areas(
             f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}"
         )
     drawn.count_poses(n, silhouette)
-    if silhouette.device == "cuda":
-        from posefit.silhouette.cuda.areas import areas_on_device
-
-        return areas_on_device(body, camera, silhouette, poses, translations)
+    if silhouette.device is not None:
+        return silhouette.device.areas(body, camera, silhouette, poses, translations)
     counted = np.empty((n, 3), dtype=np.int64)
     drawing = drawing_of(body, camera, silhouette)
 
@@ -171,8 +168,10 @@ def costs_in(
     """
     drawn.count_poses(len(poses), silhouette)
     counted = np.empty((len(poses), 3), dtype=np.int64)
+    costs = np.zeros(len(poses))
     kernels.count_areas(*drawing, poses, translations, counted)
-    return mismatch(counted, beta)
+    kernels.add_mismatch(counted, SCALE, beta, costs)
+    return costs
 
 
 def compile_kernels() -> None:

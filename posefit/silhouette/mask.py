@@ -2,19 +2,22 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Bits
+from posefit.arrays import Array, Bits
 from posefit.errors import InputError
+from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.reading import quoted
 from posefit.silhouette.rasteriser import strips_and_words
 from posefit.silhouette.spans import STRIP_PIXELS
 
 Mask = NDArray[np.bool_]  # (height, width)
+Areas = NDArray[np.int64]  # (..., 3): R, B, Y
 
 # of the largest piece's pixels, ours: a smaller one is left out of the person's borders
 MIN_PIECE_PIXELS = 0.06
@@ -83,7 +86,8 @@ class Silhouette:
     valid: Mask = field(repr=False)  # (height, width)
     # every so many pixels of every so many rows of the full-size silhouette
     scale: int = 1
-    device: str = "cpu"  # where poses are drawn to be compared with it
+    # where poses are drawn to be compared with it; None is the CPU
+    device: "Device | None" = None
     # at full size, in these pixels; () where it is
     full_extent: tuple[float, ...] = field(default=(), repr=False)
 
@@ -154,6 +158,23 @@ class Silhouette:
             float(right) if right < width else np.nan,
             float(bottom) if bottom < height else np.nan,
         )
+
+
+class Device(Protocol):
+    """Draws poses and counts their areas somewhere else than on the CPU; plugins register some."""
+
+    def areas(
+        self,
+        body: Body,
+        camera: Camera,
+        silhouette: Silhouette,
+        poses: Array,
+        translations: Array,
+    ) -> Areas:
+        """Return R, B, Y (n, 3) in pixels of poses (n, 66) at translations (n, 3).
+
+        They are those that `posefit.silhouette.cost.areas` counts on a CPU, where shapes have been checked.
+        """
 
 
 def coarser_camera(camera: Camera, factor: int) -> Camera:

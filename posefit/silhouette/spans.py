@@ -1,6 +1,6 @@
-"""Two instructions that numba cannot say at speed: the bits of eight spans, and how many bits of a word are set.
+"""What numba cannot say at speed: rows of a known length, the bits of eight spans, how many bits of a word are set.
 
-Each stands here as plain Python, and below it as numba compiles it.
+Each is here as plain Python, and below it as numba compiles it.
 """
 
 from typing import Any
@@ -12,6 +12,51 @@ from numba.extending import intrinsic, overload
 
 STRIP_PIXELS = 32  # pixels: bits of a lane
 BLOCK = 8  # rows filled at a time
+ROOM = 512  # numbers in a row of a work array
+
+
+def rows_of(block: Any) -> Any:
+    """Return the rows (n, ROOM) of a work array, of a length that the compiler knows.
+
+    So it sees that rows do not overlap, and loops that write several rows run in vector registers. Rows of an unknown
+    length it would compare with each other before each loop, if there are few of them, and else give up.
+    """
+    return block
+
+
+@intrinsic
+def _rows_of(typing_context: Any, block: Any) -> Any:  # noqa: ARG001
+    return block(block), _build_rows
+
+
+@overload(rows_of)
+def _rows_of_compiled(block):  # noqa: ARG001
+    return lambda block: _rows_of(block)  # type: ignore[call-arg]
+
+
+def _build_rows(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """Write `rows_of`: the same numbers, with constants for the length of a row and its bytes."""
+    array = context.make_array(signature.return_type)
+    block = array(context, builder, arguments[0])
+    rows = array(context, builder)
+
+    def whole(number: int) -> Any:
+        return context.get_constant(types.intp, number)
+
+    size = signature.return_type.dtype.bitwidth // 8
+    count = builder.extract_value(block.shape, 0)
+    shape = builder.insert_value(block.shape, whole(ROOM), 1)
+    strides = builder.insert_value(block.strides, whole(ROOM * size), 0)
+    rows.data = block.data
+    rows.nitems = builder.mul(count, whole(ROOM))
+    rows.itemsize = whole(size)
+    rows.shape = shape
+    rows.strides = builder.insert_value(strides, whole(size), 1)
+    rows.meminfo = block.meminfo
+    rows.parent = block.parent
+    value = rows._getvalue()
+    context.nrt.incref(builder, signature.return_type, value)
+    return value
 
 
 def popcount(bits: Any) -> int:
@@ -61,7 +106,9 @@ def _set_spans(
     return types.void(image, types.int64, types.int64, spans), _build_spans
 
 
-@overload(set_spans, inline="always")
+# Not `inline="always"`: where numba inlines a typed function, it removes what it takes for dead code, and it does not
+# know that a row is a view of its block.
+@overload(set_spans)
 def _set_spans_compiled(image, place, stride, spans):  # noqa: ARG001
     return lambda image, place, stride, spans: _set_spans(image, place, stride, spans)  # type: ignore[call-arg]
 

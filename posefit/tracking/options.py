@@ -144,9 +144,9 @@ def _is_whole(value: Any) -> bool:
 
 
 def _device(_name: str, value: Any) -> str:
-    from posefit.silhouette.cuda.device import check_device
+    from posefit.footage.device import device_of
 
-    check_device(value)
+    device_of(value)
     return str(value)
 
 
@@ -424,9 +424,9 @@ class TrackOptions:
     )
     device: str = option(
         "cpu",
-        "Where poses are drawn: cpu, or cuda with a GPU.",
+        "Where poses are drawn: cpu, or a device that a plugin offers, such as a GPU.",
         _device,
-        "cpu|cuda",
+        "NAME",
         identifies=False,
     )
 

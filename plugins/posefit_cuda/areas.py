@@ -10,14 +10,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba import cuda
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import Chain
-from posefit.silhouette.cuda.launch import THREADS, count_on_device
-from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.mask import Areas, Silhouette
+from posefit_cuda.launch import THREADS, count_on_device
 
 _held: WeakKeyDictionary[Any, Sequence[Any]] = WeakKeyDictionary()
 # poses: 35 MB; two parts at a time are on the device, however many there are
@@ -30,7 +29,7 @@ def areas_on_device(
     silhouette: Silhouette,
     poses: Array,
     translations: Array,
-) -> NDArray[np.int64]:
+) -> Areas:
     """Return R, B, Y (n, 3) in pixels of poses (n, 66) at translations (n, 3), counted on the device.
 
     Shapes are checked by the callers.
