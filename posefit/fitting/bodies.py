@@ -4,27 +4,28 @@ A build is searched by trying bodies. One call a body and frame would fill one l
 empty, and spend more time in Python than in the kernel. Each pair has the bits that it has alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, Bits, jit
+from posefit.arrays import Array, Bits, jit, writeable
 from posefit.fitting.kernels import move_to_borders
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import (
     LANES,
+    Chain,
     empty_lanes,
     place_lanes,
     read_joints,
     set_offsets,
 )
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS
-from posefit.silhouette.cost import mean_over_views, mismatch
+from posefit.silhouette.cost import Areas, mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.kernels import count
 from posefit.silhouette.rasteriser import (
@@ -173,6 +174,95 @@ def _joint_radii(radii: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class ObservedFrames:
+    """The silhouettes of some frames (f), stacked for calls that draw all of them."""
+
+    observed: Sequence[Observed] = field(repr=False)  # one a camera
+    borders: Array = field(repr=False)  # (f, views, 4) pixels, see `Silhouette.extent`
+    # of each frame: the views of which something is known, or all of them
+    known: Sequence[Sequence[int]] = field(repr=False)
+
+    @classmethod
+    def of(cls, observations: Iterable[Observation]) -> Self:
+        """Return the silhouettes of some observations, of which nothing else is kept."""
+        stacks = list[list[tuple[Bits, Bits, int]]]()
+        borders = list[list[tuple[float, float, float, float]]]()
+        known = list[Sequence[int]]()
+        for observation in observations:
+            row = observation.silhouettes
+            stacks.append([(*each.bits, each.pixels) for each in row])
+            borders.append([each.extent for each in row])
+            views = range(len(row))
+            known.append([view for view in views if row[view].known] or views)
+        observed = [
+            Observed(*(np.array(part) for part in zip(*view, strict=True)))
+            for view in zip(*stacks, strict=True)
+        ]
+        return cls(observed, np.array(borders), known)
+
+    def areas(
+        self,
+        chain: Chain,
+        bodies: Bodies,
+        cameras: Sequence[Camera],
+        poses: Array,
+        places: Array,
+        threads: int = 1,
+    ) -> Areas:
+        """Return the areas (views, m, f, 3) R, B, Y of bodies in poses (f, 66), at places (m, f, 3)."""
+        pairs = places.shape[0] * places.shape[1]
+        count_poses(float(pairs * len(cameras)))
+        areas = np.empty((len(cameras), *places.shape[:2], 3), np.int64)
+
+        def count_part(part: slice) -> None:
+            ends = np.array([part.start, part.stop])
+            for camera, observed, of_view in zip(
+                cameras, self.observed, areas, strict=True
+            ):
+                view = View(
+                    camera.rotation,
+                    camera.translation,
+                    camera.focal,
+                    camera.centre,
+                    camera.width,
+                    camera.height,
+                )
+                count_pairs(chain, bodies, view, observed, poses, places, ends, of_view)
+
+        work_through(parts_of(pairs, threads), threads, lambda _: (), count_part)
+        return areas
+
+    def costs(self, areas: Areas, beta: float) -> Array:
+        """Return the costs (m, f) of areas (views, m, f, 3), the mean over the views of which something is known."""
+        by_view = mismatch(areas.reshape(-1, 3), beta).reshape(areas.shape[:3])
+        costs = np.empty(areas.shape[1:3])
+        for k, known in enumerate(self.known):
+            costs[:, k] = mean_over_views([by_view[view, :, k] for view in known])
+        return costs
+
+    def areas_of(
+        self, body: Body, cameras: Sequence[Camera], poses: Array, places: Array
+    ) -> Areas:
+        """Return the areas (views, f, 3) R, B, Y of one body in poses (f, 66) at places (f, 3)."""
+        chain = body.skeleton.chain
+        bodies = Bodies(chain.offsets[None], writeable(body.radii)[None])
+        poses = writeable(poses)
+        return self.areas(chain, bodies, cameras, poses, writeable(places)[None])[:, 0]
+
+    def costs_of(
+        self,
+        body: Body,
+        cameras: Sequence[Camera],
+        poses: Array,
+        places: Array,
+        beta: float,
+    ) -> Array:
+        """Return the costs (f,) of one body in poses (f, 66) at places (f, 3). SAPSO (4)."""
+        areas = self.areas_of(body, cameras, poses, places)
+        return np.asarray(self.costs(areas[:, None], beta)[0])
+
+
+@dataclass(frozen=True, eq=False)
 class HeldFrames:
     """Frames whose poses are held while bodies are tried."""
 
@@ -180,11 +270,7 @@ class HeldFrames:
     cameras: Sequence[Camera]
     poses: Array = field(repr=False)  # (f, 66)
     places: Array = field(repr=False)  # (f, 3) metres
-    # one a camera
-    observed: Sequence[Observed] = field(repr=False)
-    borders: Array = field(repr=False)  # (f, views, 4) pixels, see `Silhouette.extent`
-    # of each frame: the views of which something is known, or all of them
-    known: Sequence[Sequence[int]] = field(repr=False)
+    frames: ObservedFrames
 
     @classmethod
     def of(
@@ -195,28 +281,12 @@ class HeldFrames:
         frames: Sequence[Frame],
     ) -> Self:
         """Return the frames of some observations, held in the poses that were tracked in them."""
-        views = range(len(cameras))
-        silhouettes = [observation.silhouettes for observation in observations]
-        observed = [
-            Observed(
-                np.array([row[view].bits[0] for row in silhouettes]),
-                np.array([row[view].bits[1] for row in silhouettes]),
-                np.array([row[view].pixels for row in silhouettes]),
-            )
-            for view in views
-        ]
-        known = [
-            [view for view in views if row[view].known] or [*views]
-            for row in silhouettes
-        ]
         return cls(
             body,
             cameras,
             np.array([frame.pose for frame in frames]),
             np.array([frame.translation for frame in frames]),
-            observed,
-            np.array([[each.extent for each in row] for row in silhouettes]),
-            known,
+            ObservedFrames.of(observations),
         )
 
     def costs(
@@ -232,60 +302,26 @@ class HeldFrames:
             threads: the number that draw; the costs are the same with any.
 
         """
-        many = len(offsets)
-        count_poses(float(many * self.poses.shape[0] * len(self.cameras)))
+        chain = self.body.skeleton.chain
         bodies = Bodies(_turned(self.body, offsets), np.ascontiguousarray(radii))
-        places = np.repeat(self.places[None], many, axis=0)
+        places = np.repeat(self.places[None], len(offsets), axis=0)
         if aligned:
             self._align(bodies, places)
-        views = [
-            mismatch(self._areas(view, bodies, places, threads), beta)
-            for view in range(len(self.cameras))
-        ]
-        shape = many, len(self.poses)
-        by_view = [costs.reshape(shape) for costs in views]
-        total = np.zeros(many)
-        for k, known in enumerate(self.known):
-            total += mean_over_views([by_view[view][:, k] for view in known])
+        drawn = chain, bodies, self.cameras, self.poses, places, threads
+        costs = self.frames.costs(self.frames.areas(*drawn), beta)
+        total = np.zeros(len(offsets))
+        # one by one: the order of a sum decides its last digit
+        for of_frame in costs.T:
+            total += of_frame
         return total / len(self.poses)
 
     def _align(self, bodies: Bodies, places: Array) -> None:
-        shape = len(places), len(self.poses), len(JOINTS), 3
-        joints = np.empty(shape)
+        """Move places (m, f, 3) to where bodies fill the silhouettes' boxes."""
+        joints = np.empty((*places.shape[:2], len(JOINTS), 3))
         place_bodies(self.body.skeleton.chain, bodies.offsets, self.poses, joints)
         cameras = tuple(
             np.array([getattr(camera, name) for camera in self.cameras])
             for name in ("rotation", "translation", "focal", "centre")
         )
-        align_bodies(joints, _joint_radii(bodies.radii), cameras, self.borders, places)
-
-    def _areas(
-        self, view: int, bodies: Bodies, places: Array, threads: int
-    ) -> NDArray[np.int64]:
-        """Return the areas (m f, 3) R, B, Y of all pairs in one view."""
-        camera = self.cameras[view]
-        drawing = View(
-            camera.rotation,
-            camera.translation,
-            camera.focal,
-            camera.centre,
-            camera.width,
-            camera.height,
-        )
-        areas = np.empty((*places.shape[:2], 3), np.int64)
-
-        def count_part(part: slice) -> None:
-            count_pairs(
-                self.body.skeleton.chain,
-                bodies,
-                drawing,
-                self.observed[view],
-                self.poses,
-                places,
-                np.array([part.start, part.stop]),
-                areas,
-            )
-
-        pairs = places.shape[0] * places.shape[1]
-        work_through(parts_of(pairs, threads), threads, lambda _: (), count_part)
-        return areas.reshape(-1, 3)
+        borders = self.frames.borders
+        align_bodies(joints, _joint_radii(bodies.radii), cameras, borders, places)

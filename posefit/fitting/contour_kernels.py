@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
+from posefit.geometry.kernels import place_frames
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
@@ -47,6 +48,21 @@ class Contours(NamedTuple):
     points: Array  # (n, 2) frame after frame
     starts: NDArray[np.int64]  # (T + 1,)
     step: float
+
+
+class Views(NamedTuple):
+    """The borders of one frame's masks in V views, and the cameras."""
+
+    rotations: Array  # (V, 3, 3) camera_from_world
+    translations: Array  # (V, 3)
+    focals: Array  # (V, 2) pixels
+    centres: Array  # (V, 2) pixels
+    fields: NDArray[np.float32]  # (V, h, w)
+    corners: NDArray[np.int64]  # (V, 2)
+    sizes: NDArray[np.int64]  # (V, 2)
+    points: Array  # (n, 2) view after view
+    starts: NDArray[np.int64]  # (V + 1,)
+    steps: Array  # (V,) pixels of the border that a point stands for
 
 
 class Growth(NamedTuple):
@@ -96,16 +112,16 @@ def write_cones(parents, centres, radii, cones, discs):
 
 
 @inlined
-def cone_distance(x, y, cone):
+def cone_distance(x, y, cones, bone):
     """Return how far a point is outside a cone, below 0 within, the share of the bone it is at, and its normal."""
-    x0 = cone[0]
-    y0 = cone[1]
-    r0 = cone[2]
-    dx = cone[3]
-    dy = cone[4]
-    dr = cone[5]
-    length = cone[6]
-    side = cone[7]
+    x0 = cones[bone, 0]
+    y0 = cones[bone, 1]
+    r0 = cones[bone, 2]
+    dx = cones[bone, 3]
+    dy = cones[bone, 4]
+    dr = cones[bone, 5]
+    length = cones[bone, 6]
+    side = cones[bone, 7]
     if side == 0.0:
         share = 0.0 if dr >= 0.0 else 1.0
     else:
@@ -119,41 +135,92 @@ def cone_distance(x, y, cone):
 
 
 @inlined
-def _add(block, gradient, share, across, down, radius_change, off, weight):
-    """Add the square of one distance, which moves by (across, down) with its axis and by `radius_change`."""
+def accumulate(pulls, bone, share, across, down, radius_change, off, weight):
+    """Add the square of one distance, which moves by (across, down) with its axis and by `radius_change`.
+
+    What moves a point of a bone is a product: of what moves either end, and of how near the point is to it. So the
+    squares are products too, see `expand`.
+    """
     rest = 1.0 - share
-    values = (
-        across * rest,
-        down * rest,
-        across * share,
-        down * share,
-        radius_change * rest,
-        radius_change * share,
-    )
-    for i in range(6):
-        gradient[i] += weight * off * values[i]
-        for j in range(6):
-            block[i, j] += weight * values[i] * values[j]
+    near = rest * rest
+    both = rest * share
+    far = share * share
+    wa = weight * across
+    wd = weight * down
+    wr = weight * radius_change
+    aa = wa * across
+    ad = wa * down
+    ar = wa * radius_change
+    dd = wd * down
+    dr = wd * radius_change
+    rr = wr * radius_change
+    pulls[bone, 0] += aa * near
+    pulls[bone, 1] += ad * near
+    pulls[bone, 2] += ar * near
+    pulls[bone, 3] += dd * near
+    pulls[bone, 4] += dr * near
+    pulls[bone, 5] += rr * near
+    pulls[bone, 6] += aa * both
+    pulls[bone, 7] += ad * both
+    pulls[bone, 8] += ar * both
+    pulls[bone, 9] += dd * both
+    pulls[bone, 10] += dr * both
+    pulls[bone, 11] += rr * both
+    pulls[bone, 12] += aa * far
+    pulls[bone, 13] += ad * far
+    pulls[bone, 14] += ar * far
+    pulls[bone, 15] += dd * far
+    pulls[bone, 16] += dr * far
+    pulls[bone, 17] += rr * far
+    pulls[bone, 18] += wa * off * rest
+    pulls[bone, 19] += wd * off * rest
+    pulls[bone, 20] += wr * off * rest
+    pulls[bone, 21] += wa * off * share
+    pulls[bone, 22] += wd * off * share
+    pulls[bone, 23] += wr * off * share
 
 
-@jit
+@inlined
+def expand(pulls, blocks, gradients):
+    """Add what `accumulate` summed up to the blocks (B, 6, 6) and gradients (B, 6) of bones."""
+    places = np.empty((2, 3), np.int64)
+    for end in range(2):
+        places[end, 0] = 2 * end
+        places[end, 1] = 2 * end + 1
+        places[end, 2] = 4 + end
+    for bone in range(pulls.shape[0]):
+        for end in range(2):
+            for i in range(3):
+                row = places[end, i]
+                gradients[bone, row] += pulls[bone, 18 + 3 * end + i]
+                for other in range(2):
+                    for j in range(3):
+                        low = min(i, j)
+                        pair = low * (5 - low) // 2 + max(i, j)
+                        column = places[other, j]
+                        blocks[bone, row, column] += pulls[
+                            bone, 6 * (end + other) + pair
+                        ]
+
+
+@inlined
 def _nearest_bone(x, y, first, cones, discs):
     """Return the bone whose border is nearest to a point; begin with `first`."""
-    least = np.inf
+    least = cone_distance(x, y, cones, first)[0]
     bone = first
-    for k in range(-1, discs.shape[0]):
-        b = first if k < 0 else k
+    for b in range(discs.shape[0]):
         reach = least + discs[b, 2]
-        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 >= reach * reach:
-            continue
-        off = cone_distance(x, y, cones[b])[0]
-        if off < least:
-            least = off
-            bone = b
+        dx = x - discs[b, 0]
+        dy = y - discs[b, 1]
+        if b != first and dx * dx + dy * dy < reach * reach:
+            off = cone_distance(x, y, cones, b)[0]
+            if off < least:
+                least = off
+                bone = b
     return bone
 
 
-@jit
+@inlined
 def _write_neighbours(bone, discs, neighbours):
     """Write the other bones whose discs meet that of a bone, and return how many they are."""
     count = 0
@@ -166,111 +233,142 @@ def _write_neighbours(bone, discs, neighbours):
     return count
 
 
-@jit
-def _covered(x, y, neighbours, cones, discs):
-    for b in neighbours:
-        near = (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[
-            b, 2
-        ]
-        if near and cone_distance(x, y, cones[b])[0] < -COVERED:
-            return True
-    return False
+@inlined
+def visible(x, y, neighbours, count, cones, discs):
+    """Return whether a point of a bone's border is within none of its neighbours."""
+    shown = True
+    for k in range(count):
+        b = neighbours[k]
+        dx = x - discs[b, 0]
+        dy = y - discs[b, 1]
+        near = dx * dx + dy * dy < discs[b, 2] * discs[b, 2]
+        if near and cone_distance(x, y, cones, b)[0] < -COVERED:
+            shown = False
+            break
+    return shown
 
 
 @jit
-def add_pulls(parents, centres, radii, contour, scale, blocks, gradients):
+def add_pulls(parents, centres, radii, contour, scale, owners, blocks, gradients):
     """Add the squares of the distances of the mask's border from the body's, and of the body's from the mask's.
 
     Those of a bone go to its half of a second derivative, 6 x 6, and half of a gradient: by the column and row of its
-    two joints, and by both radii.
+    two joints, and by both radii. `owners` (n,) are the bones that were nearest to the points of the mask's border a
+    step before, -1 where none was, and then those that are now: a search that begins with the right one is short.
     """
     cones = np.empty((parents.size, 8))
     discs = np.empty((parents.size, 3))
     write_cones(parents, centres, radii, cones, discs)
-    _add_mask_border(contour, scale, cones, discs, blocks, gradients)
+    pulls = np.zeros((parents.size, 24))
+    _add_mask_border(contour, scale, cones, discs, owners, pulls)
     neighbours = np.empty(parents.size, np.int64)
-    for b in range(parents.size):
+    for bone in range(parents.size):
         # else one of its discs covers the other
-        if cones[b, 6] > abs(cones[b, 5]) + TINY:
-            others = neighbours[: _write_neighbours(b, discs, neighbours)]
-            start = centres[parents[b]]
-            end = centres[b + 1]
-            _add_bone_border(
-                start,
-                end,
-                radii[b],
+        if cones[bone, 6] > abs(cones[bone, 5]) + TINY:
+            count = _write_neighbours(bone, discs, neighbours)
+            others = neighbours, count, cones, discs
+            side_points(bone, contour, scale, others, pulls)
+            cap_points(bone, contour, scale, others, pulls)
+    expand(pulls, blocks, gradients)
+
+
+@inlined
+def _add_mask_border(contour, scale, cones, discs, owners, pulls):
+    """Add the squares of the distances of the mask's border from the nearest bones."""
+    points = contour.points
+    bone = 0
+    for i in range(points.shape[0]):
+        x = points[i, 0]
+        y = points[i, 1]
+        bone = _nearest_bone(x, y, owners[i] if owners[i] >= 0 else bone, cones, discs)
+        owners[i] = bone
+        off, share, nx, ny = cone_distance(x, y, cones, bone)
+        weight = contour.step / (1.0 + (off / scale) ** 2)
+        accumulate(pulls, bone, share, -nx, -ny, -1.0, off, weight)
+
+
+@inlined
+def _add_point(x, y, nx, ny, share, worth, bone, contour, scale, others, pulls):
+    """Add the square of the distance from the mask's border of a point of a bone's border with a normal."""
+    neighbours, count, cones, discs = others
+    known, off, across, down = _mask_distance(x, y, contour)
+    if known and visible(x, y, neighbours, count, cones, discs):
+        weight = worth / (1.0 + (off / scale) ** 2)
+        turned = across * nx + down * ny
+        accumulate(pulls, bone, share, across, down, turned, off, weight)
+
+
+@inlined
+def side_points(bone, contour, scale, others, pulls):
+    """Add the squares of the distances of both straight sides of a bone's border, where they are visible."""
+    cones = others[2]
+    length = cones[bone, 6]
+    dx = cones[bone, 3] / length
+    dy = cones[bone, 4] / length
+    cosine = cones[bone, 5] / length
+    sine = math.sqrt(1.0 - cosine * cosine)
+    parts = max(int(length / (2.0 * contour.step)) + 1, 2)
+    for i in range(parts + 1):
+        share = i / parts
+        worth = length * sine / parts * (0.5 if i in (0, parts) else 1.0)
+        radius = cones[bone, 2] - share * cones[bone, 5]
+        x = cones[bone, 0] + share * cones[bone, 3]
+        y = cones[bone, 1] + share * cones[bone, 4]
+        for k in range(2):
+            aside = sine if k == 0 else -sine
+            nx = cosine * dx - aside * dy
+            ny = cosine * dy + aside * dx
+            _add_point(
+                x + radius * nx,
+                y + radius * ny,
+                nx,
+                ny,
+                share,
+                worth,
+                bone,
                 contour,
                 scale,
-                (others, cones, discs),
-                (blocks[b], gradients[b]),
+                others,
+                pulls,
             )
 
 
 @inlined
-def _add_mask_border(contour, scale, cones, discs, blocks, gradients):
-    """Add the squares of the distances of the mask's border from the nearest bones."""
-    bone = 0
-    for i in range(contour.points.shape[0]):
-        x = contour.points[i, 0]
-        y = contour.points[i, 1]
-        bone = _nearest_bone(x, y, bone, cones, discs)
-        off, share, nx, ny = cone_distance(x, y, cones[bone])
-        weight = contour.step / (1.0 + (off / scale) ** 2)
-        _add(blocks[bone], gradients[bone], share, -nx, -ny, -1.0, off, weight)
-
-
-@inlined
-def _add_bone_border(start, end, ends, contour, scale, others, square):
-    """Add the squares of the distances of a bone's visible border, both sides and both ends, from the mask's."""
-    neighbours, cones, discs = others
-    block, gradient = square
-    dx = end[0] - start[0]
-    dy = end[1] - start[1]
-    r0 = ends[0]
-    r1 = ends[1]
-    length = math.sqrt(dx * dx + dy * dy)
-    dx = dx / length
-    dy = dy / length
-    cosine = (r0 - r1) / length
-    sine = math.sqrt(1.0 - cosine * cosine)
-    tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
-    sides = max(int(length / (2.0 * contour.step)) + 1, 2)
-    for k in range(2 * (sides + 1 + 2 * CAP)):
-        i = k // 2
-        side = 1.0 - 2.0 * (k % 2)
-        if i <= sides:
-            share = i / sides
-            along = cosine
-            aside = sine
-            stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
-        elif side > 0.0:
-            share = 1.0 if i <= sides + CAP else 0.0
-            if share > 0.0:
-                angle = tilt * (i - sides - 0.5) / CAP
-                stands = r1 * tilt / CAP
-            else:
-                rest = math.pi - tilt
-                angle = tilt + rest * (i - sides - CAP - 0.5) / CAP
-                stands = r0 * rest / CAP
-            along = math.cos(angle)
-            aside = math.sin(angle)
-        nx = along * dx - side * aside * dy
-        ny = along * dy + side * aside * dx
-        radius = r0 + share * (r1 - r0)
-        x = start[0] + share * length * dx + radius * nx
-        y = start[1] + share * length * dy + radius * ny
-        known, off, across, down = _mask_distance(x, y, contour)
-        if known and not _covered(x, y, neighbours, cones, discs):
-            weight = stands / (1.0 + (off / scale) ** 2)
-            _add(
-                block,
-                gradient,
+def cap_points(bone, contour, scale, others, pulls):
+    """Add the squares of the distances of the round ends of a bone's border, where they are visible."""
+    cones = others[2]
+    length = cones[bone, 6]
+    dx = cones[bone, 3] / length
+    dy = cones[bone, 4] / length
+    # from the axis to the normal of the cone's side
+    tilt = math.acos(cones[bone, 5] / length)
+    for k in range(2 * CAP):
+        # the last end first, then the first one
+        share = 1.0 if k < CAP else 0.0
+        part = (k % CAP + 0.5) / CAP
+        angle = tilt * part if share > 0.0 else tilt + (math.pi - tilt) * part
+        around = tilt if share > 0.0 else math.pi - tilt
+        radius = cones[bone, 2] - share * cones[bone, 5]
+        x = cones[bone, 0] + share * cones[bone, 3]
+        y = cones[bone, 1] + share * cones[bone, 4]
+        along = math.cos(angle)
+        sine = math.sin(angle)
+        for side in range(2):
+            aside = sine if side == 0 else -sine
+            nx = along * dx - aside * dy
+            ny = along * dy + aside * dx
+            _add_point(
+                x + radius * nx,
+                y + radius * ny,
+                nx,
+                ny,
                 share,
-                across,
-                down,
-                across * nx + down * ny,
-                off,
-                weight,
+                radius * around / CAP,
+                bone,
+                contour,
+                scale,
+                others,
+                pulls,
             )
 
 
@@ -281,6 +379,7 @@ def _mask_distance(x, y, contour):
     off = 0.0
     across = 0.0
     down = 0.0
+    field = contour.field
     column = x - contour.corner[0] - 0.5
     row = y - contour.corner[1] - 0.5
     left = math.floor(column)
@@ -288,12 +387,10 @@ def _mask_distance(x, y, contour):
     if 0 <= left < contour.size[1] - 1 and 0 <= top < contour.size[0] - 1:
         u = column - left
         v = row - top
-        upper = contour.field[top]
-        lower = contour.field[top + 1]
-        f00 = upper[left]
-        f01 = upper[left + 1]
-        f10 = lower[left]
-        f11 = lower[left + 1]
+        f00 = field[top, left]
+        f01 = field[top, left + 1]
+        f10 = field[top + 1, left]
+        f11 = field[top + 1, left + 1]
         off = (f00 * (1.0 - u) + f01 * u) * (1.0 - v) + (f10 * (1.0 - u) + f11 * u) * v
         across = (f01 - f00) * (1.0 - v) + (f11 - f10) * v
         down = (f10 - f00) * (1.0 - u) + (f11 - f01) * u
@@ -307,6 +404,13 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
 
     A distance counts less beyond `reach` metres.
     """
+    owners = np.full(len(contour.points), -1)
+    _add_view(parents, radii, camera, frames, contour, reach, owners, grown, sums)
+
+
+@inlined
+def _add_view(parents, radii, camera, frames, contour, reach, owners, grown, sums):
+    """Add what `add_view` does; `owners` are those of `add_pulls`."""
     rotation, translation, focal, centre = camera
     hessians, forces = sums
     bones = parents.size
@@ -361,6 +465,7 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
         wide,
         contour,
         max(reach * metres, MIN_ROBUST_SCALE),
+        owners,
         blocks,
         gradients,
     )
@@ -390,10 +495,10 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
             )
         for i in range(6):
             for j in range(6):
-                total = 0.0
-                for k in range(6):
-                    total += blocks[b, i, k] * rows[k, j]
-                turned[i, j] = total
+                turned[i, j] = 0.0
+            for k in range(6):
+                for j in range(6):
+                    turned[i, j] += blocks[b, i, k] * rows[k, j]
         for i in range(6):
             total = 0.0
             for k in range(6):
@@ -555,6 +660,103 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
             grows = Growth(grown.joints[i], grown.radii, grown.squares)
             bones = BoneSquares(sums.hessians[i], sums.forces[i])
             add_view(parents, radii, camera, frames[i], contour, reach, grows, bones)
+
+
+@jit
+def fit_poses(chain, radii, views, free, aims, reaches, max_turn, poses, places):
+    """Move poses (n, 66) and places (n, 3) to the contours of one frame, a step for each of `reaches`, metres.
+
+    A step is Gauss and Newton's. Of the 69 numbers of a place and a pose those that are `free` (m,) change. `aims` are
+    what they are pulled to (n, m), and how strongly (m,). No angle turns farther than `max_turn` in a step.
+    """
+    targets, weights = aims
+    n = poses.shape[0]
+    joints = chain.parents.size + 1
+    many = free.size
+    frames = np.empty((n, joints, 4, 3))
+    sines = np.empty((n, ANGLES))
+    cosines = np.empty((n, ANGLES))
+    owners = np.full((n, len(views.points)), -1)
+    hessians = np.empty((joints, 6, 6))
+    forces = np.empty((joints, 6, 1))
+    bones = BoneSquares(hessians, forces)
+    grown = Growth(
+        np.empty((0, joints, 3)), np.empty((0, radii.shape[0], 2)), np.zeros((1, 1))
+    )
+    all_screws = np.empty((NUMBERS, 6))
+    screws = np.zeros((NUMBERS, 6))
+    sums = np.empty((NUMBERS, NUMBERS))
+    slopes = np.empty((NUMBERS, 1))
+    matrix = np.empty((many, many))
+    step = np.empty(many)
+    for reach in reaches:
+        place_frames(chain, poses, places, sines, cosines, frames)
+        for i in range(n):
+            hessians[:] = 0.0
+            forces[:] = 0.0
+            for v in range(len(views.steps)):
+                first = views.starts[v]
+                stop = views.starts[v + 1]
+                if first < stop:
+                    camera = (
+                        views.rotations[v],
+                        views.translations[v],
+                        views.focals[v],
+                        views.centres[v],
+                    )
+                    contour = Contour(
+                        views.fields[v],
+                        views.corners[v],
+                        views.sizes[v],
+                        views.points[first:stop],
+                        views.steps[v],
+                    )
+                    _add_view(
+                        chain.parents,
+                        radii,
+                        camera,
+                        frames[i],
+                        contour,
+                        reach,
+                        owners[i, first:stop],
+                        grown,
+                        bones,
+                    )
+            write_screws(chain, frames[i], sines[i], cosines[i], all_screws)
+            for a in free:
+                screws[a] = all_screws[a]
+            add_bones(chain, screws, hessians, forces, sums, slopes)
+            for a in range(many):
+                number = free[a]
+                value = places[i, number] if number < 3 else poses[i, number - 3]
+                step[a] = slopes[number, 0] + weights[a] * (value - targets[i, a])
+                for b in range(a + 1):
+                    matrix[b, a] = sums[number, free[b]]
+                matrix[a, a] += weights[a]
+            solve_symmetric(matrix, step)
+            for a in range(many):
+                number = free[a]
+                if number < 3:
+                    places[i, number] -= step[a]
+                else:
+                    poses[i, number - 3] -= min(max(step[a], -max_turn), max_turn)
+
+
+@jit
+def solve_symmetric(matrix, right):
+    """Solve for a vector (m,), in its place, by elimination in the upper half of a positive definite matrix (m, m)."""
+    m = right.size
+    for k in range(m):
+        for i in range(k + 1, m):
+            factor = matrix[k, i] / matrix[k, k]
+            for j in range(i, m):
+                matrix[i, j] -= factor * matrix[k, j]
+            right[i] -= factor * right[k]
+    for k in range(m - 1, -1, -1):
+        total = right[k]
+        for j in range(k + 1, m):
+            total -= matrix[k, j] * right[j]
+        right[k] = total / matrix[k, k]
 
 
 @jit

@@ -93,7 +93,7 @@ def cone_distance(
     kernels.write_cones(
         np.zeros(1, int), np.asarray(points), np.asarray(radii)[None], cones, discs
     )
-    distance, *others = kernels.cone_distance(x, y, cones[0])
+    distance, *others = kernels.cone_distance(x, y, cones, 0)
     return distance, *others
 
 
@@ -114,7 +114,8 @@ def pulled(numbers: Array, mask: kernels.Contour, scale: float) -> tuple[Array, 
     )
     blocks = np.zeros((len(BONES), 6, 6))
     forces = np.zeros((len(BONES), 6))
-    kernels.add_pulls(BONE_STARTS, centres, radii, mask, scale, blocks, forces)
+    owners = np.full(len(mask.points), -1)
+    kernels.add_pulls(BONE_STARTS, centres, radii, mask, scale, owners, blocks, forces)
     curves = np.zeros((COUNT, COUNT))
     slopes = np.zeros(COUNT)
     for b, parent in enumerate(BONE_STARTS):
@@ -356,7 +357,10 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
         mask = kernels.Contour(
             field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
         )
-        kernels.add_pulls(np.array(parents), joints, radii, mask, scale, blocks, forces)
+        owners = np.full(len(mask.points), -1)
+        kernels.add_pulls(
+            np.array(parents), joints, radii, mask, scale, owners, blocks, forces
+        )
         return blocks[0], forces[0]
 
     for mine, expected in zip(

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.bodies import ObservedFrames
 from posefit.fitting.landmarks import LEGS, landmark_likelihoods, side_odds
-from posefit.fitting.tracker import Frame, Observation
+from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import pose_costs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
@@ -36,6 +36,8 @@ AROUND_SECONDS = 0.08  # in which one frame stands for all
 # of landmarks: of the logarithm of the odds that legs are as they are, as errors last
 # for frames
 ODDS_COST = 0.5
+# metres: the steps of a trial, fewer than `ROBUST_SCALES`
+TRIAL_SCALES = (0.065, 0.045, 0.033, 0.033)
 LEG_JOINTS = [
     JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]
 ]
@@ -54,13 +56,16 @@ def with_cheapest_legs(
     usable = np.array([observation.usable for observation in scene.observations])
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
-        exchanged = legs_exchanged(smoothed.scene, tracked, usable, beta)
+        costs = np.array([frame.cost for frame in smoothed.frames]) * usable
+        exchanged = legs_exchanged(smoothed.scene, tracked, usable, costs, beta)
         pairs = zip(tracked, exchanged, strict=True)
         frames = [
             _exchanged(smoothed.scene, frame) if other else frame
             for frame, other in pairs
         ]
-        again = smooth(scene, frames, shape, beta) if exchanged.any() else smoothed
+        if not exchanged.any():
+            break
+        again = smooth(scene, frames, shape, beta)
         if mean_cost(again.frames, usable) >= mean_cost(smoothed.frames, usable):
             break
         tracked = frames
@@ -73,16 +78,33 @@ def with_cheapest_legs(
 
 
 def legs_exchanged(
-    scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float
+    scene: Scene,
+    frames: Sequence[Frame],
+    usable: NDArray[np.bool_],
+    costs: Array,
+    beta: float,
 ) -> NDArray[np.bool_]:
-    """Return in which frames (T,) legs should be exchanged, as that is cheaper. `usable` frames (T,) show enough."""
+    """Return in which frames (T,) legs should be exchanged, as that is cheaper.
+
+    Args:
+        scene: what is seen, and the body that fits.
+        frames: as they were tracked.
+        usable: (T,) which of them show enough.
+        costs: (T,) of the frames once they are smoothed.
+        beta: that of the cost.
+
+    """
     pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
     here, there = (scene.motion(each) for each in pairs)
-    costs = _smoothed_costs(scene, here, beta)
-    added = _smoothed_costs(scene, there, beta) - costs
     edges = doubtful(here, there, costs, usable)
-    exchanged = np.zeros(len(frames), dtype=np.int64)
+    odds = _odds(scene, here)
     reach = max(round(TRIAL_SECONDS * scene.fps), 2)
+    others = _smoothed_costs(scene, there, beta)
+    edges, anything = in_doubt(edges, reach, costs, others - costs + odds, usable)
+    if not anything:
+        return np.zeros(len(frames), dtype=bool)
+    added = others - _smoothed_costs(scene, here, beta)
+    exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
     for edge in edges:  # in the order of time: two that are near each other may be one
         rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
@@ -103,15 +125,43 @@ def legs_exchanged(
         exchanged ^= later & (switch < 0.0)
     starts = [0, *edges]
     stops = [*edges, len(frames)]
-    stretches = np.add.reduceat(
-        np.where(exchanged, -1.0, 1.0) * (added + _odds(scene, here)), starts
-    )
+    stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + odds), starts)
     steps = np.reshape(switches, (-1, 1, 1)) * (1.0 - np.eye(2))
     others = cheapest_sequence(
         np.column_stack([np.zeros(len(starts)), stretches]), steps
     )
     others = np.repeat(others, np.subtract(stops, starts))
     return np.asarray(exchanged != others)
+
+
+def in_doubt(
+    edges: Sequence[int],
+    reach: int,
+    costs: Array,
+    added: Array,
+    usable: NDArray[np.bool_],
+) -> tuple[list[int], bool]:
+    """Return the edges of the stretches that may be better with exchanged legs, and whether any stretch may be.
+
+    To exchange the legs between two edges adds `added` (T,) to the cost of each frame there. All that it can save is
+    what frames near these edges, closer than `reach`, cost more than others, where they do clearly: `costs` (T,) are
+    those of smoothed frames.
+    """
+    typical = np.median(costs[usable])
+    excess = np.where(usable & (costs > HIGH_COST * typical), costs - typical, 0.0)
+    ends = [0, *edges, len(costs)]
+    near = [np.zeros(len(costs), dtype=bool) for _ in ends]
+    for edge, rows in zip(edges, near[1:-1], strict=True):
+        rows[max(edge - reach, 0) : edge + reach] = True
+    kept = set[int]()
+    anything = False
+    for first, start in enumerate(ends[:-1]):
+        for last in range(first + 1, len(ends)):
+            saved = excess[near[first] | near[last]].sum()
+            if added[start : ends[last]].sum() < saved:
+                anything = True
+                kept |= {start, ends[last]}
+    return [edge for edge in edges if edge in kept], anything
 
 
 def doubtful(
@@ -189,32 +239,19 @@ def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
 
 def _smoothed_costs(scene: Scene, motion: Motion, beta: float) -> Array:
     """Return the costs (T,) of a motion's frames once it is smoothed; 0 for those that show too little."""
-    scene, motion, _ = smoothed_motion(scene, motion, None, beta)
-    return np.array(
-        [
-            _cost(scene, *each, beta)
-            for each in zip(
-                scene.observations, motion.poses, motion.translations, strict=True
-            )
-        ]
-    )
-
-
-def _cost(
-    scene: Scene, observation: Observation, pose: Array, place: Array, beta: float
-) -> float:
-    if not observation.usable:
-        return 0.0
-    return float(
-        pose_costs(
+    scene, motion, _ = smoothed_motion(scene, motion, None, beta, TRIAL_SCALES)
+    usable = np.array([observation.usable for observation in scene.observations])
+    costs = np.zeros(len(motion))
+    if usable.any():
+        seen = ObservedFrames.of(each for each in scene.observations if each.usable)
+        costs[usable] = seen.costs_of(
             scene.body,
             scene.cameras,
-            observation.silhouettes,
-            pose[None],
-            place[None],
+            motion.poses[usable],
+            motion.translations[usable],
             beta,
-        )[0][0]
-    )
+        )
+    return costs
 
 
 def _odds(scene: Scene, motion: Motion) -> Array:
