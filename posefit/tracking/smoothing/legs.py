@@ -3,7 +3,8 @@
 From the side, two legs that pass each other look like two that meet and go back, and a track takes the one for the
 other. But a body whose legs go back, or are exchanged in the middle of a stride, does not stay on the masks once its
 motion is smooth. So legs are exchanged, for a trial, from each doubtful frame on. The costs of these trials, and of
-each stretch between them as it is and exchanged, give the cheapest sequence of exchanges.
+each stretch between them as it is and exchanged, give the cheapest sequence of exchanges. Most films need no trial:
+exchanged legs cost more everywhere than all that could be saved.
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.bodies import ObservedFrames
+from posefit.fitting.contours import ROBUST_SCALES
 from posefit.fitting.landmarks import LEGS, landmark_likelihoods, side_odds
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
@@ -26,6 +28,8 @@ from posefit.uncertainty.calibration import SECOND_SIDE
 
 ROUNDS = 3  # at most: what is exchanged in one shows the next what else is doubtful
 TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
+# the same, of frames that a wrong exchange makes cost more
+DOUBT_SECONDS = 0.1
 # metres, rms: exchanged legs that are so near to those of the frame before may be
 # theirs
 PASSING = 0.16
@@ -36,8 +40,8 @@ AROUND_SECONDS = 0.08  # in which one frame stands for all
 # of landmarks: of the logarithm of the odds that legs are as they are, as errors last
 # for frames
 ODDS_COST = 0.5
-# metres: the steps of a trial, fewer than `ROBUST_SCALES`
-TRIAL_SCALES = (0.065, 0.045, 0.033, 0.033)
+# metres: the steps of a first look, fewer than `ROBUST_SCALES`
+QUICK_SCALES = (0.065, 0.045, 0.033, 0.033)
 LEG_JOINTS = [
     JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]
 ]
@@ -56,8 +60,7 @@ def with_cheapest_legs(
     usable = np.array([observation.usable for observation in scene.observations])
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
-        costs = np.array([frame.cost for frame in smoothed.frames]) * usable
-        exchanged = legs_exchanged(smoothed.scene, tracked, usable, costs, beta)
+        exchanged = legs_exchanged(smoothed, tracked, usable, beta)
         pairs = zip(tracked, exchanged, strict=True)
         frames = [
             _exchanged(smoothed.scene, frame) if other else frame
@@ -78,32 +81,31 @@ def with_cheapest_legs(
 
 
 def legs_exchanged(
-    scene: Scene,
-    frames: Sequence[Frame],
-    usable: NDArray[np.bool_],
-    costs: Array,
-    beta: float,
+    smoothed: Smoothed, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float
 ) -> NDArray[np.bool_]:
     """Return in which frames (T,) legs should be exchanged, as that is cheaper.
 
     Args:
-        scene: what is seen, and the body that fits.
+        smoothed: the frames once they are smoothed.
         frames: as they were tracked.
         usable: (T,) which of them show enough.
-        costs: (T,) of the frames once they are smoothed.
         beta: that of the cost.
 
     """
+    scene = smoothed.scene
+    costs = np.array([frame.cost for frame in smoothed.frames]) * usable
     pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
     here, there = (scene.motion(each) for each in pairs)
     edges = doubtful(here, there, costs, usable)
     odds = _odds(scene, here)
     reach = max(round(TRIAL_SECONDS * scene.fps), 2)
-    others = _smoothed_costs(scene, there, beta)
-    edges, anything = in_doubt(edges, reach, costs, others - costs + odds, usable)
+    # a few steps are enough to see where nothing is in doubt
+    quick = _smoothed_costs(scene, there, beta, QUICK_SCALES)
+    near = max(round(DOUBT_SECONDS * scene.fps), 1)
+    edges, anything = in_doubt(edges, near, costs, quick - costs + odds, usable)
     if not anything:
         return np.zeros(len(frames), dtype=bool)
-    added = others - _smoothed_costs(scene, here, beta)
+    added = _smoothed_costs(scene, there, beta) - _smoothed_costs(scene, here, beta)
     exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
     for edge in edges:  # in the order of time: two that are near each other may be one
@@ -237,9 +239,11 @@ def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
     return replace(frame, posterior=both)
 
 
-def _smoothed_costs(scene: Scene, motion: Motion, beta: float) -> Array:
+def _smoothed_costs(
+    scene: Scene, motion: Motion, beta: float, scales: Sequence[float] = ROBUST_SCALES
+) -> Array:
     """Return the costs (T,) of a motion's frames once it is smoothed; 0 for those that show too little."""
-    scene, motion, _ = smoothed_motion(scene, motion, None, beta, TRIAL_SCALES)
+    scene, motion, _ = smoothed_motion(scene, motion, None, beta, scales)
     usable = np.array([observation.usable for observation in scene.observations])
     costs = np.zeros(len(motion))
     if usable.any():
