@@ -140,7 +140,12 @@ def pull_of_view(
     root = view.metres[k]
     points = np.ascontiguousarray(view.points[view.starts[k] : view.starts[k + 1]])
     mask = kernels.Contour(
-        view.fields[k], view.corners[k], view.sizes[k], points, view.step
+        view.fields[k],
+        view.corners[k],
+        view.sizes[k],
+        points,
+        view.step,
+        np.full(len(points), -1),
     )
     curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
     deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
@@ -289,6 +294,7 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
         np.ones(2, np.int64),
         points,
         1.0,
+        np.full(len(points), -1),
     )
 
     def half_sum(numbers: np.ndarray) -> float:
@@ -354,7 +360,12 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
         blocks = np.zeros((len(parents), 6, 6))
         forces = np.zeros((len(parents), 6))
         mask = kernels.Contour(
-            field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
+            field,
+            np.zeros(2, int),
+            np.array(field.shape),
+            np.zeros((0, 2)),
+            0.25,
+            np.zeros(0, int),
         )
         kernels.accumulate_borders(
             np.array(parents), joints, radii, mask, scale, blocks, forces
