@@ -25,15 +25,16 @@ from posefit.geometry.kernels import (
     set_offsets,
 )
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS
-from posefit.silhouette.cost import Areas, mean_over_views, mismatch
+from posefit.silhouette.cost import mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.kernels import count
+from posefit.silhouette.mask import Areas
 from posefit.silhouette.rasteriser import (
     View,
     fill_pose,
     outline_poses,
-    scratch,
     set_scene,
+    work_arrays,
 )
 from posefit.silhouette.sharing import parts_of, work_through
 
@@ -98,7 +99,7 @@ def count_pairs(chain, bodies, view, observed, poses, places, pairs, areas):
     """
     frames = poses.shape[0]
     strips, words = observed.person.shape[1:]
-    work = scratch(strips, words)
+    work = work_arrays(strips, words)
     # a lane moves a pose and a place of one row: each of them has its own here
     block = np.arange(LANES)
     lane_poses = np.empty((LANES, poses.shape[1]))
@@ -116,13 +117,13 @@ def count_pairs(chain, bodies, view, observed, poses, places, pairs, areas):
                     work, lane, lane + 1, bodies.offsets[i], bodies.radii[i], view
                 )
                 drawn[lane] = i
-        outline_poses(
+        stride = outline_poses(
             chain, lane_poses, lane_places, block, view.width, view.height, work
         )
         for lane in range(min(LANES, pairs[1] - first)):
             i = (first + lane) // frames
             k = (first + lane) % frames
-            image, box = fill_pose(lane, work)
+            image, box = fill_pose(lane, stride, work)
             body, overlap = count(image, observed.person[k], observed.valid[k], box)
             areas[i, k, 0] = np.uint64(observed.pixels[k]) - overlap  # SAPSO (3)
             areas[i, k, 1] = body - overlap

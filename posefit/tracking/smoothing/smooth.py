@@ -14,7 +14,7 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import Areas
+from posefit.silhouette.mask import Areas
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import mean_cost
