@@ -273,15 +273,13 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     products = np.zeros((count, PRODUCTS))
     _accumulate_mask_border(contour, scale, cones, discs, products)
     neighbours = np.empty(count, np.int64)
-    points = np.empty((_most_points(cones, contour.step), 4))
     for b in range(count):
         # else one of its discs covers the other
         if cones[b, LENGTH] > abs(cones[b, TAPER]) + TINY:
             others = neighbours[: _write_neighbours(b, discs, neighbours)]
             bones = Bones(cones, discs, others)
-            _accumulate_bone_border(
-                cones[b], contour, scale, bones, points, products[b]
-            )
+            side_points(cones[b], contour, scale, bones, products[b])
+            cap_points(cones[b], contour, scale, bones, products[b])
     expand(products, hessians, gradients)
 
 
@@ -306,83 +304,72 @@ def _accumulate_mask_border(contour, scale, cones, discs, products):
 
 
 @inlined
-def _sides(length, step):
-    """Return into how many pieces a side of a bone's border is divided."""
-    return max(int(length / (2.0 * step)) + 1, 2)
+def _accumulate_point(disc, normal, length, contour, scale, bones, products):
+    """Add the squared distance of a point of a bone's border from the mask's, if it is visible.
 
-
-@inlined
-def _most_points(cones, step):
-    """Return how many points the border of the longest bone has."""
-    longest = 0.0
-    for b in range(cones.shape[0]):
-        longest = max(longest, cones[b, LENGTH])
-    return 2 * (_sides(longest, step) + 1 + 2 * CAP)
-
-
-@inlined
-def _write_pair(points, first, share, along, across, length):
-    """Write a point of the border and its mirror image beyond the bone's axis.
-
-    A point is the share of the bone that it is at, its normal along the axis and across it, and its pixels of border.
+    The point is where the `normal` meets the border of a disc: its share of the bone, its centre and radius. It
+    represents a `length` of border, in pixels.
     """
-    for k in range(2):
-        points[first + k, 0] = share
-        points[first + k, 1] = along
-        points[first + k, 2] = across if k == 0 else -across
-        points[first + k, 3] = length
+    share, u, v, radius = disc
+    nx, ny = normal
+    x = u + radius * nx  # contour (3)
+    y = v + radius * ny
+    known, distance, slope_x, slope_y = field_distance(x, y, contour)
+    if known and visible(x, y, bones):
+        weight = length / (1.0 + (distance / scale) ** 2)  # contour (6)
+        slope = slope_x, slope_y, slope_x * nx + slope_y * ny
+        accumulate(products, share, slope, distance, weight)
 
 
 @inlined
-def side_points(points, sides, length, cosine, sine):
-    """Write the points (n, 4) of both sides of a bone's border, its tangent segments; return how many there are."""
-    for i in range(sides + 1):
-        # the first and the last one have a neighbour on one side only
-        piece = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
-        _write_pair(points, 2 * i, i / sides, cosine, sine, piece)
-    return 2 * (sides + 1)
-
-
-@inlined
-def cap_points(points, first, share, radius, start, arc):
-    """Write points of both arcs of a disc, from the angle `start` to the axis on; return the number after them."""
-    for i in range(CAP):
-        angle = start + arc * (i + 0.5) / CAP
-        along = math.cos(angle)
-        across = math.sin(angle)
-        _write_pair(points, first + 2 * i, share, along, across, radius * arc / CAP)
-    return first + 2 * CAP
-
-
-@inlined
-def _accumulate_bone_border(cone, contour, scale, bones, points, products):
-    """Add the squared distances of a bone's visible border, both sides and both ends, from the mask's."""
+def side_points(cone, contour, scale, bones, products):
+    """Add the squared distances of points of both sides of a bone's border, its tangent segments."""
     length = cone[LENGTH]
     dx = cone[DX] / length
     dy = cone[DY] / length
     cosine = cone[TAPER] / length
     sine = math.sqrt(1.0 - cosine * cosine)
-    tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
-    r0 = cone[R0]
-    r1 = cone[R0] - cone[TAPER]
-    sides = _sides(length, contour.step)
-    count = side_points(points, sides, length, cosine, sine)
-    count = cap_points(points, count, 1.0, r1, 0.0, tilt)
-    count = cap_points(points, count, 0.0, r0, tilt, math.pi - tilt)
-    for i in range(count):
-        share = points[i, 0]
-        along = points[i, 1]
-        across = points[i, 2]
-        nx = along * dx - across * dy
-        ny = along * dy + across * dx
+    pieces = max(int(length / (2.0 * contour.step)) + 1, 2)
+    for i in range(pieces + 1):
+        share = i / pieces
+        # the first and the last point have a neighbour on one side only
+        piece = length * sine / pieces * (0.5 if i in (0, pieces) else 1.0)
         radius = cone[R0] - share * cone[TAPER]
-        x = cone[X0] + share * cone[DX] + radius * nx  # contour (3)
-        y = cone[Y0] + share * cone[DY] + radius * ny
-        known, distance, slope_x, slope_y = field_distance(x, y, contour)
-        if known and visible(x, y, bones):
-            weight = points[i, 3] / (1.0 + (distance / scale) ** 2)  # contour (6)
-            slope = slope_x, slope_y, slope_x * nx + slope_y * ny
-            accumulate(products, share, slope, distance, weight)
+        u = cone[X0] + share * cone[DX]
+        v = cone[Y0] + share * cone[DY]
+        disc = share, u, v, radius
+        for k in range(2):
+            across = sine if k == 0 else -sine
+            normal = cosine * dx - across * dy, cosine * dy + across * dx
+            _accumulate_point(disc, normal, piece, contour, scale, bones, products)
+
+
+@inlined
+def cap_points(cone, contour, scale, bones, products):
+    """Add the squared distances of points of the arcs of both discs of a bone's border."""
+    length = cone[LENGTH]
+    dx = cone[DX] / length
+    dy = cone[DY] / length
+    # from the axis to the normal of the cone's side
+    tilt = math.acos(cone[TAPER] / length)
+    for i in range(2 * CAP):
+        # the last disc, then the first
+        last = i < CAP
+        share = 1.0 if last else 0.0
+        start = 0.0 if last else tilt
+        arc = tilt if last else math.pi - tilt
+        angle = start + arc * ((i % CAP + 0.5) / CAP)
+        along = math.cos(angle)
+        sine = math.sin(angle)
+        radius = cone[R0] - share * cone[TAPER]
+        piece = radius * arc / CAP
+        u = cone[X0] + share * cone[DX]
+        v = cone[Y0] + share * cone[DY]
+        disc = share, u, v, radius
+        for k in range(2):
+            across = sine if k == 0 else -sine
+            normal = along * dx - across * dy, along * dy + across * dx
+            _accumulate_point(disc, normal, piece, contour, scale, bones, products)
 
 
 @inlined
