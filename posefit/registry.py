@@ -39,7 +39,7 @@ Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter", "device"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 # those that `posefit check` has rules for, and `posefit plugins new` a template
 CHECKED_KINDS = tuple(kind for kind in KINDS if kind != "device")
-# instead of the distribution of an optimiser that no plugin registered
+# distribution of an optimiser that no plugin but the program itself has registered
 OWN = "this process"
 COMMAND: Literal["command"] = "command"  # what a plugin may register besides KINDS
 Registrable: TypeAlias = Kind | Literal["command"]

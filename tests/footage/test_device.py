@@ -46,7 +46,7 @@ def absent() -> Twin:
 def planted(monkeypatch: pytest.MonkeyPatch) -> None:
     plugin = registering(("twin", Twin), ("absent", absent), hook="devices")
     needy = registering(
-        ("needy", Twin), hook="devices", needs=("lost", "posefit[lost]")
+        ("needy", Twin), hook="devices", needs=("no_such_library", "posefit[needy]")
     )
     offered = Registry(load([point("twin", plugin), point("needy", needy)]))
     monkeypatch.setattr(devices, "registry", lambda: offered)
@@ -101,7 +101,7 @@ def test_one_line_says_what_a_device_needs() -> None:
             "device must be one of cpu, needy, twin, absent, got 'tpu'",
         ),
         ("absent", ValueError, "device absent needs a twin, got none"),
-        ("needy", ImportError, "device needy needs the library lost"),
+        ("needy", ImportError, "device needy needs the library no_such_library"),
     ):
         for use in (
             lambda name=name: moved_to(silhouette, name),
