@@ -1,15 +1,22 @@
 """posefit recovers a person's 3D motion from silhouettes, by searching.
 
     import posefit
-    track = posefit.track("walk")           # or masks (T, H, W), a folder, a video; the same as `posefit track walk`
-    print(track)                            # its errors, or signs of trust
-    track.joints, track.angles("left_knee_flexion"), track.to_pandas(), track.show(), track.save("out")
+    track = posefit.track("walk")  # or masks (T, H, W), a folder, a video
+    print(track)  # its errors, or signs of trust
+    track.joints, track.angles("left_knee_flexion"), track.to_pandas()
+    track.show()
+    track.save("out")
 
-`fit` takes one mask, `compare` runs a small sweep, `suite` numbers problems for a benchmark. The pieces: `Skeleton`,
-`Body` and `Camera` describe the person and the view; `Silhouette` an observation; `SearchSpace` the box that optimisers
-search; `SilhouetteCost` what a proposal costs; `Problem` counts the evaluations and remembers the best; `minimise` is
-the loop; `SynthesisTracker` follows a sequence. What the author of a plugin imports is in `posefit.plugin`. Each name
-is imported when it is first used.
+`posefit track walk` does the same on the command line. `fit` takes one mask, `compare`
+runs a small sweep, `suite` numbers problems for a benchmark.
+
+These are the parts: `Skeleton`, `Body` and `Camera` describe the person and the view,
+and `Silhouette` is an observation. `SearchSpace` is the box that optimisers search, and
+`SilhouetteCost` is the cost of a proposal. `Problem` counts the evaluations and
+remembers the best, and `minimise` is the loop. `SynthesisTracker` follows a sequence.
+
+`posefit.plugin` has what plugin authors import. Each name is imported when it is first
+used.
 """
 
 from pluggy import HookimplMarker

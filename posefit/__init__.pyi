@@ -1,4 +1,4 @@
-"""The names of `posefit`, each with the module that it is imported from when it is first used."""
+"""The names of `posefit`, each with the module that defines it."""
 
 from pluggy import HookimplMarker
 

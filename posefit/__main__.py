@@ -1,12 +1,15 @@
-"""`python -m posefit` is `posefit`. Ctrl-C ends it with one line, also while Python still imports it."""
+"""`python -m posefit` is `posefit`.
+
+Ctrl-C ends it with one line, also while Python still imports it.
+"""
 
 import sys
 
-STOPPED = 130  # the exit status of a program that Ctrl-C ended
+from posefit.errors import STOPPED
 
 
 def main() -> None:
-    """Run the command that was asked for."""
+    """Run the command."""
     try:
         from posefit.cli import run
     except KeyboardInterrupt:

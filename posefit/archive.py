@@ -1,7 +1,8 @@
-"""Arrays of an .npz or .npy file that may be hostile: the size of each is checked before it is unpacked.
+"""Arrays of .npz and .npy files, whose sizes are checked before they are unpacked.
 
-`numpy.load` unpacks whatever a file asks for. Here the archive's directory and the header of each array are read first:
-nothing is unpacked that has another size than they say, or more bytes than the caller allows.
+`numpy.load` unpacks whatever a file asks for, which a hostile file may abuse. Here the
+archive's directory and the header of each array are read first. An array is not
+unpacked if its size differs from what they say, or exceeds what the caller allows.
 """
 
 import io
@@ -21,23 +22,23 @@ from numpy.typing import NDArray
 from posefit.errors import InputError
 from posefit.reading import check_size, cut, quoted
 
-# bytes of an archive's directory, which has about a hundred for each array
+# bytes of an archive's directory, which has about a hundred per array
 DIRECTORY = 100_000
-HEADER = 10_000  # characters before an array, as NumPy has it
-# bytes of an array that is stored column by column, which has to be unpacked whole
+HEADER = 10_000  # characters of the header that NumPy writes before an array
+# bytes of an array that is stored column by column, and so has to be unpacked whole
 TURNED = 500_000_000
-KINDS = "biufUS"  # booleans, numbers and text: nothing that has to be unpickled
-# as NumPy writes; others unpack a thousand times slower
+KINDS = "biufUS"  # booleans, numbers and text: anything else would be unpickled
+# packed as NumPy does; other ways unpack a thousand times slower
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 class _RefusedError(InputError):
-    """The file holds what is not read; the message says what."""
+    """The file holds something that is not read; the message says what."""
 
 
 @dataclass(frozen=True)
 class Stored:
-    """One array of an archive, which is unpacked by `numpy.asarray`, or row by row by a loop over it."""
+    """One array of an archive. `numpy.asarray` or a loop over its rows unpacks it."""
 
     name: str
     shape: tuple[int, ...]
@@ -46,11 +47,11 @@ class Stored:
     _path: Path = field(repr=False)
     _what: str = field(repr=False)
     _archive: zipfile.ZipFile = field(repr=False)
-    _start: int = field(repr=False)  # bytes before the array
+    _start: int = field(repr=False)  # bytes of the header before the array
 
     @property
     def nbytes(self) -> int:
-        """How many bytes it unpacks to."""
+        """How many bytes the array unpacks to."""
         return math.prod(self.shape) * self.dtype.itemsize
 
     def __array__(self, dtype: object = None, copy: object = None) -> NDArray[Any]:
@@ -64,16 +65,16 @@ class Stored:
         if self.fortran:
             if self.nbytes > TURNED:
                 raise InputError(
-                    f"{self._path}: expected {self.name} row by row, got it column by column"
+                    f"{self._path}: expected {self.name} row by row, "
+                    "got it column by column"
                 )
             yield from np.asarray(self)
             return
         size = math.prod(self.shape[1:]) * self.dtype.itemsize
         with self._opened() as member:
             for _ in range(self.shape[0]):
-                yield np.frombuffer(_exactly(member, size), self.dtype).reshape(
-                    self.shape[1:]
-                )
+                row = np.frombuffer(_exactly(member, size), self.dtype)
+                yield row.reshape(self.shape[1:])
             _exactly(member, 0)
 
     @contextmanager
@@ -88,7 +89,11 @@ class Stored:
 
 
 def mapped(path: Path) -> NDArray[Any]:
-    """Return the array of an .npy file, read from the disk row by row. Raises InputError where it is none."""
+    """Return the array of an .npy file, read from the disk row by row.
+
+    Raises:
+        InputError: the file is not a valid .npy file.
+    """
     check_size(path, sys.maxsize)
     with _as_input_error(f"{path}: expected an .npy file with an array"):
         with path.open("rb") as file:
@@ -100,12 +105,18 @@ def mapped(path: Path) -> NDArray[Any]:
 def archived(
     path: Path, names: Sequence[str], what: str, packed: int, *, single: bool = False
 ) -> Iterator[dict[str, Stored]]:
-    """Yield those of `names` that an .npz file of at most `packed` bytes has; none of them is unpacked yet.
+    """Yield the arrays of an .npz file by name, not unpacked yet.
 
-    With `single` the only array of a file is the first of the names, whatever its own is.
+    Args:
+        path: the file.
+        names: the arrays to look for; others are ignored.
+        what: description of the expected arrays, for messages.
+        packed: most bytes that the file may have.
+        single: if the file has only one array, take it for the first of the names.
 
-    Raises InputError, also while they are read, where the file is damaged or larger; `what` describes the expected
-    arrays in messages.
+    Raises:
+        InputError: the file is damaged or too large. It may also be raised when an
+            array is unpacked.
     """
     check_size(path, packed)
     with ExitStack() as stack:
@@ -124,14 +135,16 @@ def archived(
                 and len(members) == 1
                 and (only := members.pop()).endswith(".npy")
             ):
-                arrays = {
-                    names[0]: _stored(path, what, archive, only.removesuffix(".npy"))
-                }
+                only = only.removesuffix(".npy")
+                arrays = {names[0]: _stored(path, what, archive, only)}
         yield arrays
 
 
 class _ArchiveFile(io.FileIO):
-    """A file of which zipfile reads no more than `longest` bytes at once: its directory, which it reads whole."""
+    """A file from which no more than `longest` bytes can be read at once.
+
+    zipfile reads an archive's directory whole, however long it is.
+    """
 
     longest = DIRECTORY
 
@@ -146,15 +159,18 @@ class _ArchiveFile(io.FileIO):
 
 @contextmanager
 def _as_input_error(expected: str) -> Iterator[None]:
-    """Raise whatever a damaged archive or array raises as an InputError, which begins with what was expected."""
+    """Turn any error of a damaged archive or array into an InputError.
+
+    Its message begins with what was expected.
+    """
     try:
         yield
-    # whatever zipfile and NumPy trip over, the file is to blame
+    # whatever zipfile and NumPy stumble over, the file is the cause
     except Exception as error:
         text = " ".join(str(error).split()) or type(error).__name__
-        came = (
-            text if isinstance(error, _RefusedError) else f"a damaged one: {cut(text)}"
-        )
+        came = f"a damaged one: {cut(text)}"
+        if isinstance(error, _RefusedError):
+            came = text
         raise InputError(f"{expected}, got {came}") from None
 
 
@@ -170,13 +186,20 @@ def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Store
 def _header(
     file: IO[bytes], name: str, size: int
 ) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
-    """Return shape, order and type of the array in a file of `size` bytes, and where its values begin."""
+    """Return an array's shape, order and type, and where its values begin.
+
+    Args:
+        file: the array's file.
+        name: of the array, for messages.
+        size: bytes of the file.
+    """
     version = np.lib.format.read_magic(file)
-    # the others are for records of very many fields, and their headers of any length
+    # other versions are for records of very many fields, with headers of any length
     if version != (1, 0):
         raise _RefusedError(f"{name} in NumPy's format {version}")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about headers as Python 2 wrote them
+        # about headers that Python 2 wrote
+        warnings.simplefilter("ignore")
         shape, fortran, dtype = np.lib.format.read_array_header_1_0(file, HEADER)
     start = file.tell()
     if dtype.kind not in KINDS or not dtype.itemsize:
@@ -190,12 +213,13 @@ def _header(
 
 
 def _exactly(member: IO[bytes], count: int) -> bytes:
-    """Return the next bytes; for none, see that it is the end, where the checksum is compared."""
+    """Return the next `count` bytes. For 0, check that it is the end.
+
+    At the end zipfile compares the checksum.
+    """
     content = member.read(count or 1)
     if len(content) != count:
-        raise EOFError(
-            "an array that ends too early"
-            if count
-            else "an array that is longer than it says"
-        )
+        if not count:
+            raise EOFError("an array that is longer than it says")
+        raise EOFError("an array that ends too early")
     return content

@@ -1,16 +1,18 @@
-"""What a mistake of the user raises, as opposed to a fault of the program, and the warning that a plugin is broken."""
+"""Errors of a user's mistakes, as opposed to faults of the program, and a warning."""
 
 import re
 import warnings
 from typing import Any
 
-_LONG = re.compile(r"\S{300,}")  # longer than any one name of a file
+STOPPED = 130  # exit status of a program that Ctrl-C ended
+_LONG = re.compile(r"\S{300,}")  # longer than the name of a file may be
 
 
 def printable(text: str) -> str:
-    r"""Return a text on one line: line breaks become \n, what steers a terminal is written out, too.
+    r"""Return a text on one line, without control characters.
 
-    The middle of what is too long to be a name is left out, so that 80 characters remain.
+    Line breaks become \n, and characters that control a terminal are written out. A
+    word that is too long for a name loses its middle, so that 80 characters remain.
     """
     text = _LONG.sub(lambda word: f"{word[0][:38]}...{word[0][-39:]}", text)
     if text.isprintable():
@@ -22,25 +24,30 @@ def printable(text: str) -> str:
 
 
 class InputError(ValueError):
-    """An argument, a setting or a file is not what it must be; the message names what was expected and what came.
+    """An argument, a setting or a file is invalid.
 
-    The command line shows it as one line; any other ValueError is a fault of the program and shows its traceback.
-    Names from outside may be in it: it is `printable`.
+    The message says what was expected and what came. The command line shows it as one
+    line; any other ValueError is a fault of the program and shows its traceback. The
+    message may contain names from outside, and so it is made `printable`.
     """
 
     def __init__(self, message: object = "") -> None:
         super().__init__(printable(str(message)))
 
 
+class NoPersonError(InputError):
+    """Masks show no person, or not the one who is meant; another segmenter may find them."""
+
+
 class PluginWarning(UserWarning):
-    """A plugin is left out; the message, on one line, names it and says why."""
+    """A plugin is left out. The message, on one line, names it and says why."""
 
     def __init__(self, message: object = "") -> None:
         super().__init__(printable(" ".join(str(message).split())))
 
 
 def warn_in_one_line() -> None:
-    """Have this process show a `PluginWarning` as one line, without the place in posefit where it was given."""
+    """Show each `PluginWarning` as one line, without the place in the source."""
     usual = warnings.formatwarning
 
     def formatted(message: Any, category: type[Warning], *place: Any) -> str:

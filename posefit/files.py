@@ -1,8 +1,9 @@
 """Folders and files that appear whole under their name, or not at all.
 
-Files are written beside their place, under a random name that begins with a dot. They are created exclusively, so that
-no other file or link is written through; and nothing is ever removed but what the call itself has made, or what carries
-the mark of an earlier one that has ended.
+Files are first written in the same folder, under a random name that begins with a dot.
+They are created exclusively, so that nothing is written through another file or link.
+A call removes only what it has made, or what carries the mark of an earlier call that
+has ended.
 """
 
 import errno
@@ -20,20 +21,20 @@ from typing import Any, Self
 from posefit.errors import InputError
 from posefit.reading import cut, parsed_json, read_text
 
-MARK = "unfinished.json"  # in a folder that is being written
+MARK = "unfinished.json"  # file in a folder that is being written
 MAX_MARK_BYTES = 10_000_000
 # errors of a rename to a name that is no longer free
 _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
 
 
 def check_new(path: str | Path) -> None:
-    """Raise InputError where `path` exists, be it a link that leads nowhere."""
+    """Raise InputError if `path` exists, even as a link that leads nowhere."""
     if os.path.lexists(path):
         raise _exists(path)
 
 
 def check_place(path: str | Path) -> None:
-    """Raise InputError where `path` is in no folder, or in one that cannot be written to."""
+    """Raise InputError if the folder of `path` is missing or cannot be written to."""
     parent = Path(path).resolve().parent
     if not parent.is_dir():
         raise InputError(f"cannot write to {path}: {parent} is not a folder")
@@ -42,16 +43,19 @@ def check_place(path: str | Path) -> None:
 
 
 def check_free(path: str | Path | None) -> None:
-    """Raise InputError as `check_new` and `check_place` do, where there is a path."""
+    """Raise InputError like `check_new` and `check_place`; None is always free."""
     if path is not None:
         check_new(path)
         check_place(path)
 
 
 def opencv_name(path: str | Path) -> str:
-    """Return a file's absolute name, as OpenCV needs it: a relative one with a colon would be an address.
+    """Return a file's absolute name for OpenCV.
 
-    Raises InputError where it is no UTF-8, with which OpenCV would end the process.
+    OpenCV would take a relative name with a colon for an address.
+
+    Raises:
+        InputError: the name is not UTF-8. OpenCV would end the process.
     """
     name = os.path.abspath(path)
     try:
@@ -64,32 +68,47 @@ def opencv_name(path: str | Path) -> str:
 
 
 def new_folder(path: str | Path) -> AbstractContextManager[Path]:
-    """Yield an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
+    """Yield an empty folder to write to. On success it takes the name `path`.
 
-    Raises InputError where `path` exists or cannot be written, a full disk included.
+    If the body fails, nothing is left.
+
+    Raises:
+        InputError: `path` exists, or cannot be written; the disk may be full.
     """
     return _built(Path(path), check_new, _created_folder, Path.rename)
 
 
 def new_file(path: str | Path) -> AbstractContextManager[Path]:
-    """Yield an empty file to write, which becomes `path` where nothing fails; else nothing is left.
+    """Yield an empty file to write, with the suffix of `path`. It then becomes `path`.
 
-    It has the suffix of `path`. Raises InputError where `path` exists or cannot be written, a full disk included.
+    If the body fails, nothing is left.
+
+    Raises:
+        InputError: `path` exists, or cannot be written; the disk may be full.
     """
     return _built(Path(path), check_new, _created, _named)
 
 
 def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]:
-    """Yield an empty file to write, which takes the place of an earlier one where nothing fails; else that one stays.
+    """Yield an empty file to write. On success it replaces an earlier file.
 
-    Only a file that begins with `mark` is replaced, and no link. Raises InputError where something else has the name,
-    or it cannot be written, a full disk included.
+    If the body fails, the earlier file stays.
+
+    Args:
+        path: the file.
+        mark: the beginning of an earlier file. Any other file, and a link, is not
+            replaced.
+
+    Raises:
+        InputError: something else has the name, or it cannot be written; the disk may
+            be full.
     """
 
     def check(target: Path) -> None:
         if not replaceable(target, mark):
             raise InputError(
-                f"{target}: expected a new name or an earlier file of this kind, got something else"
+                f"{target}: expected a new name or an earlier file of this kind, "
+                "got something else"
             )
 
     return _built(Path(path), check, _created, Path.replace)
@@ -102,7 +121,10 @@ def _built(
     make: Callable[[Path], Path],
     name: Callable[[Path, Path], Any],
 ) -> Iterator[Path]:
-    """Yield what `make` creates beside a target, and give it its name; whatever fails, nothing of it is left."""
+    """Yield what `make` creates next to a target, then give it the target's name.
+
+    If anything fails, nothing of it is left.
+    """
     try:
         check(target)
         building = make(target)
@@ -110,16 +132,22 @@ def _built(
             yield building
             try:
                 name(building, target)
-            except OSError as error:  # another writer's has come meanwhile
-                raise _exists(target) if error.errno in _TAKEN else error from None
+            except OSError as error:
+                # another writer may have taken the name meanwhile
+                if error.errno in _TAKEN:
+                    raise _exists(target) from None
+                raise
     except OSError as error:
         raise InputError(
-            f"{target}: expected a place to write to, got {error.strerror or error}"
+            f"cannot write to {target}: {error.strerror or error}"
         ) from error
 
 
 def replaceable(path: str | Path, mark: bytes) -> bool:
-    """Return whether nothing has a name, or a file that begins with `mark`, which is no link."""
+    """Return whether a name is free, or is that of a file that begins with `mark`.
+
+    A link is never replaceable.
+    """
     target = Path(path)
     if not os.path.lexists(target):
         return True
@@ -130,10 +158,15 @@ def replaceable(path: str | Path, mark: bytes) -> bool:
 
 
 class Unfinished:
-    """A hidden folder beside its target, which carries a mark while it is written, and after that was interrupted.
+    """A hidden folder next to its target, with a mark while it is unfinished.
 
-    The mark is a file that its writer holds a lock on, so that others see whether it is in use. Where there are no
-    locks, it seems not to be.
+    It keeps the mark if it is interrupted. The mark is a file that its writer locks, so
+    that others see whether the folder is in use. On systems without locks it never
+    seems to be in use.
+
+    Attributes:
+        path: the folder.
+        info: content of the mark.
     """
 
     def __init__(
@@ -145,15 +178,18 @@ class Unfinished:
         made: Sequence[Path] = (),
     ) -> None:
         self.path = path
-        # folders above it that are as new as it is
-        self._made = made
+        self._made = made  # parent folders that were created with it
         self.info = info
         self._target = target
         self._file = file
 
     @classmethod
     def begin(cls, target: Path, info: Mapping[str, Any]) -> Self:
-        """Return a new folder, whose mark holds `info`. Raises OSError where there is no room."""
+        """Return a new folder with a mark that holds `info`.
+
+        Raises:
+            OSError: the disk is full, or the folder cannot be created.
+        """
         made = made_folders(target.parent)
         path = _created_folder(target)
         with _undone(path):
@@ -166,7 +202,7 @@ class Unfinished:
 
     @classmethod
     def interrupted(cls, target: Path) -> list[Self]:
-        """Return the folders of a target that carry a mark and are not in use, the latest first."""
+        """Return the interrupted folders of a target, the latest first."""
         folders = []
         for entry in target.parent.glob(f".{glob.escape(target.name)}.*/{MARK}"):
             if entry.is_symlink() or entry.parent.is_symlink():
@@ -174,41 +210,46 @@ class Unfinished:
             with suppress(OSError, ValueError, KeyError, TypeError):
                 modified = entry.stat().st_mtime
                 file = os.open(entry, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
-                mark = (
-                    parsed_json(read_text(entry, MAX_MARK_BYTES))
-                    if lock(file)
-                    else None
-                )
+                mark = None
+                if lock(file):
+                    mark = parsed_json(read_text(entry, MAX_MARK_BYTES))
                 if (
                     mark is not None
                     and mark["target"] == target.name
                     and isinstance(mark["info"], dict)
                 ):
-                    folders.append(
-                        (modified, cls(target, entry.parent, file, mark["info"]))
-                    )
+                    folder = cls(target, entry.parent, file, mark["info"])
+                    folders.append((modified, folder))
                 else:
                     os.close(file)
-        return [
-            folder for _, folder in sorted(folders, key=itemgetter(0), reverse=True)
-        ]
+        latest_first = sorted(folders, key=itemgetter(0), reverse=True)
+        return [folder for _, folder in latest_first]
 
     def close(self) -> None:
-        """Release the folder, so that it can be continued; a second call does nothing."""
+        """Release the folder, so that it can be continued. May be called twice."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove the entries of these names, and the folder where nothing else is in it, with those made for it."""
+        """Remove the files with these names, and the folder if it is then empty.
+
+        Parent folders that were created with it are removed, too, if they are empty.
+        """
         emptied(self.path, [*names, MARK])
         remove_empty(self._made)
         self.close()
 
     def finish(self, names: Iterable[str], replace: bool) -> None:
-        """Give the folder its target's name; with `replace` it may be an earlier one's, with files of these names.
+        """Give the folder its target's name.
 
-        Raises OSError where that one holds anything else, or a folder of that name has appeared meanwhile.
+        Args:
+            names: names of the result's files.
+            replace: whether to replace an earlier folder that holds only such files.
+
+        Raises:
+            OSError: the earlier folder holds anything else, or a folder with the
+                target's name has appeared meanwhile.
         """
         names = [*names, MARK]
         aside = None
@@ -239,14 +280,14 @@ def made_folders(folder: Path) -> list[Path]:
 
 
 def remove_empty(folders: Iterable[Path]) -> None:
-    """Remove those of some folders that are empty."""
+    """Remove the folders that are empty."""
     for folder in folders:
         with suppress(OSError):
             folder.rmdir()
 
 
 def other_entries(folder: Path, names: Iterable[str]) -> list[str]:
-    """Return the entries of a folder that are no plain files of these names, sorted."""
+    """Return the entries of a folder that are not plain files with these names."""
     known = {*names, MARK}
     return sorted(
         entry.name
@@ -256,7 +297,7 @@ def other_entries(folder: Path, names: Iterable[str]) -> list[str]:
 
 
 def emptied(folder: Path, names: Iterable[str]) -> None:
-    """Remove the plain files of these names from a folder, and the folder once it is empty."""
+    """Remove plain files by name from a folder, and the folder if it is then empty."""
     with suppress(OSError):
         for path in (folder / name for name in names):
             if path.is_file() and not path.is_symlink():
@@ -265,7 +306,7 @@ def emptied(folder: Path, names: Iterable[str]) -> None:
 
 
 def lock(file: int) -> bool:
-    """Lock a file; return False where another process has."""
+    """Lock a file, and return False if another process has locked it."""
     try:
         import fcntl
     except ImportError:  # an operating system without it
@@ -281,7 +322,7 @@ def lock(file: int) -> bool:
 
 @contextmanager
 def _undone(path: Path) -> Iterator[None]:
-    """Remove a file or a folder where the body fails."""
+    """Remove a file or a folder if the body fails."""
     try:
         yield
     except BaseException:
@@ -305,17 +346,23 @@ def _created_folder(target: Path) -> Path:
 
 
 def _created(target: Path) -> Path:
-    """Return an empty file beside the target, created exclusively, so that it is no link and no other's file."""
+    """Create an empty file next to the target, and return it.
+
+    It is created exclusively, so that it is neither a link nor somebody else's file.
+    """
     building = _beside(target)
     os.close(os.open(building, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     return building
 
 
 def _named(building: Path, target: Path) -> None:
-    """Give a file its name where that is free. Raises FileExistsError where it is not.
+    """Give a file its name.
 
-    With a hard link the file appears whole. A file system without links lets one writer create the name, which is
-    empty until its content replaces it.
+    With a hard link the file appears whole. On a file system without links one writer
+    creates the name with an empty file, which the content then replaces.
+
+    Raises:
+        FileExistsError: the name is not free.
     """
     try:
         os.link(building, target)

@@ -1,7 +1,8 @@
-"""Which type hints a setting may have, whether a value fits one, and how one is shown.
+"""Type hints of settings: which are allowed, whether a value fits, how one is shown.
 
-A setting may be an int, a float, a bool, a str or None; one of several by `Literal` or a union; a tuple or a list of
-those; or Any. `Annotated` adds nothing to the type that it is about.
+A setting may be an int, a float, a bool, a str or None; one of several by `Literal` or
+a union; a tuple or a list of these; or Any. `Annotated` is ignored: the type inside it
+counts.
 """
 
 import inspect
@@ -12,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-NONE = inspect.Parameter.empty  # the hint of a parameter that has none
+NONE = inspect.Parameter.empty  # the hint of a parameter without one
 KNOWN = "int, float, bool, str, None, Literal, a union, a tuple or a list of these"
 _ANYTHING = (NONE, Any, object)
 _SEQUENCES = (tuple, list, Sequence)
@@ -23,28 +24,36 @@ class UnfitError(ValueError):
 
 
 def resolved(function: Callable[..., Any], hint: Any) -> Any:
-    """Return a hint of a function's parameter, or of a class's attribute, as a type where it is written as text.
+    """Return a hint as a type, even if it is written as text.
 
-    A module with postponed annotations has all of them as text. What cannot be resolved stays a text.
+    In a module with postponed annotations all hints are texts. A text that cannot be
+    evaluated is returned as it is.
+
+    Args:
+        function: the function or class that the hint belongs to.
+        hint: the hint.
     """
     if not isinstance(hint, str):
         return hint
     for names in _namespaces(function):
         try:
             return eval(hint, dict(names))
-        except Exception:  # a name that is not here, or no expression
+        except Exception:  # an unknown name, or not an expression
             continue
     return hint
 
 
 def _namespaces(function: Any) -> list[Mapping[str, Any]]:
-    """Return where the names in a function's hints are looked up: the globals of what it wraps, and its module's."""
+    """Return the namespaces of a function's hints.
+
+    They are the globals of what it wraps, and those of its module.
+    """
     while isinstance(function, partial):
         function = function.func
     function = inspect.unwrap(function)
     made = [function]
     if isinstance(function, type):
-        # whichever of its bases has the constructor
+        # the constructor may be a base's, from another module
         made = [getattr(function, name) for name in ("__init__", "__new__")]
     elif not hasattr(function, "__globals__"):
         made = [type(function).__call__]
@@ -71,20 +80,20 @@ def checkable(hint: Any) -> bool:
 
 
 def fitted(hint: Any, value: Any) -> Any:
-    """Return a value as a hint has it: a list as the tuple that it asks for, and the other way round.
+    """Return a value as a hint demands it: a list as a tuple, or the other way round.
 
-    Raises UnfitError where the value does not fit, or the hint is not checkable.
+    Raises:
+        UnfitError: the value does not fit, or the hint is not checkable.
     """
     hint = _plain(hint)
     origin = get_origin(hint)
     if hint in _ANYTHING:
         return value
     if origin is Literal:
-        # True equals 1, and is not meant by it
-        if any(
-            type(choice) is type(value) and choice == value for choice in get_args(hint)
-        ):
-            return value
+        for choice in get_args(hint):
+            # True equals 1, but does not mean it
+            if type(choice) is type(value) and choice == value:
+                return value
     elif origin in (Union, types.UnionType):
         for member in get_args(hint):
             try:
@@ -100,9 +109,12 @@ def fitted(hint: Any, value: Any) -> Any:
 
 
 def read(hint: Any, text: str) -> Any:
-    """Return what a text means to a hint: `3,4.5` are two numbers to a tuple, and a text to a str.
+    """Return what a text means to a hint.
 
-    Raises UnfitError where it means nothing.
+    For a tuple `3,4.5` is two numbers, for a str it is a text.
+
+    Raises:
+        UnfitError: the text has no meaning.
     """
     for value in _values(text):
         try:
@@ -122,7 +134,7 @@ def read(hint: Any, text: str) -> Any:
 
 
 def _values(text: str) -> list[Any]:
-    """Return everything that a text may mean, the most special first."""
+    """Return everything that a text may mean, the most specific first."""
     words: dict[str, Any] = {"true": True, "false": False, "none": None}
     values: list[Any] = []
     if text.lower() in words:
@@ -141,7 +153,10 @@ def _values(text: str) -> list[Any]:
 
 
 def _is_one(hint: Any, value: Any) -> bool:
-    """Return whether a value is of one of the plain types. A truth is no number, and a whole number is a float."""
+    """Return whether a value is of a plain type.
+
+    A bool is not a number, and an int is also a float.
+    """
     if hint is None or hint is type(None):
         return value is None
     if hint is bool or hint is str:
@@ -155,7 +170,10 @@ def _is_one(hint: Any, value: Any) -> bool:
 def _fitted_members(
     hint: Any, values: Sequence[Any], fit: Callable[[Any, Any], Any]
 ) -> Any:
-    """Return values as the members of a tuple, a list or a sequence, each as `fit` returns it."""
+    """Return values as the members of a tuple, a list or a sequence.
+
+    `fit` converts each value.
+    """
     members = _members(hint)
     if _has_length(hint):
         if len(values) != len(members):
@@ -169,11 +187,13 @@ def _fitted_members(
 
 
 def _members(hint: Any) -> tuple[Any, ...]:
-    """Return the hints of the members of a tuple, a list or a sequence: one, or as many as a tuple's length."""
+    """Return the hints of a sequence's members: one, or one per member of a tuple."""
     if hint in _SEQUENCES:
         return (Any,)
     members = get_args(hint)
-    return members if _has_length(hint) else members[:1]
+    if _has_length(hint):
+        return members
+    return members[:1]  # without the Ellipsis of tuple[int, ...]
 
 
 def _has_length(hint: Any) -> bool:
@@ -181,7 +201,7 @@ def _has_length(hint: Any) -> bool:
 
 
 def _plain(hint: Any) -> Any:
-    """Return what `Annotated` is about, and what the name of a type stands for."""
+    """Return the type inside `Annotated` and behind a type alias."""
     while True:
         if get_origin(hint) is Annotated:
             hint = get_args(hint)[0]
@@ -192,7 +212,7 @@ def _plain(hint: Any) -> Any:
 
 
 def choices_of(hint: Any) -> tuple[Any, ...]:
-    """Return what a hint lists as choices: of a `Literal`, or of a union of such and None; else nothing."""
+    """Return the choices of a `Literal`, or of a union of such and None; else ()."""
     hint = _plain(hint)
     if get_origin(hint) is Literal:
         return get_args(hint)
@@ -210,7 +230,10 @@ def choices_of(hint: Any) -> tuple[Any, ...]:
 
 
 def shown(hint: Any, default: Any = None) -> str:
-    """Return a hint as it is shown: `float`, or the choices there are. One that is missing is the default's type."""
+    """Return a hint in the form for users: `float`, or the choices.
+
+    If there is no hint, the default's type is shown.
+    """
     hint = _plain(hint)
     if hint is NONE:
         return "any" if default is None or default is NONE else type(default).__name__

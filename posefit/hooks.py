@@ -1,4 +1,7 @@
-"""The hooks of a plugin: a module named in the entry-point group `posefit`, which registers what it offers.
+"""The hooks of a plugin.
+
+A plugin is a module that is named in the entry-point group `posefit`. Its hooks
+register what it offers.
 
     from posefit.plugin import hookimpl
 
@@ -6,8 +9,9 @@
     def posefit_register_optimisers(register):
         register("spiral", Spiral)
 
-posefit imports the module of every plugin for its commands, even for `posefit --help`, and calls the other hooks when a
-method is needed. So heavy imports belong inside the hooks and what they register.
+posefit imports the module of every plugin to find commands, even for `posefit --help`.
+It calls the other hooks when it needs a method. So heavy imports belong inside the
+hooks and inside what they register.
 """
 
 from collections.abc import Callable
@@ -26,12 +30,13 @@ if TYPE_CHECKING:
 PROJECT = "posefit"
 hookspec = HookspecMarker(PROJECT)
 
-# The module a factory imports when it is called, and what to install where it is absent: ("cma", "posefit[pycma]").
+# the module that a factory imports when it is called, and what to install if it is
+# missing: ("cma", "posefit[pycma]")
 Needs = tuple[str, str]
 
 
 class RegisterOptimiser(Protocol):
-    """Registers an optimiser: its name, its factory, what becomes of it in the next frame, and what it needs."""
+    """Registers an optimiser."""
 
     def __call__(
         self,
@@ -41,14 +46,18 @@ class RegisterOptimiser(Protocol):
         next_frame: "NextFrame" = "start",
         needs: Needs | None = None,
     ) -> None:
-        """Register an optimiser."""
+        """Register an optimiser.
+
+        Args:
+            name: how users name it.
+            factory: takes (space, rng) and keyword-only settings.
+            next_frame: what becomes of it in the next frame.
+            needs: a module that the factory imports, and what to install for it.
+        """
 
 
 class RegisterTracker(Protocol):
-    """Registers a tracker: its name, its factory, whether it looks ahead, and what it needs.
-
-    One that looks ahead takes several observations before it yields the frame of the first.
-    """
+    """Registers a tracker."""
 
     def __call__(
         self,
@@ -58,32 +67,49 @@ class RegisterTracker(Protocol):
         looks_ahead: bool = False,
         needs: Needs | None = None,
     ) -> None:
-        """Register a tracker."""
+        """Register a tracker.
+
+        Args:
+            name: how users name it.
+            factory: takes (task) and keyword-only settings.
+            looks_ahead: whether it takes several observations before it yields the
+                frame of the first.
+            needs: a module that the factory imports, and what to install for it.
+        """
 
 
 class RegisterPrior(Protocol):
-    """Registers a prior: its name, its factory and what it needs."""
+    """Registers a prior."""
 
     def __call__(
         self, name: str, factory: "PriorFactory", *, needs: Needs | None = None
     ) -> None:
-        """Register a prior."""
+        """Register a prior.
+
+        Args:
+            name: how users name it.
+            factory: takes keyword-only settings.
+            needs: a module that the factory imports, and what to install for it.
+        """
 
 
 class RegisterStart(Protocol):
-    """Registers what guesses first poses: its name, its factory and what it needs."""
+    """Registers a start, which guesses first poses."""
 
     def __call__(
         self, name: str, factory: "InitialiserFactory", *, needs: Needs | None = None
     ) -> None:
-        """Register a start."""
+        """Register a start.
+
+        Args:
+            name: how users name it.
+            factory: takes (task) and keyword-only settings.
+            needs: a module that the factory imports, and what to install for it.
+        """
 
 
 class RegisterSegmenter(Protocol):
-    """Registers a segmenter: its name, its factory, whether it needs a still background, and what else it needs.
-
-    The masks of one that needs a still background are judged by what moves outside them.
-    """
+    """Registers a segmenter."""
 
     def __call__(
         self,
@@ -93,7 +119,15 @@ class RegisterSegmenter(Protocol):
         still_background: bool = True,
         needs: Needs | None = None,
     ) -> None:
-        """Register a segmenter."""
+        """Register a segmenter.
+
+        Args:
+            name: how users name it.
+            factory: takes (film) and keyword-only settings.
+            still_background: whether it needs a still background. If so, motion outside
+                its masks counts against them.
+            needs: a module that the factory imports, and what to install for it.
+        """
 
 
 RegisterCommand: TypeAlias = Callable[["click.Command"], None]
@@ -101,32 +135,48 @@ RegisterCommand: TypeAlias = Callable[["click.Command"], None]
 
 @hookspec
 def posefit_register_optimisers(register: RegisterOptimiser) -> Any:
-    """Call `register(name, factory)` for each optimiser; see `posefit.fitting.optimiser`."""
+    """Call `register(name, factory)` for each optimiser.
+
+    See `posefit.fitting.optimiser`.
+    """
 
 
 @hookspec
 def posefit_register_priors(register: RegisterPrior) -> Any:
-    """Call `register(name, factory)` for each prior; see `posefit.fitting.prior`."""
+    """Call `register(name, factory)` for each prior.
+
+    See `posefit.fitting.prior`.
+    """
 
 
 @hookspec
 def posefit_register_trackers(register: RegisterTracker) -> Any:
-    """Call `register(name, factory)` for each tracker; see `posefit.fitting.tracker`."""
+    """Call `register(name, factory)` for each tracker.
+
+    See `posefit.fitting.tracker`.
+    """
 
 
 @hookspec
 def posefit_register_starts(register: RegisterStart) -> Any:
-    """Call `register(name, factory)` for each way to guess a first pose; see `posefit.fitting.start`."""
+    """Call `register(name, factory)` for each start.
+
+    See `posefit.fitting.start`.
+    """
 
 
 @hookspec
 def posefit_register_segmenters(register: RegisterSegmenter) -> Any:
-    """Call `register(name, factory)` for each segmenter; see `posefit.silhouette.foreground`."""
+    """Call `register(name, factory)` for each segmenter.
+
+    See `posefit.silhouette.foreground`.
+    """
 
 
 @hookspec
 def posefit_register_commands(register: RegisterCommand) -> Any:
-    """Call `register(command)` for each command, a `click.Command` or a group of them.
+    """Call `register(command)` for each command.
 
-    A ValueError, an ImportError or a missing file becomes one line for the user, with exit status 2.
+    A command is a `click.Command` or a group of commands. A click.UsageError, an
+    ImportError or a missing file becomes one line for the user, with exit status 2.
     """

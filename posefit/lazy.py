@@ -1,4 +1,7 @@
-"""Names of a module that are imported when they are first used; its stub declares them, SPEC 1 of Scientific Python."""
+"""Imports a module's names when they are first used; a stub declares them.
+
+SPEC 1 of Scientific Python describes the pattern.
+"""
 
 import re
 import sys
@@ -13,13 +16,14 @@ _IMPORT = re.compile(r"^from (posefit\.\S+) import (\w+)", re.MULTILINE)
 def names_of_stub(
     module: str, file: str
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Return `__getattr__`, `__dir__` and the names of a module in a file, beside which its stub stands."""
-    homes = {
-        name: home
-        for home, name in _IMPORT.findall(
-            Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
-        )
-    }
+    """Return `__getattr__`, `__dir__` and the names of a module.
+
+    Args:
+        module: the module's name.
+        file: its file. A stub in the same folder declares the names.
+    """
+    stub = Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
+    homes = {name: home for home, name in _IMPORT.findall(stub)}
 
     def value_of(name: str) -> Any:
         if name not in homes:

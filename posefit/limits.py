@@ -1,4 +1,4 @@
-"""How long a call into a plugin may take, how much memory there may be, and in which range numbers must lie."""
+"""Limits: time of a call into a plugin, memory, and the ranges of numbers."""
 
 import os
 import signal
@@ -14,20 +14,20 @@ from types import FrameType
 from posefit.errors import InputError
 from posefit.reading import quoted
 
-SECONDS = 1e-3, 1e8  # of a limit: what timers of operating systems take
+SECONDS = 1e-3, 1e8  # range of a time limit that the timers of operating systems take
 GIGABYTES = 1e-3, 1e6
-RATES = 1e-3, 1e6  # frames a second
-HEIGHTS = 0.3, 2.8  # metres that a person may stand
-AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
+RATES = 1e-3, 1e6  # frames per second
+HEIGHTS = 0.3, 2.8  # stature of a person, metres
+AGAIN = 1.0  # seconds between repeated interrupts, for code that swallowed the first
 PARENT_POLL_SECONDS = 0.5
-# seconds, for a timer that should have ended meanwhile; 0 would switch it off
+# seconds left of a timer that should have ended meanwhile; 0 would switch it off
 SOON = 1e-6
-# seconds until an alarm that came before the body comes again
+# seconds until an alarm that came too early, before the body, is repeated
 EARLY = 1e-3
-# the variable of `check_decoded`, and its default
+# environment variable that `check_decoded` reads, and its default
 DECODED = "POSEFIT_DECODED_GIGABYTES"
 DECODED_GIGABYTES = 4.0
-# of Linux: the memory that a container may have, in control groups of version 2 and 1
+# files of Linux with a container's memory limit, by version 2 and 1 of control groups
 _CONTAINER = (
     Path("/sys/fs/cgroup/memory.max"),
     Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"),
@@ -35,15 +35,19 @@ _CONTAINER = (
 
 
 class _OvertimeError(BaseException):
-    """Ends what takes too long; no Exception, which it might swallow."""
+    """Ends a call that takes too long.
+
+    It is not an Exception, because the call might swallow one.
+    """
 
 
-class timed:  # noqa: N801, a context as those of contextlib
-    """Raise TimeoutError in the body of a `with` once it has run for `limit` seconds; None is no limit.
+class timed:  # noqa: N801, named like the context managers of contextlib
+    """Raise TimeoutError if the body of a `with` runs longer than `limit` seconds.
 
-    That needs an operating system with timers, and a body that runs Python in the main thread: elsewhere, and inside a
-    call of compiled code that does not return, there is no limit. An earlier limit of a caller's holds as well, and
-    goes on afterwards.
+    None is no limit. A limit needs an operating system with timers, and a body that
+    runs Python in the main thread. Elsewhere, and inside a call of compiled code that
+    does not return, there is no limit. An earlier limit of a caller holds as well, and
+    continues afterwards.
     """
 
     def __init__(self, limit: float | None) -> None:
@@ -66,7 +70,11 @@ class timed:  # noqa: N801, a context as those of contextlib
         signal.setitimer(signal.ITIMER_REAL, self._limit, AGAIN)
 
     def _stop(self, _: int, frame: FrameType | None) -> None:
-        """End the body. An alarm may come while it is entered or left, and would then end the caller instead."""
+        """End the body.
+
+        An alarm may come while the body is entered or left. It would then end the
+        caller instead, so it is repeated a little later.
+        """
         own = [method.__code__ for method in (timed.__enter__, timed.__exit__)]
         outside = False
         while frame is not None and not outside:
@@ -90,16 +98,16 @@ class timed:  # noqa: N801, a context as those of contextlib
             left = callers - (time.monotonic() - self._began)
             signal.setitimer(signal.ITIMER_REAL, max(left, SOON), again)
         if isinstance(error, _OvertimeError):
-            raise TimeoutError from error  # whose traceback says where it was
+            raise TimeoutError from error  # the cause's traceback says where it was
 
 
 def end_with_parent(parent: int) -> None:
-    """End this process soon after `parent`, the one that started it, however that one ends."""
+    """End this process soon after its parent process has ended in any way."""
 
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(PARENT_POLL_SECONDS)
-        # with what it has started, if it leads a group of its own
+        # also end what this process has started, if it leads a process group
         if hasattr(os, "getpgrp") and os.getpgrp() == os.getpid():
             os.killpg(0, signal.SIGKILL)
         os._exit(1)
@@ -109,7 +117,10 @@ def end_with_parent(parent: int) -> None:
 
 @contextmanager
 def memory(gigabytes: float) -> Iterator[None]:
-    """Let this process have so much memory in the body, on systems with limits: to want more is a MemoryError."""
+    """Limit this process' memory in the body, on systems with such limits.
+
+    Code that wants more gets a MemoryError.
+    """
     try:
         import resource
     except ImportError:
@@ -127,9 +138,13 @@ def memory(gigabytes: float) -> Iterator[None]:
 
 
 def check_decoded(name: str, size: int) -> None:
-    """Raise InputError where masks unpack to more bytes than POSEFIT_DECODED_GIGABYTES allows.
+    """Raise InputError if masks unpack to more bytes than POSEFIT_DECODED_GIGABYTES.
 
-    They take time rather than memory, where they become bits frame by frame.
+    Such masks take time rather than memory if they are unpacked frame by frame.
+
+    Args:
+        name: of the masks, for the message.
+        size: bytes that they unpack to.
     """
     text = os.environ.get(DECODED, "")
     try:
@@ -144,7 +159,10 @@ def check_decoded(name: str, size: int) -> None:
 
 
 def allowed_bytes() -> int:
-    """Return how much memory this process may have: what the machine, its container and its own limits leave."""
+    """Return the memory in bytes that this process may use.
+
+    It is the least of what the machine, its container and the process' limits allow.
+    """
     limits = []
     with suppress(ImportError):
         import resource
@@ -159,11 +177,11 @@ def allowed_bytes() -> int:
 
 @lru_cache(maxsize=1)
 def _machine_bytes() -> int:
-    """Return the memory of this machine, or of the container that this process is in."""
+    """Return the memory of this machine, or of this process' container, in bytes."""
     limits = [sys.maxsize]
     with suppress(AttributeError, ValueError, OSError):
         limits.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for path in _CONTAINER:
-        with suppress(OSError, ValueError):  # "max" is no number
+        with suppress(OSError, ValueError):  # the file may say "max"
             limits.append(int(path.read_text()))
     return min(limits)

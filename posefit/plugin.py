@@ -1,20 +1,20 @@
-"""What the author of a plugin imports: the marker of hooks, protocols and their data, functions on a search space.
+"""What plugin authors import: the hook marker, protocols, data, and functions.
 
     from posefit.plugin import draw_population, hookimpl, sample_normal
 
-An optimiser knows four members of its space: `dimensions`, `start`, `periodic` and `feasible`. Everything else it does
-with a space is a function here.
+An optimiser uses four members of its space: `dimensions`, `start`, `periodic` and
+`feasible`. Whatever else it does with a space is a function here.
 
 | what you write | what it is | its hook |
 |---|---|---|
 | optimiser | `Optimiser`, or `Filter`, of a `Space` | `posefit_register_optimisers` |
 | prior | `Prior` | `posefit_register_priors` |
-| tracker | `Tracker`: a `Task` and `Observation`s in, `Frame`s out | `posefit_register_trackers` |
-| start | `Initialiser` of a `Task`: an `Observation` in, a `Posterior` of poses out | `posefit_register_starts` |
+| tracker | `Tracker`: `Observation`s in, `Frame`s out | `posefit_register_trackers` |
+| start | `Initialiser`: `Observation` in, `Posterior` out | `posefit_register_starts` |
 | segmenter | `Segmenter` of a `Film` | `posefit_register_segmenters` |
 | command | a `click.Command` | `posefit_register_commands` |
 
-A name is imported when it is first used, so that a command line that lists plugins stays quick.
+A name is imported when it is first used, so that a command that lists plugins is quick.
 """
 
 from posefit import hookimpl

@@ -1,4 +1,4 @@
-"""The names of `posefit.plugin`, each with the module that it is imported from when it is first used."""
+"""The names of `posefit.plugin`, each with the module that defines it."""
 
 from posefit import hookimpl as hookimpl
 from posefit.arrays import Array as Array

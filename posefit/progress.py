@@ -1,4 +1,4 @@
-"""Messages and progress bars of work that takes its time."""
+"""Messages and progress bars of long work."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -14,19 +14,21 @@ WARNING = "warning: "
 
 @dataclass(frozen=True)
 class Progress:
-    """Where messages go, and what shows the steps of a loop; by default nothing.
+    """Receives messages and shows the steps of a loop; by default it does nothing.
 
-    `log` takes a message; `steps` an iterator and how many steps it has, and returns one with the same steps.
+    Attributes:
+        log: takes a message.
+        steps: takes an iterator and its length, and returns the same steps.
+        phases: seconds that each phase took, by name.
     """
 
     log: Callable[[str], None] = lambda _message: None
     steps: Callable[[Iterator[Any], int], Iterator[Any]] = lambda steps, _count: steps
-    # the seconds that each took
     phases: dict[str, float] = field(default_factory=dict, compare=False)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """Time the body, as a phase of the work."""
+        """Time the body as a phase of the work."""
         began = perf_counter()
         yield
         self.phases[name] = self.phases.get(name, 0.0) + perf_counter() - began
@@ -40,14 +42,17 @@ QUIET = Progress()
 
 
 def bars_shown() -> bool:
-    """Return whether anybody watches: stderr is a terminal, or this is a notebook."""
-    return (
-        sys.stderr is not None and sys.stderr.isatty()
-    ) or "ipykernel" in sys.modules
+    """Return whether somebody watches: stderr is a terminal, or this is a notebook."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        return True
+    return "ipykernel" in sys.modules
 
 
 def interactive() -> Progress:
-    """Return messages and bars on stderr where that is a terminal, bars in a notebook; elsewhere warnings alone."""
+    """Return progress with messages and bars in a terminal or a notebook.
+
+    Elsewhere only warnings are shown. Messages go to stderr.
+    """
     if not bars_shown():
 
         def show_warning(message: str) -> None:
@@ -60,9 +65,7 @@ def interactive() -> Progress:
     def log(message: str) -> None:
         tqdm.write(printable(message), file=sys.stderr)
 
-    return Progress(
-        log,
-        lambda steps, count: iter(
-            tqdm(steps, total=count, unit="frame", dynamic_ncols=True)
-        ),
-    )
+    def steps(steps: Iterator[Any], count: int) -> Iterator[Any]:
+        return iter(tqdm(steps, total=count, unit="frame", dynamic_ncols=True))
+
+    return Progress(log, steps)

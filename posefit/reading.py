@@ -1,6 +1,6 @@
-"""What a stranger's file says, read so that it can neither fill the memory nor end in a traceback.
+"""Reads files from outside safely: they cannot fill the memory or cause a traceback.
 
-Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
+`posefit.archive` does so for archives of arrays, `posefit.footage.images` for pictures.
 """
 
 import json
@@ -14,24 +14,25 @@ from typing import Any
 
 from posefit.errors import InputError, printable
 
-# names that other libraries have for what is known here
+# what other libraries call things of posefit
 OTHER_WORDS = {
     "optimizer": ("optimiser", "method"),
     "optimizers": ("optimisers", "methods"),
     "optimisers": ("methods",),
 }
 SHOWN = 80  # characters of a name or value in a message
-DOTS = 1_000  # in a line of TOML, those of decimal numbers aside
-# The sum of their squares over all lines: reading a key of n parts takes memory as n squared. A plan that names 300
-# files on each of 10 lines has 1e6.
+DOTS = 1_000  # most dots in a line of TOML, except in decimal numbers
+# greatest sum of the squared numbers of dots over all lines: reading a key of n parts
+# takes memory as n squared. A plan that names 300 files on each of 10 lines has 1e6.
 NESTING = 10_000_000
 _DECIMAL = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:[eE][-+]?\d+)?(?![\w.])")
 
 
 def quoted(value: object) -> str:
-    """Return a value as a message quotes it, cut where it is long."""
+    """Return a value in the form that messages quote, cut if it is long."""
     if isinstance(value, str | bytes | bytearray):
-        value = value[: SHOWN + 1]  # the rest would not be shown, however long it is
+        # the rest would not be shown, however long it is
+        value = value[: SHOWN + 1]
     try:
         text = repr(value)
     # a number of more digits than Python writes, or endless nesting
@@ -41,7 +42,7 @@ def quoted(value: object) -> str:
 
 
 def cut(text: str, most: int = SHOWN) -> str:
-    """Return a text on one line, cut where it is long."""
+    """Return a text on one line, cut if it is long."""
     text = printable(text[: most + 1])
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
@@ -52,7 +53,10 @@ def counted(count: int, word: str) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return the end of a message about a wrong name, which asks for the nearest known one; "" where none is near."""
+    """Return a question for the nearest known name, to end a message about a wrong one.
+
+    It is "" if no name is near.
+    """
     names = list(known)
     others = [other for other in OTHER_WORDS.get(name, ()) if other in names]
     near = others or get_close_matches(name[:SHOWN], names, 1)
@@ -60,7 +64,11 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def existing(path: Path) -> Path:
-    """Return a path. Raises InputError where there is nothing, or an empty file."""
+    """Return a path.
+
+    Raises:
+        InputError: it does not exist, or is an empty file.
+    """
     if not path.exists():
         expected = "a file" if path.suffix else "a file or a folder"
         raise InputError(f"{path}: expected {expected}, got nothing of that name")
@@ -70,24 +78,36 @@ def existing(path: Path) -> Path:
 
 
 def check_size(path: Path, most: int) -> None:
-    """Raise InputError where a file is too large to be read, or is a folder, a pipe or a device."""
+    """Raise InputError if a file is too large, or is a folder, a pipe or a device.
+
+    Args:
+        path: the file.
+        most: bytes that it may have.
+    """
     state = path.stat()
     if not stat.S_ISREG(state.st_mode):
         came = "a folder" if stat.S_ISDIR(state.st_mode) else "a pipe or a device"
         raise InputError(f"{path}: expected a file that can be read, got {came}")
     size = state.st_size
     if size > most:
-        allowed = f"{most / 1e6:g} MB" if most < 1_000_000_000 else f"{most / 1e9:g} GB"
-        came = (
-            f"{size / 1e6:.1f} MB" if most < 1_000_000_000 else f"{size / 1e9:.1f} GB"
+        factor, unit = (1e6, "MB") if most < 1_000_000_000 else (1e9, "GB")
+        raise InputError(
+            f"{path}: expected at most {most / factor:g} {unit}, "
+            f"got {size / factor:.1f} {unit}"
         )
-        raise InputError(f"{path}: expected at most {allowed}, got {came}")
 
 
 def read_text(path: str | Path, most: int, what: str = "text") -> str:
-    """Return the text of a file of at most so many bytes, without a byte-order mark.
+    """Return the text of a file, without a byte-order mark.
 
-    Raises InputError naming the file where it is larger, is no UTF-8 or cannot be read, and FileNotFoundError.
+    Args:
+        path: the file.
+        most: bytes that it may have.
+        what: kind of text, for messages.
+
+    Raises:
+        InputError: the file is larger, is not UTF-8 or cannot be read.
+        FileNotFoundError: there is no such file.
     """
     path = Path(path)
     try:
@@ -108,14 +128,20 @@ def read_text(path: str | Path, most: int, what: str = "text") -> str:
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text. Raises InputError where it is none, or nested so deeply that it is hostile."""
+    """Return the tables of a TOML text.
+
+    Raises:
+        InputError: the text is nested so deeply that it must be hostile.
+        ValueError: the text is not TOML.
+    """
     weight = 0
     for number, line in enumerate(text.splitlines(), 1):
         dots = _DECIMAL.sub("", line).count(".") if line.count(".") > 1 else 0
         weight += dots * dots
         if dots > DOTS or weight > NESTING:
             raise InputError(
-                f"expected keys that are not nested so deeply, got {dots} dots in line {number}"
+                "expected keys that are not nested so deeply, "
+                f"got {dots} dots in line {number}"
             )
     try:
         return tomllib.loads(text)
@@ -126,9 +152,11 @@ def parsed_toml(text: str) -> dict[str, Any]:
 
 
 def parsed_json(text: str | bytes) -> Any:
-    """Return the value of a JSON text, or of its bytes.
+    """Return the value of a JSON text.
 
-    Raises InputError where it is none, or nested so deeply that it is hostile.
+    Raises:
+        InputError: the text is nested so deeply that it must be hostile.
+        ValueError: the text is not JSON.
     """
     try:
         return json.loads(text)

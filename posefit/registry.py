@@ -1,8 +1,9 @@
-"""What plugins offer, by kind and name, and how plugins are loaded.
+"""Loads plugins, and finds what they offer by kind and name.
 
-A plugin that cannot be imported, misspells a hook, fails inside one or takes a name that is taken is left out with a
-warning that names its distribution; the others work. The environment variable POSEFIT_BLOCK_PLUGINS names those to
-leave out, each by plugin or distribution and separated by commas.
+A plugin is left out if it cannot be imported, misspells a hook, fails inside a hook, or
+registers a name that is taken. A warning then names its distribution; the others work.
+The environment variable POSEFIT_BLOCK_PLUGINS names plugins or distributions to leave
+out, separated by commas.
 """
 
 import os
@@ -12,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
@@ -36,53 +37,66 @@ BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
 Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-# instead of the distribution of an optimiser that no plugin registered
+# distribution of an optimiser that no plugin but the program itself has registered
 OWN = "this process"
-COMMAND: Literal["command"] = "command"  # what a plugin may register besides
+COMMAND: Literal["command"] = "command"  # what a plugin may register besides KINDS
 Registrable: TypeAlias = Kind | Literal["command"]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 
 
 @dataclass(frozen=True)
 class Offer:
-    """One registered name."""
+    """One registered name.
+
+    Attributes:
+        kind: kind of plugin.
+        name: the name.
+        factory: takes the arguments of its kind, and keyword-only settings.
+        distribution: the installed package that registered it.
+        version: of the distribution.
+        next_frame: what becomes of an optimiser in the next frame.
+        looks_ahead: whether a tracker does.
+        still_background: whether a segmenter needs one.
+        needs: a module that the factory imports, and what to install for it.
+    """
 
     kind: Kind
     name: str
     factory: Callable[..., Any] = field(repr=False)
     distribution: str
     version: str
-    next_frame: "NextFrame" = "start"  # of an optimiser
-    looks_ahead: bool = False  # of a tracker
-    still_background: bool = True  # whether a segmenter needs one
+    next_frame: "NextFrame" = "start"
+    looks_ahead: bool = False
+    still_background: bool = True
     needs: hooks.Needs | None = None
 
     @property
     def label(self) -> str:
-        """How an error names it."""
-        return (
-            f"{self.kind} {self.name!r} of {self.distribution} {self.version}".rstrip()
-        )
+        """Its name in error messages."""
+        owner = f"{self.distribution} {self.version}"
+        return f"{self.kind} {self.name!r} of {owner}".rstrip()
 
     @property
     def origin(self) -> str:
-        """What its results depend on: its distribution with its version, a digest of its package's source, its library.
+        """What its results depend on.
 
-        The packages of posefit's own plugins, which have one version, are distinguished by name. What such a plugin
-        offers from posefit itself depends on posefit's build.
+        That is its distribution and version, a digest of its package's source, and its
+        library. posefit's own plugins have the same version; their packages' names
+        distinguish them. What they offer from posefit itself depends on posefit's
+        build.
         """
         if self.distribution == OWN:
             return f"{self.name} {self.version}".rstrip()
-        module = (
-            self.factory.func if isinstance(self.factory, partial) else self.factory
-        ).__module__
-        if self.distribution == PROJECT and module.partition(".")[0] == PROJECT:
+        factory = self.factory
+        if isinstance(factory, partial):
+            factory = factory.func
+        module = factory.__module__
+        package = module.partition(".")[0]
+        if self.distribution == PROJECT and package == PROJECT:
             return posefit_build()
-        name = (
-            module.partition(".")[0]
-            if self.distribution == PROJECT
-            else f"{self.distribution} {self.version}"
-        )
+        name = f"{self.distribution} {self.version}"
+        if self.distribution == PROJECT:
+            name = package
         library = ""
         if self.needs is not None:
             with suppress(PackageNotFoundError):
@@ -96,21 +110,30 @@ class Offer:
 
     @property
     def settings(self) -> tuple[Setting, ...]:
-        """What `--set` may set."""
+        """The settings that `--set` accepts."""
         return settings_of(self.factory)
 
     @property
     def missing(self) -> str | None:
-        """What to install before it can be used, if anything."""
-        return (
-            None
-            if self.needs is None or find_spec(self.needs[0]) is not None
-            else self.needs[1]
-        )
+        """What to install before it can be used, or None."""
+        if self.needs is None or find_spec(self.needs[0]) is not None:
+            return None
+        return self.needs[1]
 
 
 class Plugin(NamedTuple):
-    """One entry point, whether it was loaded, and what it offers of the kinds that it was asked for."""
+    """One entry point, and what it offers.
+
+    Attributes:
+        name: of the entry point.
+        distribution: the installed package.
+        version: of the distribution.
+        state: what happened when it was loaded.
+        cause: why it is not loaded.
+        offers: of the kinds that were asked for.
+        commands: if commands were asked for.
+        traceback: of the error that broke it.
+    """
 
     name: str
     distribution: str
@@ -119,26 +142,23 @@ class Plugin(NamedTuple):
     cause: str = ""
     offers: tuple[Offer, ...] = ()
     commands: "tuple[click.Command, ...]" = ()
-    traceback: str = ""  # of what broke it
+    traceback: str = ""
 
 
 @dataclass(frozen=True)
 class Registry:
-    """The methods that plugins registered, by kind and name."""
+    """What plugins have registered, by kind and name."""
 
     plugins: tuple[Plugin, ...]
 
     def rivals(self, offer: Offer) -> list[Plugin]:
-        """Return the plugins that are left out because they register the name of an offer, too."""
-        return [
-            plugin
-            for plugin in self.plugins
-            if _taken(f"{offer.kind} {offer.name!r}") in plugin.cause
-        ]
+        """Return the plugins that are left out because an offer has their name."""
+        cause = _taken(f"{offer.kind} {offer.name!r}")
+        return [plugin for plugin in self.plugins if cause in plugin.cause]
 
-    @property
+    @cached_property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
-        """The offers of all plugins that were loaded."""
+        """The offers of all loaded plugins."""
         offers = [offer for plugin in self.plugins for offer in plugin.offers]
         return {
             kind: {offer.name: offer for offer in offers if offer.kind == kind}
@@ -146,30 +166,46 @@ class Registry:
         }
 
     def optimiser(self, name: str) -> "OptimiserFactory":
-        """Return the optimiser factory of a name. Raises ValueError listing the known names."""
+        """Return the optimiser factory with a name.
+
+        Raises:
+            InputError: there is none; the message lists the known names.
+            ImportError: a library that it needs is not installed.
+        """
         return self.offer("optimiser", name).factory
 
     def prior(self, name: str) -> "PriorFactory":
-        """Return the prior factory of a name. Raises ValueError listing the known names."""
+        """Return the prior factory with a name.
+
+        Raises:
+            InputError: there is none; the message lists the known names.
+            ImportError: a library that it needs is not installed.
+        """
         return self.offer("prior", name).factory
 
     def offer(self, kind: Kind, name: str) -> Offer:
-        """Return what is offered under a name; `family:NAME` is the family with its setting `variant`.
+        """Return the offer with a name.
 
-        Raises ValueError listing the known names, and ImportError where a library it needs is not installed.
+        `family:NAME` is the offer `family` with its setting `variant`.
+
+        Raises:
+            InputError: there is none; the message lists the known names.
+            ImportError: a library that it needs is not installed.
         """
         known = self.offers[kind]
         family, colon, variant = name.partition(":")
         if family not in known:
             listed = ", ".join(sorted(known)) or "none"
             raise InputError(
-                f"{kind} must be one of {listed}, got {quoted(name)}{self.hint(family, known)}"
+                f"{kind} must be one of {listed}, "
+                f"got {quoted(name)}{self.hint(family, known)}"
             )
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs
             raise ImportError(
-                f"{kind} {family} needs the library {needed}: install it with python -m pip install '{requirement}'"
+                f"{kind} {family} needs the library {needed}: "
+                f"install it with python -m pip install '{requirement}'"
             )
         if not colon:
             return offer
@@ -182,28 +218,33 @@ class Registry:
         return replace(offer, name=name, factory=factory)
 
     def hint(self, name: str, known: Iterable[str]) -> str:
-        """Return the end of a message about a name that is not known: its kind, the nearest name, or where to ask."""
+        """Return the end of a message about an unknown name.
+
+        It names the name's kind, the nearest known name, or the command to ask.
+        """
         kinds = [kind for kind, offers in self.offers.items() if name in offers]
         if kinds:
             return f"; its kind is {kinds[0]}"
         broken = [plugin.name for plugin in self.plugins if plugin.state == "broken"]
-        doctor = (
-            f"posefit plugins doctor says why {', '.join(broken)} failed to load"
-            if broken
-            else ""
-        )
+        doctor = ""
+        if broken:
+            listed = ", ".join(broken)
+            doctor = f"posefit plugins doctor says why {listed} failed to load"
         near = suggestion(name, known)
         if near and doctor:
             return f"{near} {doctor}"
+        if near:
+            return near
+        if doctor:
+            return f"; {doctor}"
         return (
-            near
-            or f"; {doctor or 'posefit plugins doctor lists what is installed, and what failed to load'}"
+            "; posefit plugins doctor lists what is installed, and what failed to load"
         )
 
 
 @lru_cache(maxsize=1)
 def registry() -> Registry:
-    """Return the methods of all installed plugins; they are loaded once a process."""
+    """Return what all installed plugins offer. They are loaded once per process."""
     return Registry((*plugins_of(KINDS), *_own.values()))
 
 
@@ -211,21 +252,26 @@ _own: dict[str, Plugin] = {}
 
 
 def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
-    """Let this process know optimisers by their names, each with a digest of its source.
+    """Register optimisers in this process only.
 
-    Raises ValueError where a plugin has registered one of them.
+    Args:
+        factories: factory, and digest of its source, by name.
+
+    Raises:
+        InputError: a plugin has registered one of the names, or a name is invalid.
     """
     for name, (factory, digest) in factories.items():
         if not _NAME.fullmatch(name):
             raise InputError(
-                f"a factory must have a name of letters, digits, _, + and -, got {quoted(name)}"
+                "a factory must have a name of letters, digits, _, + and -, "
+                f"got {quoted(name)}"
             )
-        if name not in _own and name in {
-            **registry().offers["optimiser"],
-            **registry().offers["tracker"],
-        }:
+        offers = registry().offers
+        known = {**offers["optimiser"], **offers["tracker"]}
+        if name not in _own and name in known:
             raise InputError(
-                f"a factory must have a name of its own, got {name}, which a plugin has registered"
+                f"a factory must have a new name, got {name}, "
+                "which a plugin has registered"
             )
         check_hints(f"optimiser {name!r}", factory)
         _own[name] = Plugin(
@@ -244,32 +290,37 @@ def plugins_of(
 ) -> tuple[Plugin, ...]:
     """Return all installed plugins with what they offer of some kinds; see `load`.
 
-    One whose group only begins with posefit's name, however that is written, is among them, and broken.
+    A plugin in a group whose name only begins with posefit's is included as broken.
     """
-    groups = [
-        group
-        for group in entry_points().groups
-        if re.sub("[-_. ]", "", group.lower()).startswith(PROJECT)
-    ]
-    return load(
-        [point for group in groups for point in entry_points(group=group)],
-        kinds,
-        taken=taken,
-    )
+    points = list[EntryPoint]()
+    for group in entry_points().groups:
+        if re.sub("[-_. ]", "", group.lower()).startswith(PROJECT):
+            points += entry_points(group=group)
+    return load(points, kinds, taken=taken)
 
 
 def version_of(origins: Iterable[str]) -> str:
-    """Return the version of posefit, and of a method whose plugins have these origins: see `Offer.origin`."""
+    """Return the version of posefit, and of plugins with these `Offer.origin`s."""
     return ", ".join([posefit_build(), *sorted(set(origins) - {posefit_build()})])
 
 
 def optimiser(name: str) -> "OptimiserFactory":
-    """Return the factory of an installed optimiser. Raises ValueError listing the known names."""
+    """Return the factory of an installed optimiser.
+
+    Raises:
+        InputError: there is none; the message lists the known names.
+        ImportError: a library that it needs is not installed.
+    """
     return registry().optimiser(name)
 
 
 def prior(name: str) -> "PriorFactory":
-    """Return the factory of an installed prior. Raises ValueError listing the known names."""
+    """Return the factory of an installed prior.
+
+    Raises:
+        InputError: there is none; the message lists the known names.
+        ImportError: a library that it needs is not installed.
+    """
     return registry().prior(name)
 
 
@@ -279,37 +330,44 @@ def load(
     variables: Mapping[str, str] = os.environ,
     taken: Iterable[str] = (),
 ) -> tuple[Plugin, ...]:
-    """Return the plugins behind entry points, posefit's own first: loaded, broken or left out.
+    """Return the plugins of entry points, posefit's own first.
 
-    Only the hooks of `kinds` are called: some of KINDS, or COMMAND. No two offers of one name are loaded; `taken` are
-    the names of posefit's own commands.
+    Of several offers with the same name, only the first is loaded.
+
+    Args:
+        points: the entry points.
+        kinds: only the hooks of these kinds are called; may include COMMAND.
+        variables: environment variables.
+        taken: names of posefit's own commands.
     """
     owners = {f"command {name!r}": PROJECT for name in taken}
     blocked = {word.strip().lower() for word in variables.get(BLOCK, "").split(",")}
     plugins: list[Plugin] = []
-    owned = [
-        (
-            *((point.dist.name, point.dist.version) if point.dist else ("unknown", "")),
-            point,
-        )
-        for point in points
-    ]
-    for owner, release, point in sorted(
-        owned, key=lambda entry: (entry[0] != PROJECT, entry[2].name)
-    ):
+    owned = []
+    for point in points:
+        if point.dist:
+            owned.append((point.dist.name, point.dist.version, point))
+        else:
+            owned.append(("unknown", "", point))
+    own_first = sorted(owned, key=lambda entry: (entry[0] != PROJECT, entry[2].name))
+    for owner, release, point in own_first:
         plugin = Plugin(point.name, owner, release, "left out", f"{BLOCK} names it")
         if not blocked & {point.name.lower(), owner.lower()}:
             try:
                 offers = _offers(point, kinds, owner, release, owners)
                 owners |= dict.fromkeys(offers, owner)
-                methods = tuple(
-                    offer for offer in offers.values() if isinstance(offer, Offer)
-                )
-                commands = tuple(
-                    offer for offer in offers.values() if not isinstance(offer, Offer)
-                )
+                methods = []
+                commands = []
+                for offer in offers.values():
+                    if isinstance(offer, Offer):
+                        methods.append(offer)
+                    else:
+                        commands.append(offer)
                 plugin = plugin._replace(
-                    state="loaded", cause="", offers=methods, commands=commands
+                    state="loaded",
+                    cause="",
+                    offers=tuple(methods),
+                    commands=tuple(commands),
                 )
             # whatever a plugin does, the others must work
             except (Exception, SystemExit) as error:
@@ -323,7 +381,8 @@ def load(
         if plugin.state == "broken":
             warnings.warn(
                 PluginWarning(
-                    f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}"
+                    f"plugin {plugin.name!r} of {owner} {release} is left out: "
+                    f"{plugin.cause}"
                 ),
                 stacklevel=2,
             )
@@ -337,7 +396,7 @@ def _offers(
     release: str,
     owners: Mapping[str, str],
 ) -> "dict[str, Offer | click.Command]":
-    """Return what a plugin offers, by how an error names it. Raises whatever goes wrong."""
+    """Return what a plugin offers, by its name in errors. Let all errors through."""
     if point.group != PROJECT:
         raise InputError(
             f"its entry point must be in the group {PROJECT!r}, got {point.group!r}"
@@ -355,9 +414,8 @@ def _offers(
             for name in vars(module)
             if name.startswith("posefit_") and name not in known
         ]
-        raise InputError(
-            f"{error}{suggestion(unknown[0], known) if unknown else ''}"
-        ) from None
+        near = suggestion(unknown[0], known) if unknown else ""
+        raise InputError(f"{error}{near}") from None
     offers: dict[str, Offer | click.Command] = {}
 
     def add(name: str, offer: "Offer | click.Command") -> None:
@@ -387,7 +445,8 @@ def _offers(
             )
         if more.get("next_frame", "start") not in get_args(NextFrame):
             raise InputError(
-                f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}"
+                f"next_frame must be one of {', '.join(get_args(NextFrame))}, "
+                f"got {more['next_frame']!r}"
             )
         label = f"{kind} {name!r}"
         add(label, Offer(kind, name, factory, owner, release, **more))

@@ -1,23 +1,25 @@
-"""The settings of a plugin: read from its signature, so that a mistake is reported before anything runs."""
+"""Settings of plugins, read from signatures and checked before anything runs."""
 
 import inspect
 import json
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from posefit import hints
 from posefit.errors import InputError
 from posefit.reading import quoted, suggestion
 
-# a docstring's list of settings: an indented line for each, which may go on in lines that are indented more
+# a docstring's list of settings: an indented line for each setting, which may continue
+# in lines with more indentation
 _LIST = re.compile(r"^( *)Settings:\n((?:\1 +.*(?:\n|$)|\s*\n)*)", re.MULTILINE)
 _ENTRY = re.compile(
     r"^([A-Za-z_]\w*)(?: \(([^()]*)\))?: (.*(?:\n[ \n].*)*)", re.MULTILINE
 )
-POPULATION_SIZE = 40  # where none is chosen: N of the SAPSO paper, section 5.2
+POPULATION_SIZE = 40  # if none is chosen: N of the SAPSO paper, section 5.2
 
 
 @dataclass(frozen=True)
@@ -26,42 +28,55 @@ class Setting:
 
     name: str
     annotation: Any
-    default: Any  # inspect.Parameter.empty where it must be given
+    default: Any  # inspect.Parameter.empty if the setting must be given
 
     @property
     def type(self) -> str:
-        """The type as it is shown: `float`, or the choices there are."""
+        """The type as users see it: `float`, or the choices."""
         return hints.shown(self.annotation, self.default)
 
 
 def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     """Return the settings that a factory takes, in the order of its signature."""
-    # the others may be hints of names that only a type checker imports
-    return tuple(
-        Setting(
-            parameter.name,
-            hints.resolved(factory, parameter.annotation),
-            parameter.default,
-        )
-        for parameter in inspect.signature(factory).parameters.values()
-        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
-    )
+    if isinstance(factory, Hashable):
+        return _settings_of(factory)
+    return _settings_of.__wrapped__(factory)
+
+
+@lru_cache
+def _settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
+    """Return the same, and keep it: a signature takes long to read."""
+    settings = []
+    for parameter in inspect.signature(factory).parameters.values():
+        # only hints of settings are resolved: others may name types that are imported
+        # for type checkers only
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY:
+            hint = hints.resolved(factory, parameter.annotation)
+            settings.append(Setting(parameter.name, hint, parameter.default))
+    return tuple(settings)
 
 
 def check_hints(plugin: str, factory: Callable[..., Any]) -> None:
-    """Raise InputError, naming the plugin and the setting, if values cannot be checked by a setting's type."""
+    """Raise InputError if a setting's type is one whose values cannot be checked.
+
+    Args:
+        plugin: name of the plugin, for the message.
+        factory: its factory.
+    """
     for setting in settings_of(factory):
         if not hints.checkable(setting.annotation):
             raise InputError(
-                f"{plugin}: the type of the setting {setting.name} must be {hints.KNOWN}, got {setting.type}"
+                f"{plugin}: the type of the setting {setting.name} must be "
+                f"{hints.KNOWN}, got {setting.type}"
             )
 
 
 def settings_in(text: str) -> dict[str, tuple[str, str]]:
-    """Return what the list of settings of a docstring says, by the settings' names; empty where it has no list.
+    """Return symbol and meaning of each setting in a docstring's list of settings.
 
-    That is the source's letter, "" where it has none, and the meaning. Such a list is a line `Settings:`, then an
-    indented line `name (symbol): meaning` for each, which may go on in lines that are indented more.
+    Such a list is a line `Settings:`, then an indented line `name (symbol): meaning`
+    for each setting, which may continue in lines with more indentation. The symbol is
+    the source's letter, and is "" if it is missing. Without a list the result is empty.
     """
     listed = _LIST.search(text)
     entries = _ENTRY.findall(textwrap.dedent(listed[2])) if listed else []
@@ -83,9 +98,17 @@ def names(factory: Callable[..., Any]) -> list[str]:
 def check(
     plugin: str, factory: Callable[..., Any], chosen: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return settings, numbers of NumPy as Python's own.
+    """Return settings with values as their types demand.
 
-    Raises ValueError where one is unknown, listing the known, or its type is wrong.
+    Numbers of NumPy become Python's.
+
+    Args:
+        plugin: name of the plugin, for messages.
+        factory: its factory.
+        chosen: values by the settings' names.
+
+    Raises:
+        InputError: a setting is unknown, or its value has a wrong type.
     """
     known = {setting.name: setting for setting in settings_of(factory)}
     values = {}
@@ -103,10 +126,19 @@ def check(
 def planned(
     factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int
 ) -> dict[str, Any]:
-    """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
+    """Return an optimiser's settings with those that follow from a search's budget.
 
-    These are `evaluations` itself, and `iterations`, the populations after the first. What is given stays as it is.
-    Raises InputError if the population that is asked for is larger than the budget: it may be larger than the memory.
+    These are `evaluations` itself, and `iterations`, the populations after the first,
+    if the optimiser has these settings. Given values are kept.
+
+    Args:
+        factory: the optimiser's factory.
+        chosen: given values by the settings' names.
+        evaluations: budget of one search.
+
+    Raises:
+        InputError: the population is larger than the budget. It might not fit the
+            memory.
     """
     known = {setting.name: setting.default for setting in settings_of(factory)}
     filled = dict(chosen)
@@ -118,9 +150,8 @@ def planned(
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:
-        size = filled.get(
-            "population_size", known.get("population_size", POPULATION_SIZE)
-        )
+        default_size = known.get("population_size", POPULATION_SIZE)
+        size = filled.get("population_size", default_size)
         if isinstance(size, int) and size > 0:
             filled.setdefault("iterations", max(1, evaluations // size - 1))
     return filled
@@ -129,20 +160,21 @@ def planned(
 def population(
     factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int
 ) -> int:
-    """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
+    """Return how many proposals an optimiser makes at a time, or 1 if unknown."""
     known = {setting.name: setting.default for setting in settings_of(factory)}
-    size = planned(factory, chosen, evaluations).get(
-        "population_size", known.get("population_size", 1)
-    )
+    default_size = known.get("population_size", 1)
+    filled = planned(factory, chosen, evaluations)
+    size = filled.get("population_size", default_size)
     return size if isinstance(size, int) and size > 0 else 1
 
 
 def parse(
     plugin: str, factory: Callable[..., Any], chosen: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return settings that were given as text, as the values their types ask for.
+    """Return settings that are given as text, with values of the settings' types.
 
-    Raises ValueError where one is unknown or its text does not fit its type.
+    Raises:
+        InputError: a setting is unknown, or its text does not fit its type.
     """
     known = {setting.name: setting for setting in settings_of(factory)}
     values = {}
@@ -160,16 +192,21 @@ def parse(
 def parse_texts(
     plugin: str, factory: Callable[..., Any], texts: Sequence[str]
 ) -> dict[str, Any]:
-    """Return settings that texts such as `population_size=20` give; the plugin's name and a dot may stand before.
+    """Return settings that are given as texts such as `population_size=20`.
 
-    Raises ValueError where a text has another form, or `parse` does.
+    The plugin's name and a dot may precede the setting's name.
+
+    Raises:
+        InputError: a text has another form, a setting is unknown or given twice, or its
+            value does not fit its type.
     """
     chosen: dict[str, str] = {}
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
             raise InputError(
-                f"a setting must be SETTING=VALUE such as population_size=20, got {quoted(text)}"
+                "a setting must be SETTING=VALUE such as population_size=20, "
+                f"got {quoted(text)}"
             )
         if (name := setting.rpartition(".")[2]) in chosen:
             raise InputError(f"a setting must be given once, got {quoted(name)} twice")
@@ -178,12 +215,15 @@ def parse_texts(
 
 
 def settings_text(settings: Mapping[str, Any]) -> list[str]:
-    """Return settings as `--set` takes them."""
+    """Return settings in the form that `--set` takes."""
     return [f"{name}={setting_text(value)}" for name, value in settings.items()]
 
 
 def setting_text(value: Any) -> str:
-    """Return a setting's value as `--set` takes it: numbers with commas between them, other lists as JSON has them."""
+    """Return a setting's value in the form that `--set` takes.
+
+    Lists of numbers have commas between them; other lists are JSON.
+    """
     if isinstance(value, bool) or value is None:
         return str(value).lower()
     if not isinstance(value, list | tuple):
@@ -193,20 +233,19 @@ def setting_text(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a number of NumPy as Python's own, in a tuple or a list too; anything else as it is."""
+    """Return a value, or the values in a tuple or list, with Python's numbers."""
     if type(value) in (tuple, list):
         return type(value)(map(_plain, value))
-    return (
-        value.item()
-        if type(value).__module__ == "numpy" and not getattr(value, "shape", (0,))
-        else value
-    )
+    if type(value).__module__ == "numpy" and not getattr(value, "shape", (0,)):
+        return value.item()
+    return value
 
 
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
     if name not in known:
         listed = f"one of {', '.join(known)}" if known else "none, it takes none"
+        near = suggestion(name, known)
         raise InputError(
-            f"a setting of {plugin} must be {listed}, got {quoted(name)}{suggestion(name, known)}"
+            f"a setting of {plugin} must be {listed}, got {quoted(name)}{near}"
         )
     return known[name]

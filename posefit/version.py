@@ -9,23 +9,33 @@ from pathlib import Path
 
 __version__ = "0.1.0"
 
-# Packages of posefit on which no result of a sweep's cell depends
+# packages of posefit that no result of a sweep's cell depends on
 NOT_IN_RESULTS = ("cli", "page", "report", "statistics", "testing")
-# what Python and its libraries write beside a source
+# folder that Python and its libraries write into a package
 COMPILED = "__pycache__"
 
 
 def posefit_build() -> str:
-    """Return the version of posefit with a digest of its sources, such as `posefit 0.1.0 3fa29b1c`."""
+    """Return posefit's version with a digest of its sources.
+
+    An example is `posefit 0.1.0 3fa29b1c`.
+    """
     return f"posefit {__version__} {source_digest('posefit', NOT_IN_RESULTS)}"
 
 
 @lru_cache
 def source_digest(module: str, without: tuple[str, ...] = ()) -> str:
-    """Return the first 8 digits of the SHA-256 of all files of a loaded module's package, by name and content.
+    """Return the first 8 digits of the SHA-256 of a loaded module's whole package.
 
-    Weights and tables count as its sources do; hidden files and compiled ones do not, nor do folders `without` at its
-    top. Empty if the package has no file.
+    It covers names and contents of all files, weights and tables included. Hidden files
+    and compiled ones are ignored.
+
+    Args:
+        module: name of the module.
+        without: folders at the top of the package that are ignored, too.
+
+    Returns:
+        The digits, or "" if the package has no file.
     """
     package = sys.modules[module.partition(".")[0]]
     digest = hashlib.sha256()
@@ -41,7 +51,10 @@ def source_digest(module: str, without: tuple[str, ...] = ()) -> str:
 
 
 def _files_of(package: object) -> Iterator[tuple[str, Path]]:
-    """Yield the files of a package, sorted by their names in it; of a module without a folder the one it is."""
+    """Yield the files of a package with their names in it, sorted.
+
+    A module that is not in a folder is one file.
+    """
     # a package without __init__.py may have several folders
     folders = list(getattr(package, "__path__", []))
     if not folders:
@@ -50,7 +63,7 @@ def _files_of(package: object) -> Iterator[tuple[str, Path]]:
         return
     seen = set[str]()
     for top in folders:
-        # weights often lie behind a link to a folder; it may lead back
+        # weights are often behind a link to a folder; it may lead back
         for folder, inner, names in os.walk(top, followlinks=True):
             place = os.path.realpath(folder)
             if place in seen:
@@ -65,5 +78,5 @@ def _files_of(package: object) -> Iterator[tuple[str, Path]]:
 
 
 def _counts(name: str) -> bool:
-    """Return whether a file or folder of a package may decide what it does."""
+    """Return whether a file or folder of a package can affect what it does."""
     return not name.startswith(".") and name != COMPILED and not name.endswith(".pyc")

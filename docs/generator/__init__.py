@@ -1,9 +1,10 @@
-"""What of the handbook is made from the code: settings, figures, equations, commands, environments.
+"""The parts of the handbook that are made from the code.
 
-`python docs/generator` writes it into the pages, between `<!-- from the code: NAME -->` and `<!-- end -->`, and so does
-docs/conf.py before every build; tests/docs compares it with the code. What the program prints or its modules
-hold, the lists of commands, settings and figures and the pages of modules and environments, goes to docs/generated,
-which is not in the repository.
+They are settings, figures, equations, commands, environments and modules. `python
+docs/generator` writes them, and so does docs/conf.py before every build. Parts of pages
+in the repository are between `<!-- from the code: NAME -->` and `<!-- end -->`;
+tests/docs compares them with the code. Whole pages go to docs/generated, which is not
+in the repository.
 """
 
 import re
@@ -32,7 +33,7 @@ _PART = re.compile(r"(<!-- from the code: \w+ -->\n).*?(<!-- end -->)", re.DOTAL
 
 
 def pages() -> dict[str, str]:
-    """Return the text of every page in the repository of which a part is made from the code."""
+    """Return the text of every page in the repository with a part from the code."""
     return {
         name: _with_part((DOCS / name).read_text("utf-8"), make())
         for name, make in PARTS.items()

@@ -1,4 +1,4 @@
-"""The table of the clinical angles: the columns of angles.csv, and what a positive number means."""
+"""The table of clinical angles: columns of angles.csv and meanings of their signs."""
 
 from posefit.measuring.angles import BETWEEN, COLUMNS, MEANINGS
 from posefit.measuring.segments import SIDES
@@ -10,10 +10,9 @@ def page() -> str:
         "| column, after `left_` or `right_` | of | a positive number |",
         "|---|---|---|",
     ]
-    lines += [
-        f"| `{joint}_{angle}` | {' and '.join(reversed(BETWEEN[joint])).replace('_', ' ')} | {meaning} |"
-        for joint, angles in MEANINGS.items()
-        for angle, meaning in angles.items()
-    ]
+    for joint, angles in MEANINGS.items():
+        segments = " and ".join(reversed(BETWEEN[joint])).replace("_", " ")
+        for angle, meaning in angles.items():
+            lines.append(f"| `{joint}_{angle}` | {segments} | {meaning} |")
     assert len(COLUMNS) == len(SIDES) * (len(lines) - 2)
     return "\n".join(lines) + "\n"

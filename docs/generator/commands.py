@@ -1,4 +1,4 @@
-"""The list of the command line: what `--help` prints, of every command."""
+"""The list of the command line: the `--help` of every command."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ import click
 
 from posefit.cli import main
 
-WIDTH = 78  # columns: what click takes of a terminal of 80 or more
+WIDTH = 78  # columns that click uses on a terminal of 80 or more
 
 
 def page() -> str:
@@ -20,7 +20,7 @@ def page() -> str:
 
 
 def helps() -> dict[str, str]:
-    """Return what `--help` prints of every command, a group before what it holds."""
+    """Return the `--help` of every command, with a group before its commands."""
     context = click.Context(
         main, info_name="posefit", terminal_width=WIDTH, **main.context_settings
     )

@@ -1,17 +1,17 @@
-"""The pages of the environments: their docstrings, which are written in Markdown as Gymnasium's are."""
+"""The pages of the environments: their docstrings, in Markdown as in Gymnasium."""
 
 import inspect
 
 import gymnasium
 from gymnasium.envs.registration import load_env_creator
 
-import posefit_envs  # noqa: F401, which registers them
+import posefit_envs  # noqa: F401, registers them
 
 NAMESPACE = "posefit"
 
 
 def pages() -> dict[str, str]:
-    """Return the manual of every environment by its name without the namespace, as Markdown."""
+    """Return every environment's manual in Markdown, by name without the namespace."""
     pages = {}
     for name, spec in gymnasium.registry.items():
         if spec.namespace == NAMESPACE:

@@ -1,4 +1,7 @@
-"""The list of the figures: the keys of summary.json, the columns of frames.csv and of a sweep's CSV, with units."""
+"""The list of figures, with units.
+
+It covers the keys of summary.json, and the columns of frames.csv and of a sweep's CSV.
+"""
 
 from collections.abc import Iterable, Mapping
 
@@ -8,36 +11,36 @@ from posefit.measuring.centres import PLACES
 from posefit.report.charts import LEVEL_NAMES
 from posefit.report.tracks import LOSS
 
-# How a value stands in a file whose table shows it times a factor.
+# Units of values in files; the tables show them times a factor.
 RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}
 
-# What summary.json says beside the figures: the question, not the answer.
+# Keys of summary.json about the request, not the result.
 REQUEST = {
     "motion": ("", "name of the motion, the video or the masks"),
-    "source": ("", "one entry a camera"),
+    "source": ("", "one entry per camera"),
     "frames_chosen": ("frames", "start and stop of `--frames`, or null"),
     "method": ("", "the optimiser and the prior, or the tracker"),
-    "seed": ("", "of everything random"),
-    "frames": ("frames", "how many were followed"),
+    "seed": ("", "seed of all random numbers"),
+    "frames": ("frames", "number of tracked frames"),
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
     "version": ("", "of posefit"),
-    "train": ("", "motions learned from"),
+    "train": ("", "training motions"),
     "view_degrees": ("degrees", "directions of the cameras, or null"),
     "translation": ("", "the root's position: known, searched or aligned"),
     "first_pose": ("", "searched, or given"),
     "smooth": ("", "whether the track was [smoothed](../howto/smoothing.md)"),
     "views": ("", "number of cameras"),
     "camera": ("", "calibrated, guessed, or placed around a known motion"),
-    "size_pixels": ("pixels", "of the first camera's masks"),
-    "fps": ("1/s", "frames a second"),
+    "size_pixels": ("pixels", "size of the first camera's masks"),
+    "fps": ("1/s", "frames per second"),
     "dimensions": (
         "",
-        "coordinates of a proposal; null of a tracker that searches no box",
+        "coordinates of a proposal; null for a tracker that searches no box",
     ),
     "settings": ("", "what was set, or follows from the budget"),
 }
 
-# What a sweep's row says beside the figures, in the order of the CSV: first what was run.
+# Columns of a sweep's row besides the figures, in the CSV's order: first the request.
 CELL = {
     "key": ("", "the row's name: the SHA-256 of everything it depends on"),
     "version": ("", "versions of posefit and of the plugins that are not its own"),
@@ -46,13 +49,13 @@ CELL = {
     "kind": ("", "`track` or `search`"),
     "method": ("", "the optimiser and the prior, or the tracker"),
     "motion": ("", "the motion that was tracked"),
-    "train": ("", "the motions learned from"),
+    "train": ("", "training motions"),
     "settings": ("", "what was set, `NAME.SETTING=VALUE`"),
     "view_degrees": ("degrees", "directions of the cameras"),
     "corruption": ("", "kinds of damage to the masks, with their strengths"),
     "instance": ("", "number of the variation of the motion or the function"),
-    "frames": ("frames", "how many were followed"),
-    "fps": ("1/s", "frames a second"),
+    "frames": ("frames", "number of tracked frames"),
+    "fps": ("1/s", "frames per second"),
     "size": ("pixels", "width x height of the masks"),
     "evaluations": ("", "budget: of a frame, or of a search"),
     "translation": ("", "the root's position: known, searched or aligned"),
@@ -60,7 +63,7 @@ CELL = {
     "hypotheses": ("", "number of tracks from which one was chosen"),
     "yaw_off_degrees": ("degrees", "largest error of the yaw given to the method"),
     "body_off_percent": ("%", "largest error of the body given to the method"),
-    "seed": ("", "of everything random"),
+    "seed": ("", "seed of all random numbers"),
     "name": ("", "what reports call the method, if the plan says so"),
 }
 SEARCH_CELL = {
@@ -80,8 +83,9 @@ SPENT = {
     "seconds": ("s", "wall time of the whole cell"),
     LOSS: (
         "degrees",
-        "`error_degrees.mean`, in which a lost frame counts as the mean training pose's at least: "
-        "e + s max(0, b - e) with the error e, `lost_rate` s and `baselines_degrees.mean_pose` b",
+        "`error_degrees.mean`, but a lost frame counts at least as much as the mean "
+        "training pose: e + s max(0, b - e) with the error e, `lost_rate` s and "
+        "`baselines_degrees.mean_pose` b",
     ),
 }
 SEARCHED = {
@@ -106,7 +110,7 @@ LEADERBOARD = {
     "failed": ("", "cells in quarantine"),
     "warned": ("", "runs with a warning"),
 }
-# figures of a row in which a method has a value for each of some names
+# figures with a value for each of some names
 PARTS = {
     "error_degrees": ("mean", "std", "max"),
     "effort": ("STAGE",),
@@ -120,36 +124,40 @@ NOT_IN_ROWS = ("evaluations", "evaluations_per_second")
 RESULT = {
     "hypotheses": (
         "",
-        "of each [hypothesis](../howto/hypotheses.md): `beginning`, `cost`, `motion` term, and `kept`",
+        "for each [hypothesis](../howto/hypotheses.md): `beginning`, `cost`, "
+        "`motion` term, and `kept`",
     ),
     "build": (
         "m",
-        "what was fitted: `stature_m`, `factors` on the average and their `spread`; or null",
+        "the fitted body: `stature_m`, `factors` on the average and their `spread`; "
+        "or null",
     ),
     "trace": (
         "",
-        "of a single frame: evaluations so far and best cost, after each population",
+        "of a single frame: evaluations so far and best cost after each population",
     ),
     "warnings": ("", "what to look at before the result is trusted"),
     "guesses": ("", "what posefit assumed, such as the camera, the rate or a height"),
     "modes": (
         "",
-        "weights of the tracks that the whole motion may be, the likeliest first",
+        "weights of the possible tracks of the whole motion, the likeliest first",
     ),
     "none_of_modes": ("", "mean probability that no mode of a frame is right"),
-    "unknown_sides": ("", "frames whose left and right are called unknown"),
+    "unknown_sides": ("", "frames in which left and right are called unknown"),
     "lost_frames": ("", "frames that are called lost"),
     "relocalised": (
         "",
-        "frames from which the person was searched for all around again",
+        "frames after which the person was searched for again in all directions",
     ),
     "retracked_outside": (
         "",
-        "first and last frame of what [was not tracked again](../howto/smoothing.md#a-body-that-spins)",
+        "first and last frame of what "
+        "[was not tracked again](../howto/smoothing.md#a-body-that-spins)",
     ),
     "backwards_share": (
         "",
-        "share of frames in which the root faces away from its path, faster than 0.3 m/s",
+        "share of frames in which the root faces away from its path, "
+        "at more than 0.3 m/s",
     ),
     "trust": (
         "",
@@ -169,29 +177,35 @@ def page() -> str:
     """Return the three tables, as Markdown."""
     parts = [
         "## Keys of `summary.json`",
-        "`posefit track --json` prints the same object. First the request, then the results.",
+        "`posefit track --json` prints the same object. "
+        "The request comes first, then the results.",
         _table("key", _described(REQUEST)),
         _table("key", [*_measured(MEASURES.values()), *_described(RESULT)]),
-        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, `baselines_degrees` and "
+        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, "
+        "`baselines_degrees` and "
         f"`baselines_mm` hold one number for each baseline: {_baselines()}. "
-        "`coverage` and `interval_mm` hold one for each of `50`, `80` and `95`. What needs a truth that is unknown, or "
-        "what the method does not report, is `null`.",
+        "`coverage` and `interval_mm` hold one for each of `50`, `80` and `95`. A "
+        "figure is `null` if it needs an unknown truth, or if the method does not "
+        "report it.",
         "## Columns of `frames.csv`",
-        "One row a frame; those that need the truth are there only where it is known. "
-        f"{_shared()} are as above, of one frame. Then there are",
+        "One row per frame. Columns that need the truth exist only if it is known. "
+        f"{_shared()} are as above, for one frame. The others are",
         _table(
             "column",
             [*_measured(_frame_only()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())],
         ),
         "## Columns of a sweep's CSV",
-        "`posefit report DIR --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same, but for the last "
-        "column, as a table of pandas. The report's page and its data have every figure under the same name.",
+        "`posefit report DIR --csv FILE.csv` writes one row per cell. "
+        "`Ledger.frame()` gives the same as a table of pandas, except the last column. "
+        "The report's page and its data have every figure under the same name.",
         _table("column", [*_described(CELL), *_row_measures(), *_described(SPENT)]),
-        "A single search has, beside `key` to `settings`, `instance`, `evaluations`, `seed`, `name` and the last ones,",
+        "A single search has `instance`, `evaluations`, `seed`, `name` and the last "
+        "ones, besides `key` to `settings`, and",
         _table("column", _described({**SEARCH_CELL, **SEARCHED})),
         "## Columns of `leaderboard.csv`",
-        "`posefit report DIR --figures FOLDER` writes one row a method in the order of the leaderboard: `method`, "
-        "`settings`, the mean of each figure above that the page has, `error_with_losses_degrees` first, and",
+        "`posefit report DIR --figures FOLDER` writes one row per method in the order "
+        "of the leaderboard: `method`, `settings`, the mean of each figure above that "
+        "the page has, `error_with_losses_degrees` first, and",
         _table("column", _described(LEADERBOARD)),
     ]
     return "\n\n".join(parts) + "\n"
@@ -229,7 +243,10 @@ def _shared() -> str:
 
 
 def _joints() -> str:
-    return f"place in the world of each of the {len(PLACES)} [joints](joints.md), blank where held or called lost"
+    return (
+        f"place in the world of each of the {len(PLACES)} [joints](joints.md), "
+        "blank if held or called lost"
+    )
 
 
 def _baselines() -> str:

@@ -1,4 +1,4 @@
-"""The table of the joints: their names, the places on a person, and where a pose holds their angles."""
+"""The table of joints: names, places on a person, and angles in a pose."""
 
 from posefit.geometry.skeleton import ANGLES, JOINTS, angle_index
 from posefit.measuring.centres import PLACES

@@ -1,10 +1,11 @@
-"""Docstrings as the builder reads them: plain text with code in single backticks becomes reStructuredText."""
+"""Converts docstrings to reStructuredText: plain text with code in backticks."""
 
 import re
 from collections.abc import Iterator
 
 _ARRAY = re.compile(
-    r"~?(?:numpy\.)?ndarray\[~?tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?(?:numpy\.)?dtype\[~?(?:numpy\.)?(\w+)\]\]"
+    r"~?(?:numpy\.)?ndarray\[~?tuple\[~?(?:typing\.)?Any, \.\.\.\], "
+    r"~?(?:numpy\.)?dtype\[~?(?:numpy\.)?(\w+)\]\]"
 )
 _COLUMNS = re.compile(r"\S {2,}\S")
 
@@ -15,14 +16,14 @@ def restructured(lines: list[str]) -> list[str]:
     literal = False
     for block in _blocks(lines):
         made = _block(block)
-        goes_on = literal and made[0] == "::"  # an empty line within code
+        continues = literal and made[0] == "::"  # an empty line within code
         literal = made[0] == "::"
-        out += [*(made[2:] if goes_on else made), ""]
+        out += [*(made[2:] if continues else made), ""]
     return out
 
 
 def shortened(signature: str) -> str:
-    """Return a signature with `Array` for numpy's longer name of it, and without the defaults that have no text."""
+    """Return a signature with `Array` for numpy's longer name, without `<factory>`."""
     named = _ARRAY.sub(
         lambda one: "Array" if one[1] == "float64" else f"Array[{one[1]}]", signature
     )
@@ -30,7 +31,7 @@ def shortened(signature: str) -> str:
 
 
 def _blocks(lines: list[str]) -> Iterator[list[str]]:
-    """Yield the runs of lines that stand together: an indented one after another is one, empty lines and all."""
+    """Yield the runs of lines without an empty line in between."""
     block: list[str] = []
     for line in [*lines, ""]:
         if line.strip():
@@ -60,7 +61,7 @@ def _block(block: list[str]) -> list[str]:
 
 
 def _entries(lines: list[str]) -> list[str]:
-    """Return an indented list such as the settings, one bullet an entry."""
+    """Return an indented list such as the settings, with a bullet for each entry."""
     out: list[str] = []
     base = len(lines[0]) - len(lines[0].lstrip())
     for line in lines:
@@ -91,7 +92,7 @@ def _table(lines: list[str]) -> list[str]:
 
 
 def _escaped(text: str) -> str:
-    """Return text in which only backticks mean something."""
+    """Return text in which only backticks have a meaning."""
     parts = re.split(r"(`[^`]+`)", text)
     for k, part in enumerate(parts):
         if k % 2:

@@ -1,4 +1,4 @@
-"""The reference of the Python packages: a page for each, with the docstrings of all its modules."""
+"""The reference of the Python packages: a page for each, from its docstrings."""
 
 import ast
 import importlib
@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def pages() -> dict[str, str]:
-    """Return a page for each package, by its name, and one that lists them."""
+    """Return a page for each package by name, and one for the top-level modules."""
     packages = {name: _modules(name) for name in _packages()}
     alone = [
         f"posefit.{one.name}"
@@ -50,7 +50,7 @@ def _modules(package: str) -> list[str]:
 
 
 def _source(name: str) -> str:
-    """Return a module's code; it is not imported, as its library may be absent."""
+    """Return a module's code. It is not imported, because its library may be absent."""
     spec = importlib.util.find_spec(name)
     assert spec is not None
     assert spec.origin is not None
@@ -75,6 +75,6 @@ def _page(package: str, modules: list[str]) -> str:
             f".. automodule:: {module}",
             "   :members:",
         ]
-        # what a module imports has its entry elsewhere
+        # what a module imports is listed elsewhere
         lines += ["   :ignore-module-all:", ""]
     return "\n".join(lines)

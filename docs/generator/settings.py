@@ -1,6 +1,6 @@
-"""The list of the settings: every optimiser, prior, tracker and segmenter that posefit brings, read from the code.
+"""The list of settings of every optimiser, prior, tracker and segmenter of posefit.
 
-Of optimisers that only adapt a library the page has the names.
+It is read from the code. Optimisers that only adapt a library are listed by name.
 """
 
 import inspect
@@ -40,39 +40,35 @@ def page() -> str:
 
 
 def tracker() -> str:
-    """Return the list of what drives an optimiser and a prior, as Markdown."""
+    """Return the settings of the tracker that drives an optimiser and a prior."""
     return _described("tracker", Prediction) + "\n"
 
 
 def _method(offer: Offer) -> str:
-    needs = (
-        ""
-        if offer.needs is None
-        else f"\n\nIt needs a library: `python -m pip install '{offer.needs[1]}'`."
-    )
+    needs = ""
+    if offer.needs is not None:
+        package = offer.needs[1]
+        needs = f"\n\nIt needs a library: `python -m pip install '{package}'`."
     return f"### `{offer.name}`\n\n{_described(offer.name, offer.factory, needs)}"
 
 
 def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
     """Return the first paragraph of a method's docstring and the list of its settings.
 
-    Raises KeyError where the docstring lacks a setting.
+    Raises KeyError if the docstring lacks a setting.
     """
     text = inspect.getdoc(factory) or ""
-    said = settings_in(text)
+    listed = settings_in(text)
     settings = settings_of(factory)
     if not settings:
         return f"{text}{more}\n\nIt has no settings."
     lines = []
     for setting in settings:
-        symbol, meaning = said[setting.name]
-        default = (
-            ""
-            if setting.default is inspect.Parameter.empty
-            else f"={setting_text(setting.default)}"
-        )
-        lines.append(
-            f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}"
-        )
+        symbol, meaning = listed[setting.name]
+        default = ""
+        if setting.default is not inspect.Parameter.empty:
+            default = f"={setting_text(setting.default)}"
+        letter = f" ({symbol})" if symbol else ""
+        lines.append(f"- `{name}.{setting.name}{default}`{letter}: {meaning}")
     summary = without_settings(text).split("\n\n")[0]
     return f"{summary}{more}\n\n" + "\n".join(lines)

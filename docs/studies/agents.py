@@ -1,9 +1,10 @@
-"""Does it pay to look? FitImage-v0 by blind searches, cloning and PPO, on held-out instances.
+"""Are observations worth it? FitImage-v0 by blind searches, cloning and PPO.
 
     python docs/studies/agents.py --rows agents.jsonl --picture agents.png
 
-A learner's row is one training, of Stable-Baselines3's PPO or of the truths of training instances; a search's row has
-every instance once. A table is printed for each variant of the task.
+All are tested on held-out instances. A learner's row is one training: of
+Stable-Baselines3's PPO, or on the truths of training instances. A search's row has
+every instance once. There is a table for each variant of the task.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -48,9 +49,14 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
-CONSTANTS = ("uniform", "the truth, projected")
+# what learns nothing: the k-th proposal of the look-up is the truth of the training
+# instance whose silhouette is the k-th nearest
+LOOK_UP = "look-up"
+CONSTANTS = ("uniform", "the truth, projected", LOOK_UP)
+LOOKED_UP = 10_000  # training instances
+LOOKED_UP_AT_ONCE = 500
 LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
-# CMA-ES that starts from the best of PPO's proposals
+# CMA-ES, started from the best of PPO's proposals
 STARTED = "PPO, then cma"
 STARTED_BUDGET = 200
 STARTED_SPREAD = 0.1
@@ -60,9 +66,9 @@ BATCH = 256
 EPOCHS = 6
 LEARNING_RATE = 1.5e-3
 LOG_DEVIATION = -1.6
-SHOWN = (12, 16)  # height and width of the pictures that networks take
+SHOWN = (12, 16)  # height and width of the networks' pictures
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
-# before PPO goes on, from where it draws nearer to the means
+# steps of cloning before PPO continues, and the narrower deviation with which it does
 CLONING_STEPS = 30_720
 CLONED_LOG_DEVIATION = -2.3
 WHITE = (255, 255, 255)
@@ -71,7 +77,10 @@ Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
 
 
 class Training(NamedTuple):
-    """One row: an agent in a variant, the steps of its training or the evaluations of a search, and a seed."""
+    """The key of a row.
+
+    `budget` is the steps of a training, or the evaluations of a search.
+    """
 
     variant: str
     agent: str
@@ -80,25 +89,29 @@ class Training(NamedTuple):
 
 
 def check_learners() -> None:
-    """Return nothing. Raises ImportError where Stable-Baselines3, which PPO and SAC need, is not there."""
+    """Raise ImportError if Stable-Baselines3, which PPO needs, is not installed."""
     if find_spec("stable_baselines3") is None:
         raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
 
 
 def made(training: Training, count: int, **arguments: Any) -> Any:
-    """Return a vector environment of a variant with small pictures; the observed ones are blank for a blank agent."""
+    """Return a vector environment of a variant with small pictures.
+
+    For a blank agent the observed silhouettes are blank.
+    """
     env = ResizeObservation(
         gym.make_vec(NAME, count, **VARIANTS[training.variant], **arguments), SHOWN
     )
     channels = np.arange(env.single_observation_space.shape[-1])
-    mask = (
-        channels % 2 if "blank" in training.agent else np.ones_like(channels)
-    ).astype(np.uint8)
+    channels_shown = np.ones_like(channels)
+    if "blank" in training.agent:
+        channels_shown = channels % 2
+    mask = channels_shown.astype(np.uint8)
     return TransformObservation(env, lambda pictures: pictures * mask)
 
 
 def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array, Array]:
-    """Return the actions (k, n, d) and costs (k, n) of an episode on each held-out instance."""
+    """Return actions (k, n, d) and costs (k, n) of an episode on each test instance."""
     env = made(training, INSTANCES, max_evaluations=proposals)
     pictures, _ = env.reset(seed=0, options={"instance": TESTED})
     actions = []
@@ -113,16 +126,22 @@ def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array,
 def row_of(
     training: Training, start: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return a row: the best costs on held-out instances, the proposals, and what the training took."""
+    """Return a row: best costs on held-out instances, proposals, CPU seconds."""
     start_time = process_time()
     row = training._asdict()
     if training.agent in (*SEARCHES, STARTED):
         row["costs"] = searched(training, start)
         return row | {"cpu_seconds": round(process_time() - start_time, 1)}
     learns = training.agent in LEARNERS
-    policy = trained(training) if learns else constant(training)
+    if learns:
+        policy = trained(training)
+    elif training.agent == LOOK_UP:
+        policy = looked_up(training)
+    else:
+        policy = constant(training)
     row["cpu_seconds"] = round(process_time() - start_time, 1)
-    count = MAX_EVALUATIONS if learns or training.agent == "uniform" else 1
+    several = learns or training.agent in ("uniform", LOOK_UP)
+    count = MAX_EVALUATIONS if several else 1
     actions, costs = episodes(policy, training, count)
     row["costs"] = costs.min(axis=0).tolist()
     if learns:
@@ -134,7 +153,7 @@ def row_of(
 
 
 def constant(training: Training) -> Policy:
-    """Return the policy of a reference that does not look."""
+    """Return the policy of a reference that ignores its observations."""
     rng = np.random.default_rng(training.seed)
     env = made(training, INSTANCES)
     if training.agent == "uniform":
@@ -144,8 +163,42 @@ def constant(training: Training) -> Policy:
     return lambda _: truths
 
 
+def looked_up(training: Training) -> Policy:
+    """Return the policy that proposes the truths of the training instances with the nearest silhouettes."""
+    env = made(training, LOOKED_UP_AT_ONCE)
+    silhouettes = []
+    truths = []
+    for first in range(0, LOOKED_UP, LOOKED_UP_AT_ONCE):
+        numbers = list(range(first, first + LOOKED_UP_AT_ONCE))
+        pictures, _ = env.reset(options={"instance": numbers})
+        silhouettes.append(observed(pictures))
+        truths.append([problem.truth for problem in env.unwrapped.problems])
+    known = np.concatenate(silhouettes)
+    answers = np.concatenate(truths)
+    asked = 0
+
+    def policy(pictures: Any) -> Array:
+        nonlocal asked
+        seen = observed(pictures)
+        squares = (seen**2).sum(axis=1)[:, None] - 2.0 * seen @ known.T
+        squares += (known**2).sum(axis=1)
+        nearest = np.argpartition(squares, asked, axis=1)[:, asked]
+        asked += 1
+        return answers[nearest]
+
+    return policy
+
+
+def observed(pictures: Any) -> Array:
+    """Return the observed silhouettes (n, p) of small pictures, of 0 to 1."""
+    return np.asarray(pictures[..., ::2].reshape(len(pictures), -1) / 255.0)
+
+
 def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
-    """Return the costs that an optimiser reaches on the held-out instances, blindly or from a row's proposals."""
+    """Return the costs that an optimiser reaches on the held-out instances.
+
+    It searches blindly, or from the proposals of the row `start`.
+    """
     name = "cma" if training.agent == STARTED else training.agent
     env = made(training, INSTANCES)
     costs = []
@@ -172,7 +225,10 @@ def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]
 def minimum(
     problem: Problem, space: Space, name: str, budget: int, seed: Sequence[int]
 ) -> Problem:
-    """Return a problem minimised in a space, with one population where the budget holds no more."""
+    """Return a problem minimised in a space.
+
+    A budget below 40 is spent on one population.
+    """
     factory = registry().optimiser(name)
     settings = planned(
         factory, {"population_size": budget} if budget < 40 else {}, budget
@@ -196,7 +252,8 @@ def ppo(vector: Any, seed: int) -> Any:
     return PPO(
         "MlpPolicy", vector, seed=seed, device="cpu", gamma=0.0,
         learning_rate=lambda left: LEARNING_RATE * left,
-        n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS, policy_kwargs=policy_settings,
+        n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS,
+        policy_kwargs=policy_settings,
     )  # fmt: skip
 
 
@@ -218,7 +275,10 @@ def trained(training: Training) -> Policy:
 
 
 def cloned(model: Any, env: Any) -> None:
-    """Teach a model the truth in what its own proposals show (DAgger: Ross, Gordon, Bagnell, AISTATS 2011)."""
+    """Teach a model the truths of the observations that its own proposals lead to.
+
+    DAgger: Ross, Gordon, Bagnell, AISTATS 2011.
+    """
     import torch
 
     pictures, infos = env.reset(seed=model.seed)
@@ -249,7 +309,10 @@ def cloned(model: Any, env: Any) -> None:
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the table of a variant's rows: mean costs, and the evaluations that blind searches need for the same."""
+    """Yield the table of a variant's rows.
+
+    It has mean costs, and the evaluations that blind searches need for the same cost.
+    """
     groups: dict[str, dict[int, list[Mapping[str, Any]]]] = {}
     for row in rows:
         groups.setdefault(row["agent"], {}).setdefault(row["budget"], []).append(row)
@@ -269,7 +332,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             continue
         ((budget, group),) = budgets.items()
         costs = np.array([row["costs"] for row in group])
-        proposals = {STARTED: f"8 + {budget}", "uniform": "8"}.get(
+        proposals = {STARTED: f"8 + {budget}", "uniform": "8", LOOK_UP: "8"}.get(
             agent, "8" if agent in LEARNERS else "1"
         )
         steps = f"{budget:,}"
@@ -302,9 +365,10 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def equivalent(blind: Mapping[int, float], cost: float) -> str:
-    """Return how many evaluations a blind search needs for a mean cost, by its logarithm between those measured.
+    """Return the evaluations that a blind search needs for a mean cost.
 
-    The costs of a search are those after so many evaluations, which rise nowhere.
+    They are interpolated logarithmically between the measured budgets. A search's costs
+    are cumulative minima, so that they never rise.
     """
     budgets = np.array(list(blind))
     costs = -np.minimum.accumulate(list(blind.values()))
@@ -314,7 +378,10 @@ def equivalent(blind: Mapping[int, float], cost: float) -> str:
 
 
 def picture(row: Mapping[str, Any], path: str) -> None:
-    """Write the picture of a row's eight proposals, with their costs, where their best cost is the median."""
+    """Write the picture of a row's eight proposals with their costs.
+
+    It shows the instance with the median best cost.
+    """
     import cv2
 
     instance = int(np.argsort(row["costs"])[INSTANCES // 2])
@@ -344,32 +411,32 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     "names",
     multiple=True,
     type=click.Choice(list(VARIANTS)),
-    help="By default walks alone.",
+    help="By default only walks.",
 )
 @click.option(
     "--agent",
     "agents",
     multiple=True,
     type=click.Choice(LEARNERS),
-    help="By default all. Again for more.",
+    help="By default all. Repeatable.",
 )
 @click.option(
     "--seeds",
     type=click.IntRange(1),
     default=SEEDS,
     show_default=True,
-    help="Trainings of each.",
+    help="Number of trainings of each learner.",
 )
 @click.option(
     "--rows",
     metavar="FILE",
-    help="A file for a row a line: the same command continues there.",
+    help="File with one row a line. An earlier run there is continued.",
 )
 @click.option(
     "--picture",
     "drawn",
     metavar="FILE",
-    help="A PNG of the first PPO's eight proposals.",
+    help="PNG to write: eight proposals of the first PPO.",
 )
 @WORKERS
 def main(

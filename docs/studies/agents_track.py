@@ -1,9 +1,10 @@
-"""What does PPO reach that sees its last proposals stacked, in every frame of Track-v0, beside blind searches?
+"""Track-v0: PPO with its last proposals stacked, compared with blind searches.
 
     python docs/studies/agents_track.py
 
-Costs are the committed ones, the means over the frames of held-out tracks. A search has the environment's box and
-prediction, and as many evaluations a frame as it says; what it commits, the next frame's box goes by.
+Costs are those of committed poses, averaged over the frames of held-out tracks. A
+search has the environment's box and prediction, and the stated number of evaluations
+per frame. Its committed pose moves the next frame's box.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -35,8 +36,8 @@ from posefit_reproduce.jobs import each
 from table import WORKERS, bar, drawn_means, markdown, quantiles
 
 NAME = "posefit_envs:posefit/Track-v0"
-STACKED = 4  # the latest pictures that the agent sees
-BUDGETS = (8, 40, 100, 200)  # evaluations of a frame, of blind searches
+STACKED = 4  # number of latest pictures that the agent sees
+BUDGETS = (8, 40, 100, 200)  # evaluations per frame of blind searches
 SEEDS = 2
 INSTANCES = 100
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
@@ -49,7 +50,10 @@ DIMENSIONS = 9  # of a proposal
 
 
 def stacked(count: int) -> tuple[Any, Any]:
-    """Return a vector environment of eight proposals a frame, as Stable-Baselines3 has it, and one that stacks them."""
+    """Return a vector environment for Stable-Baselines3, and one that stacks it.
+
+    There are eight proposals per frame.
+    """
     from stable_baselines3.common.vec_env import VecFrameStack
 
     env = gym.make_vec(NAME, count, evaluations_per_frame=MAX_EVALUATIONS, errors=False)
@@ -87,23 +91,26 @@ def searched(name: str, budget: int) -> Array:
             minimum(problem, problem.space, name, budget, [frame, number]).best
             for number, problem in enumerate(env.unwrapped.problems)
         ]
-        for _ in range(2):  # the fewest proposals that commit one
+        for _ in range(2):  # a frame needs at least two proposals to commit one
             infos = env.step(np.array(best))[-1]
         costs.append(infos["committed_cost"])
     return np.array(costs).T
 
 
 def row_of(agent: str, budget: int, seed: int) -> dict[str, Any]:
-    """Return the costs (n, frames) that an agent or a search commits, and the CPU seconds until it can."""
+    """Return the costs (n, frames) that an agent or a search commits.
+
+    The CPU seconds are those of the training or the search.
+    """
     start = process_time()
     if agent in SEARCHES:
         return {"costs": searched(agent, budget), "cpu_seconds": process_time() - start}
     rng = np.random.default_rng(seed)
-    policy = (
-        trained(seed)
-        if agent == "PPO"
-        else lambda _: rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
-    )
+
+    def uniform(_: Any) -> Array:
+        return rng.uniform(-1.0, 1.0, (INSTANCES, DIMENSIONS))
+
+    policy = trained(seed) if agent == "PPO" else uniform
     cpu = process_time() - start
     return {"costs": committed(policy), "cpu_seconds": cpu}
 

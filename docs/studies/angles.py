@@ -1,7 +1,8 @@
-"""Errors of clinical angles of recorded walks, whose people are left out of the library.
+"""Errors of clinical angles in recorded walks of people who are not in the library.
 
-Hip and knee flexion and ankle dorsiflexion of both sides against the truth: the root mean square error, and the one
-that is left when the mean difference is taken off. composites.py has the same of made footage.
+Hip and knee flexion and ankle dorsiflexion of both sides are compared with the truth.
+There are two errors: the root mean square, and the same after the mean difference is
+removed. composites.py has the same for composed videos.
 """
 
 from collections.abc import Iterator, Mapping
@@ -28,9 +29,10 @@ SAGITTAL = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 def angle_errors(
     true: Motion, angles: Mapping[str, Array], seen: NDArray[np.bool_]
 ) -> dict[str, float]:
-    """Return errors in degrees of angles (T,) of both sides in the frames `seen`, that an estimate has.
+    """Return the errors in degrees of an estimate's angles (T,) in the frames `seen`.
 
-    The root mean square error of each angle, and under `_varies` the one that is left without the mean difference.
+    Both sides count together. Each angle has its root mean square error, and under
+    `_varies` the error after the mean difference is removed.
     """
     truth = clinical_angles(true.skeleton, true.poses)
     found = {}

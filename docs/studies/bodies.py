@@ -1,14 +1,18 @@
-"""Masks whose truth is known: recorded people in other bodies, tracked as footage is.
+"""Tracks of recorded people in other bodies, with masks of a known truth.
 
     python docs/studies/bodies.py films
     python docs/studies/bodies.py films --report
 
-The motions of the library's people, each left out of it, get bodies with other proportions, drawn with the spreads and
-correlations of adults, other girths, and flesh that is not centred on the joints. One, two or four cameras at eight
-metres, whose calibrations are a little wrong, film them; the masks are damaged as a segmenter does. A half of the
-films by one camera has landmarks that exchange left and right at times. Ten films are tracked with five seeds. Each
-track is kept in the folder, which the same command continues. The report says what intervals lack, learned from all
-bodies, and judges each body by what the others teach.
+The motions are those of the library's people, who are each left out of it. Their bodies
+get other proportions, drawn with the spreads and correlations of adults, other girths,
+and flesh off the joints' centres. One, two or four cameras at eight metres film them,
+with calibrations that are slightly wrong. The masks are damaged as by a segmenter. Half
+of the films by one camera have landmarks that sometimes exchange left and right. Ten
+films are tracked with five seeds.
+
+Each track is stored in the folder, and the same command continues there. The report
+says what intervals lack, learned from all bodies; each body is judged by what the
+others teach.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -75,8 +79,10 @@ from posefit.uncertainty.shared import DEPTH, PARTS, STATURE, shared_spreads
 from posefit_reproduce.jobs import each
 from table import WORKERS, earlier, kept, markdown, percent
 
-GIRTH = 0.1  # that a part of the body may be thicker or thinner than the average's
-# Standard deviations in metres of the flesh's middle from the joints: to the side, upwards, forwards. Ours.
+# largest difference of a part's girth from the average's, as a share
+GIRTH = 0.1
+# Standard deviations in metres of the flesh's middle from the joints: to the side,
+# upwards, forwards. Ours.
 OFFSETS: Mapping[str, tuple[float, float, float]] = {
     "root": (0.0, 0.015, 0.02),
     "hipjoint": (0.01, 0.015, 0.015),
@@ -91,29 +97,29 @@ OFFSETS: Mapping[str, tuple[float, float, float]] = {
     "humerus": (0.005, 0.007, 0.007),
     "radius": (0.005, 0.007, 0.007),
 }
-# deviations of rotation, place in metres, and focal length
+# standard deviations of rotation, place in metres, and focal length as a share
 CALIBRATION_OFF = (np.radians(0.2), 0.01, 0.005)
-# pixels: deviations of a film's border, and of the border along the outline
+# pixels: standard deviations of a film's border, and of the border along the outline
 RIM = 0.5
 ROUGH = 0.7
 DAMAGE = {"holes": 0.1, "blobs": 0.1}
 SHADOW = 0.15
-LANDMARK_OFF = 0.02  # metres, of a film and again of each frame
+LANDMARK_OFF = 0.02  # metres, constant in a film, and again in each frame
 # shares of the frames in which a film's landmarks exchange legs, or arms
 EXCHANGED = (0.03, 0.15, 0.4)
-EXCHANGE_FRAMES = 6.0  # that such an exchange lasts on average
-LONGEST = 60  # frames of those who stay
+EXCHANGE_FRAMES = 6.0  # average length of an exchange
+LONGEST = 60  # frames of people who stay
 WALK_METRES = 2.6
 BODIES = 10
-# films, and seeds that each of them is tracked with
+# number of films with several seeds, and of seeds
 SEVERAL = 10
 SEEDS = 5
-SOONER = 60  # films before the other seeds
-# metres of shared error
+SOONER = 60  # number of films before the other seeds
+# tried shared errors in metres
 GRID = 1e-3 * np.array(
     [0, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70, 80, 100, 120, 150]
 )
-STRIDE = 2  # frames of which the first is counted
+STRIDE = 2  # every second frame counts
 JOINTS_OF = {
     part: [j for j, joint in enumerate(JOINTS) if kind(joint) in names]
     for part, names in PARTS.items()
@@ -131,16 +137,19 @@ SEGMENTS = {
 LEGS = [
     j for j, joint in enumerate(JOINTS) if kind(joint) in ("femur", "tibia", "foot")
 ]
-# MPJPE of a track: at most, at least
+# largest MPJPE of a right track, and smallest of a wrong one
 RIGHT_MM = 65.0
 WRONG_MM = 75.0
-# of one thigh, and of the time: the share by which a cycle runs faster and slower
+# turn of one thigh; share by which a cycle runs faster and slower
 LIMP_DEGREES = 7.0
 LIMP_WARP = 0.15
 
 
 class Act(NamedTuple):
-    """What a person does: frames of a clip, the way they face (degrees to the first camera), and whether they walk."""
+    """An action: frames of a clip, the person's direction, and whether they walk.
+
+    `degrees` is measured from the direction of the first camera.
+    """
 
     clip: str
     degrees: float
@@ -174,7 +183,7 @@ LIMPS = [
 
 
 class Shot(NamedTuple):
-    """One film: what happens, which of its acts, before how many cameras, in whose body, and whether they limp."""
+    """One film: its situation, act, number of cameras and body."""
 
     situation: str
     number: int
@@ -185,14 +194,17 @@ class Shot(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Of its row, and of its file."""
+        """The name of its row and its file."""
         marks = "-landmarks" if self.landmarks else ""
         again = f"-seed-{self.seed}" if self.seed else ""
         return f"{self.situation}-{self.number}-{self.views}-{self.body}{marks}{again}"
 
 
 def shots() -> list[Shot]:
-    """Return all films, whose bodies take turns; those by several cameras have no landmarks, as is the default."""
+    """Return all films; bodies take turns.
+
+    Films by several cameras have no landmarks, as by default.
+    """
     listed = []
     body = 0
     for again in range(2):
@@ -209,7 +221,7 @@ def shots() -> list[Shot]:
                         )
                     )
                 body += 1
-    # so that a part of them is of all kinds
+    # shuffled, so that the first films include all kinds
     order = np.random.default_rng(62).permutation(len(listed))
     listed = [listed[k] for k in order]
     first = [shot for shot in listed if shot.situation != "limp"][:SEVERAL]
@@ -222,16 +234,16 @@ def shots() -> list[Shot]:
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A motion with the joints of its truth, and the body that is filmed, whose flesh is moved off the joints."""
+    """A motion with the true joints, and the filmed body with flesh off the joints."""
 
     motion: Motion
     body: Body
     flesh: Body = field(repr=False)
-    root_off: Array  # (3,) of the flesh's root, in the frame of the pelvis
+    root_off: Array  # (3,) of the flesh's root, in the pelvis's frame
 
     @property
     def flesh_joints(self) -> Array:
-        """Where the flesh turns (T, 27, 3): all that masks can show."""
+        """The joints (T, 27, 3) of the flesh, which are all that masks can show."""
         return replace(self.motion, skeleton=self.flesh.skeleton).joints
 
     def mask(self, camera: Camera, k: int) -> Any:
@@ -245,7 +257,7 @@ class Person:
 
 
 def body_of(number: int) -> tuple[Body, Body, Array]:
-    """Return a body, its flesh as a body of its own, and how far the flesh's root is off (3,)."""
+    """Return a body, its flesh as a separate body, and the flesh's root offset (3,)."""
     rng = np.random.default_rng([62, number])
     average = Body.of(built_in.average_skeleton())
     logs = np.zeros(len(NAMES))
@@ -271,13 +283,13 @@ def body_of(number: int) -> tuple[Body, Body, Array]:
         [j, *(k for k, parent in enumerate(PARENTS) if parent == j)]
         for j in range(len(JOINTS))
     ]
-    # flesh turns about the joints: it is moved across the longest bone, not along it
+    # flesh turns around the joints: it moves across the longest bone, not along it
     for joint in range(len(JOINTS)):
         longest = max((bones[k] for k in ends[joint]), key=np.linalg.norm)
         along = longest / np.linalg.norm(longest)
         off[joint] -= (off[joint] @ along) * along
     for joint, parent in enumerate(PARENTS):
-        # hands, toes and the head go with what they hang on
+        # hands, toes and the head move with their parents
         if joint and not off[joint].any():
             off[joint] = off[parent]
     flesh = body.skeleton.offsets + off[1:] - off[np.array(PARENTS[1:])]
@@ -285,7 +297,7 @@ def body_of(number: int) -> tuple[Body, Body, Array]:
 
 
 def person(shot: Shot) -> Person:
-    """Return who is filmed."""
+    """Return the filmed person."""
     act = (LIMPS if shot.situation == "limp" else ACTS[shot.situation])[shot.number]
     body, flesh, root_off = body_of(shot.body)
     motion = frames_of(act.clip, act.start, None if act.walks else act.start + LONGEST)
@@ -307,7 +319,10 @@ def person(shot: Shot) -> Person:
 
 
 def limping(motion: Motion, number: int) -> Motion:
-    """Return a walk whose one thigh is turned back, so that its steps are shorter, and whose time runs unevenly."""
+    """Return a limping walk.
+
+    One thigh is turned back, so that its steps are shorter, and time runs unevenly.
+    """
     short = SIDES[number % 2]
     strikes = [
         motion.fps * step.strike_seconds
@@ -337,7 +352,7 @@ def limping(motion: Motion, number: int) -> Motion:
 def cameras_of(
     shot: Shot, rng: np.random.Generator
 ) -> tuple[list[Camera], list[Camera]]:
-    """Return the cameras, and what their calibrations say."""
+    """Return the cameras, and their calibrations."""
     target = np.array([0.0, HEIGHT, 0.0])
     turned = rng.uniform(-15.0, 15.0)
     true = [
@@ -363,7 +378,7 @@ def cameras_of(
 
 
 def damaged(mask: Any, shadow: int | None, rim: float, rng: np.random.Generator) -> Any:
-    """Return a mask as a segmenter might have taken it out; the `shadow` of a seed is that of a film."""
+    """Return a mask with a segmenter's damage; `shadow` is the seed of a shadow."""
     if not mask.any():
         return mask
     if shadow is not None:
@@ -372,7 +387,7 @@ def damaged(mask: Any, shadow: int | None, rim: float, rng: np.random.Generator)
 
 
 def landmarks_of(motion: Motion, camera: Camera, rng: np.random.Generator) -> Array:
-    """Return landmarks (T, 27, 3) whose left and right are exchanged at times."""
+    """Return landmarks (T, 27, 3) that sometimes exchange left and right."""
     off = LANDMARK_OFF * (
         rng.standard_normal((len(JOINTS), 3))
         + rng.standard_normal((len(motion), len(JOINTS), 3))
@@ -384,11 +399,10 @@ def landmarks_of(motion: Motion, camera: Camera, rng: np.random.Generator) -> Ar
         now = False
         for k in range(len(motion)):
             leave = 1.0 / EXCHANGE_FRAMES
-            now = (
-                rng.random() >= leave
-                if now
-                else rng.random() < leave * share / (1.0 - share)
-            )
+            # so that a share of the frames is exchanged in the long run
+            enter = leave * share / (1.0 - share)
+            chance = rng.random()
+            now = chance >= leave if now else chance < enter
             exchanged[k] = now
         joints[np.ix_(exchanged, group)] = joints[np.ix_(exchanged, OTHER_SIDE[group])]
     known = np.isin(np.arange(len(JOINTS)), np.concatenate(GROUPS))
@@ -399,7 +413,7 @@ def landmarks_of(motion: Motion, camera: Camera, rng: np.random.Generator) -> Ar
 
 
 def measured(folder: Path, shot: Shot) -> dict[str, Any]:
-    """Return the row of a film, which is made, tracked, and kept in a folder."""
+    """Return the row of a film, which is made, tracked, and stored in a folder."""
     who = person(shot)
     rng = np.random.default_rng(
         [shot.body, shot.views, shot.number, *shot.situation.encode()]
@@ -413,11 +427,9 @@ def measured(folder: Path, shot: Shot) -> dict[str, Any]:
             damaged(who.mask(camera, k), shadow, rim, rng)
             for k in range(len(who.motion))
         ]
-        marks: dict[str, Any] = (
-            {"landmarks": landmarks_of(who.motion, camera, rng)}
-            if shot.landmarks
-            else {}
-        )
+        marks: dict[str, Any] = {}
+        if shot.landmarks:
+            marks = {"landmarks": landmarks_of(who.motion, camera, rng)}
         paths.append(folder / f"{shot.name}-{number}.npz")
         np.savez_compressed(
             paths[-1], masks=np.array(masks), fps=np.array(who.motion.fps), **marks
@@ -452,7 +464,7 @@ def measured(folder: Path, shot: Shot) -> dict[str, Any]:
 
 
 def figures(result: Track, who: Person) -> dict[str, Any]:
-    """Return what a track is worth."""
+    """Return the figures of a track."""
     true = who.motion.joints
     joints = result.motion.joints
     mpjpe = metrics.mpjpe_mm(true, joints)
@@ -485,7 +497,10 @@ def figures(result: Track, who: Person) -> dict[str, Any]:
 
 
 def legs_exchanged(true: Array, joints: Array) -> Array:
-    """Return in which frames (T,) the legs of joints (T, 27, 3) are nearer to the other ones of the truth."""
+    """Return the frames (T,) in which left and right legs are exchanged.
+
+    There the legs of joints (T, 27, 3) are nearer to the truth's opposite legs.
+    """
     here = joints - joints[:, :1]
     there = true - true[:, :1]
     other = np.array(OTHER_SIDE)[LEGS]
@@ -497,7 +512,7 @@ def legs_exchanged(true: Array, joints: Array) -> Array:
 
 
 def steps_of(gait: Gait) -> dict[str, float | None]:
-    """Return the steps' lengths and times, left and right."""
+    """Return the lengths and times of left and right steps."""
     feet = {"left": gait.left, "right": gait.right}
     names = ("step_length", "step_seconds")
     return {
@@ -508,7 +523,7 @@ def steps_of(gait: Gait) -> dict[str, float | None]:
 
 
 def keep(path: Path, result: Track, who: Person) -> None:
-    """Write what intervals are learned from."""
+    """Write the data from which intervals are learned."""
     motion = result.motion
     posteriors = [
         frame.posterior for frame in result.frames if frame.posterior is not None
@@ -517,7 +532,7 @@ def keep(path: Path, result: Track, who: Person) -> None:
         np.array([posterior.poses for posterior in posteriors])
     )
     models = [posterior.recalibration or Recalibration() for posterior in posteriors]
-    # with what this study learned
+    # take off the shared spreads, which this study taught
     spreads = np.array([model.joint_spreads for model in models])
     spreads = np.sqrt(
         np.maximum(spreads**2 - shared_spreads(len(result.scene.cameras)) ** 2, 0.0)
@@ -536,16 +551,20 @@ def keep(path: Path, result: Track, who: Person) -> None:
 
 
 class Film(NamedTuple):
-    """Of a film: its body and cameras, the shares of each joint held (body or world, grid, levels, 27), and depths."""
+    """A film's results.
+
+    `held` has the shares of each joint within its intervals: (body or world, grid,
+    levels, 27).
+    """
 
     body: int
     views: int
     held: Array
-    depths_off: Array  # (T,) as shares
+    depths_off: Array  # (T,) relative errors of depth
 
 
 def film_of(folder: Path, row: Mapping[str, Any]) -> Film:
-    """Return how often the intervals of a kept track hold, with each shared error of the grid."""
+    """Return how often a stored track's intervals hold, for each shared error."""
     with np.load(folder / f"{row['name']}.npz") as stored:
         kept = {name: stored[name][::STRIDE].astype(np.float64) for name in stored}
     off = (
@@ -576,7 +595,10 @@ def film_of(folder: Path, row: Mapping[str, Any]) -> Film:
 
 
 def least_shared(films: Sequence[Film], where: int, joints: Sequence[int]) -> int:
-    """Return the place in the grid of the least shared error with which 80 % hold 80 % of some joints."""
+    """Return the index in the grid of the smallest sufficient shared error.
+
+    With it, 80 % intervals of some joints hold in 80 % of the frames.
+    """
     held = np.mean(
         [film.held[where, :, MAIN_LEVEL][:, joints] for film in films], axis=(0, 2)
     )
@@ -585,11 +607,16 @@ def least_shared(films: Sequence[Film], where: int, joints: Sequence[int]) -> in
 
 
 def intervals_lines(films: Sequence[Film]) -> Iterator[str]:
-    """Yield what all films teach, and how often intervals hold for each body, learned from films of the others."""
+    """Yield what all films teach, and how often intervals hold for each body.
+
+    A body's intervals are learned from films of the others.
+    """
     alone = np.abs(
         np.concatenate([film.depths_off for film in films if film.views == 1])
     )
-    yield f"depth by one camera: {np.quantile(alone, LEVELS[MAIN_LEVEL]) / ndtri(0.5 + 0.5 * LEVELS[MAIN_LEVEL]):.3f}"
+    level = LEVELS[MAIN_LEVEL]
+    spread = np.quantile(alone, level) / ndtri(0.5 + 0.5 * level)
+    yield f"depth by one camera: {spread:.3f}"
     yield ""
     heads = [
         "cameras",
@@ -634,7 +661,10 @@ def intervals_lines(films: Sequence[Film]) -> Iterator[str]:
 
 
 def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield errors of joints, of angles of walks `through`, and of lengths, by the number of cameras."""
+    """Yield errors of joints, angles and lengths by the number of cameras.
+
+    Angles are of walks `through`.
+    """
     heads = ["cameras", "films", "MPJPE mm", "through", "of the flesh itself"]
     heads += [f"{name.replace('_', ' ')}, degrees" for name in SAGITTAL]
     heads += [*(f"{name} %" for name in SEGMENTS), "known and exchanged %"]
@@ -642,6 +672,10 @@ def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for views in PLACES:
         some = [row for row in rows if row["views"] == views]
         through = [row for row in some if row["situation"] == "through"]
+        lengths_off = [
+            100.0 * np.mean([abs(row["lengths"][name]) for row in some])
+            for name in SEGMENTS
+        ]
         cells.append(
             [
                 str(views),
@@ -655,10 +689,7 @@ def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
                     f"{np.median([row['degrees'][name] for row in through]):.1f}"
                     for name in SAGITTAL
                 ),
-                *(
-                    f"{100.0 * np.mean([abs(row['lengths'][name]) for row in some]):.1f}"
-                    for name in SEGMENTS
-                ),
+                *(f"{percent_off:.1f}" for percent_off in lengths_off),
                 percent(float(np.mean([row["known_exchanged"] for row in some])), 1),
             ]
         )
@@ -666,7 +697,10 @@ def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def verdict_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield how many right tracks, and how many wrong ones, read good, by bodies and the number of cameras."""
+    """Yield how many right and wrong tracks have the grade good.
+
+    There is a row for each number of cameras, and for odd and even bodies.
+    """
     cells = []
     for views, odd in product(PLACES, (0, 1)):
         some = [row for row in rows if row["views"] == views and row["body"] % 2 == odd]
@@ -678,7 +712,7 @@ def verdict_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield by how much the MPJPE of films differs between seeds of the track."""
+    """Yield how much the MPJPE of films differs between seeds of the track."""
     films: dict[str, list[float]] = {}
     for row in rows:
         films.setdefault(row["name"].partition("-seed-")[0], []).append(row["mpjpe_mm"])
@@ -727,7 +761,9 @@ def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 @click.command(help=__doc__)
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--report", is_flag=True, help="Print what the folder holds instead.")
+@click.option(
+    "--report", is_flag=True, help="Print the report of the folder; track nothing."
+)
 @WORKERS
 def main(folder: Path, report: bool, workers: int | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,8 @@
-"""How well a person's build is found.
+"""How accurately a person's build is estimated.
 
-Synthetic subjects whose bones and radii are each up to 10 % off the average, and who are up to 10 % taller or smaller.
-A cell follows the person whose build is known, so the runs are jobs.
+The subjects are synthetic: bones and radii are each up to 10 % off the average, and the
+stature is up to 10 % taller or smaller. A sweep's cell tracks a person with known
+build, so these runs are jobs.
 """
 
 from collections.abc import Iterator
@@ -30,11 +31,11 @@ from table import WORKERS, bar
 MOTION = "walk-b"
 SIZE = (320, 240)
 PERCENT = 10.0
-SUBJECTS = 8  # people, each of another build
+SUBJECTS = 8  # each with a different build
 
 
 class Setup(NamedTuple):
-    """What is known of a person beside the silhouettes."""
+    """What is known of a person, in addition to the silhouettes."""
 
     label: str
     views_degrees: tuple[float, ...]
@@ -65,7 +66,10 @@ def subject(seed: int) -> Body:
 
 
 def builds_lines(workers: int | None) -> Iterator[str]:
-    """Yield by how many percent stature and limbs are off, after the fit and before it, for every setup."""
+    """Yield the errors of stature and limbs in percent, for every setup.
+
+    There is a line for the fitted build, and one for the average.
+    """
     keys = list(product(SETUPS, range(SUBJECTS)))
     figures_of = each(
         {(one.label, k): partial(_percent_off, one, k) for one, k in keys}, workers, bar
@@ -84,17 +88,18 @@ def builds_lines(workers: int | None) -> Iterator[str]:
 
 
 def _percent_off(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
-    """Return by how many percent a subject's parts are off after the fit, and as they were taken to be before it."""
+    """Return the errors of a subject's parts in percent, after the fit and before."""
     options = TrackOptions(method="@loose")
     average = Body.of(built_in.average_skeleton())
     true = subject(seed)
     walk = replace(built_in.motion(MOTION), skeleton=true.skeleton)
     scene = synthetic(walk, setup.views_degrees, SIZE, [], (None, None))
     scene = replace(scene, body=true, observations=rendered(walk, true, scene.cameras))
-    height = true.stature if setup.stature else None
-    start = (
-        average if height is None else average.scaled(*[height / average.stature] * 2)
-    )
+    height = None
+    start = average
+    if setup.stature:
+        height = true.stature
+        start = average.scaled(*[height / average.stature] * 2)
     training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
     task = Task(
         start,
@@ -112,7 +117,7 @@ def _percent_off(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
 
 
 def _off(body: Body, true: Body) -> list[float]:
-    """Return by how many percent stature and limbs are off."""
+    """Return the errors of stature and limbs in percent."""
     limbs = [[BONES.index(bone) for bone in bones] for bones in LIMBS.values()]
     lengths, others = (
         [one.stature, *(one.skeleton.lengths[limb].sum() for limb in limbs)]

@@ -1,4 +1,4 @@
-"""Recorded clips of people who are not in the library, and their tracks; other studies share them."""
+"""Recorded clips of people outside the library, and their tracks, for all studies."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Track
 
-# evaluations of a frame, the default of `posefit track`
+# evaluations per frame, the default of `posefit track`
 METHOD = "exemplars"
 EVALUATIONS = 9760
 
@@ -20,7 +20,7 @@ EVALUATIONS = 9760
 class Clip(NamedTuple):
     """The first frames of an instance of a recorded clip."""
 
-    name: str  # of `posefit motions`: the subject, and the number of their clip
+    name: str  # as in `posefit motions`: subject and clip number
     frames: int
     instance: int
     shows: str
@@ -38,8 +38,8 @@ class Clip(NamedTuple):
 
 WALKS = "walks"
 RUNS = "runs"
-# The first few of a group are of different people, since a quick look takes only these. Most runs of the database are
-# shorter than two seconds.
+# The first few of a group are of different people, because a quick run takes only
+# these. Most runs of the database are shorter than two seconds.
 GROUPS: dict[str, tuple[Clip, ...]] = {
     WALKS: (
         Clip("02_01", 86, 0, "walks straight"),
@@ -92,7 +92,7 @@ GROUPS: dict[str, tuple[Clip, ...]] = {
     ),
 }
 
-# Clips that no study learned from or was tuned on, for one report at the end.
+# Clips from which no study learned and on which none was tuned, for one final report.
 ASIDE: dict[str, tuple[Clip, ...]] = {
     WALKS: (
         Clip("16_32", 120, 0, "walks straight"),
@@ -124,7 +124,7 @@ SIDES: tuple[Views, ...] = ((0.0,), (45.0,), (90.0,), (135.0,), (180.0,))
 PAIRS: tuple[Views, ...] = ((0.0, 90.0), (45.0, 135.0))
 FOUR: Views = (0.0, 90.0, 180.0, 270.0)
 
-# that bones and radii of another body are off at most: five per cent, root mean square
+# largest difference of bones and radii from the person's: 5 % root mean square
 OFF_PERCENT = 10.0
 DAMAGE = {"holes": 0.3, "blobs": 0.3, "jitter": 0.3, "dropped": 0.1}
 CHANGES: dict[str, Mapping[str, Any]] = {
@@ -143,7 +143,10 @@ CHANGES["all of these"] = {
 
 
 def cell_fields(clip: Clip, views: Views, frames: int, **fields: Any) -> dict[str, Any]:
-    """Return the fields of a cell that tracks a clip without its subject in the library, with some fields changed."""
+    """Return the fields of a cell that tracks a clip without its subject's library.
+
+    `fields` replaces some of them.
+    """
     return {
         "method": METHOD,
         "motion": clip.name,
@@ -158,7 +161,10 @@ def cell_fields(clip: Clip, views: Views, frames: int, **fields: Any) -> dict[st
 
 
 def track_of(cell: TrackCell, scene: Scene, **changes: Any) -> Track:
-    """Return the track of a cell in a scene, which may differ from the cell's own, with some options changed."""
+    """Return the track of a cell in a scene, with some options changed.
+
+    The scene may differ from the cell's own.
+    """
     training = training_motions(
         training_clips(cell.train, followed=cell.motion), scene.fps
     )

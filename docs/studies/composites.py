@@ -1,4 +1,4 @@
-"""Videos made from the truth, tracked as any footage: each row is kept as it comes."""
+"""Composed videos with a known truth, tracked like any footage."""
 
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,15 +43,20 @@ Masks = NDArray[np.bool_]  # (views, T, height, width)
 
 
 def uncut(masks: Masks) -> NDArray[np.bool_]:
-    """Return in which frames of each view (views, T) a person is seen and nowhere cut by the picture's border."""
+    """Return the frames of each view (views, T) in which a person is wholly visible.
+
+    That is, a person is seen, and the picture's border cuts nothing off.
+    """
     edges = (masks[:, :, 0], masks[:, :, -1], masks[..., 0], masks[..., -1])
-    return np.asarray(
-        masks.any(axis=(2, 3)) & ~np.any([edge.any(axis=2) for edge in edges], axis=0)
-    )
+    cut = np.any([edge.any(axis=2) for edge in edges], axis=0)  # (views, T)
+    return np.asarray(masks.any(axis=(2, 3)) & ~cut)
 
 
 def track_figures(track: Track, situation: Situation, truth: Masks) -> dict[str, Any]:
-    """Return what a track is worth in the frames in which a camera sees all of the person."""
+    """Return the figures of a track.
+
+    Only frames in which a camera sees the whole person count.
+    """
     true = situation.actors[0].motion
     estimate = track.motion
     seen = np.asarray(uncut(truth).any(axis=0))
@@ -59,13 +64,14 @@ def track_figures(track: Track, situation: Situation, truth: Masks) -> dict[str,
     swapped = nearer_mirrored(true.joints, estimate.joints)
     unknown = track.table["unknown_sides"]
     known = seen & (unknown == 0.0)
+    said_unknown = None
+    if np.isfinite(unknown[seen]).any():
+        said_unknown = float((unknown[seen] == 1.0).mean())
     return {
         "mpjpe_mm": float(mpjpe[seen].mean()),
         "lost": float((mpjpe[seen] > LOST_MM).mean()),
         "swapped": float(swapped[seen].mean()),
-        "said_unknown": float((unknown[seen] == 1.0).mean())
-        if np.isfinite(unknown[seen]).any()
-        else None,
+        "said_unknown": said_unknown,
         "known_wrong": float(swapped[known].mean()) if known.any() else None,
         **angle_errors(true, clinical_angles(estimate.skeleton, estimate.poses), seen),
     }
@@ -74,9 +80,10 @@ def track_figures(track: Track, situation: Situation, truth: Masks) -> dict[str,
 def legs_exchanged(
     scene: Scene, actor: Motion, seen: NDArray[np.bool_]
 ) -> float | None:
-    """Return in what share of the pictures (views, T) that are `seen` a segmenter's landmarks exchange the legs.
+    """Return the share of pictures in which a segmenter's landmarks exchange the legs.
 
-    None where no segmenter gives landmarks.
+    Only pictures that are `seen` (views, T) count. None if no segmenter gives
+    landmarks.
     """
     exchanged = list[bool]()
     legs = GROUPS[0]
@@ -101,9 +108,10 @@ def legs_exchanged(
 
 
 def other_person_share(scene: Scene, masks: NDArray[np.bool_]) -> float | None:
-    """Return the share of the usable pictures that show more of another actor than of the first; None for one actor.
+    """Return the share of usable pictures that show more of another actor.
 
-    `masks` (actors, views, T, height, width) are the true ones.
+    None if there is only one actor. `masks` (actors, views, T, height, width) are the
+    true ones.
     """
     if len(masks) == 1:
         return None
@@ -119,7 +127,7 @@ def other_person_share(scene: Scene, masks: NDArray[np.bool_]) -> float | None:
 
 
 def entry_point(masks: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the column and row about which an actor (T, height, width) is visible first."""
+    """Return column and row of an actor's first visible mask (T, height, width)."""
     first = int(masks.any(axis=(1, 2)).argmax())
     row, column = np.argwhere(masks[first]).mean(axis=0)
     return float(column), float(row)
@@ -127,7 +135,7 @@ def entry_point(masks: NDArray[np.bool_]) -> tuple[float, float]:
 
 Row = Mapping[str, Any]
 
-# What a table shows of a row: its head, digits, and what a value is multiplied by.
+# Columns of a table: head, digits, and factor on the value.
 COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "mpjpe_mm": ("MPJPE mm", 0, 1.0),
     "lost": ("lost %", 0, 100.0),
@@ -139,11 +147,11 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     **{name: (f"{name.replace('_', ' ')} off, degrees", 1, 1.0) for name in SAGITTAL},
 }
 LIMITS = Limits(gigabytes=8.0)  # four cameras, and MediaPipe's libraries
-DEFAULT = "default"  # as `posefit track` takes people out by itself
+DEFAULT = "default"  # segments as `posefit track` does by itself
 
 
 class Shot(NamedTuple):
-    """One row: what happens, before how many cameras, by which segmenter, and which people it is."""
+    """One row: a situation, the number of cameras, the segmenter, and the people."""
 
     situation: str
     views: int
@@ -152,7 +160,10 @@ class Shot(NamedTuple):
 
 
 def row_of(video: str, shot: Shot) -> dict[str, Any]:
-    """Return the row of a shot: it is filmed, taken out and tracked; what was refused is said in the tool's words."""
+    """Return the row of a shot, which is filmed, segmented and tracked.
+
+    If the tool refuses the film, the row has its message.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         scene = situation(shot.situation, shot.views, shot.seed)
@@ -163,15 +174,16 @@ def row_of(video: str, shot: Shot) -> dict[str, Any]:
             "people": scene.people,
             "frames": len(scene),
         }
+        chosen = None
+        if shot.extraction != DEFAULT:
+            chosen = Extraction(shot.extraction)
         try:
             result = track(
                 videos,
                 camera=scene.cameras,
-                extraction=None
-                if shot.extraction == DEFAULT
-                else Extraction(shot.extraction),
+                extraction=chosen,
                 height=scene.actors[0].body.stature,
-                # who gives a height knows whose it is
+                # of several people, point at the one with the given height
                 person=entry_point(masks[0, 0]) if len(masks) > 1 else None,
                 train=[recorded.leaving_out(recorded.LIBRARY, scene.people)],
                 progress=QUIET,
@@ -232,25 +244,29 @@ def composites_lines(rows: Sequence[Row]) -> Iterator[str]:
     "extractions",
     multiple=True,
     default=(DEFAULT, "mixture"),
-    help="A segmenter's name.",
+    help="A segmenter's name. Repeatable.",
 )
 @click.option(
     "--seeds",
     type=click.IntRange(1),
     default=1,
     show_default=True,
-    help="Of other people in other clothes.",
+    help="Number of different people and clothes.",
 )
 @click.option(
     "--rows",
     metavar="FILE",
-    help="A file for a row a line: the same command continues there.",
+    help="File with one row a line. An earlier run there is continued.",
 )
 @WORKERS
 def main(
-    video: str, situations: Sequence[str], extractions: Sequence[str], seeds: int, rows: str | None,
+    video: str,
+    situations: Sequence[str],
+    extractions: Sequence[str],
+    seeds: int,
+    rows: str | None,
     workers: int | None,
-) -> None:  # fmt: skip
+) -> None:
     for name in set(extractions) - {DEFAULT}:
         registry().offer("segmenter", name)
     check_video(video)

@@ -1,4 +1,4 @@
-"""Videos with a known truth: recorded people in clothes, rendered before the empty pictures of a real place."""
+"""Videos with a known truth: recorded people, composed into real empty pictures."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,11 +24,10 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 from posefit.silhouette.rasteriser import NEAR
 
-# texels to a side of a weave, which are a turn around a limb and `LENGTH` metres along
-# it
+# side of a weave in texels; it is one turn around a limb and `LENGTH` metres along it
 TILE = 256
 LENGTH = 0.6
-ROUGH = (4, 12, 40, 128)  # waves of a weave to a side, the coarse ones first
+ROUGH = (4, 12, 40, 128)  # waves along a weave's side, the coarse ones first
 GARMENTS: Mapping[str, str] = {
     "hipjoint": "trousers",
     "femur": "trousers",
@@ -41,19 +40,19 @@ GARMENTS: Mapping[str, str] = {
     "wrist": "skin",
     "hand": "skin",
     "radius": "skin",
-}  # all others are the shirt
+}  # all others belong to the shirt
 SKIN = ((140, 165, 205), (95, 120, 165), (60, 80, 115))  # blue, green, red
-# None is the colour of what is behind
+# None is the colour of the background
 SHIRTS = ((60, 60, 170), (150, 90, 50), (215, 215, 220), None)
 TROUSERS = ((110, 70, 40), None, (45, 45, 50), (95, 140, 165))
 SHOES = ((40, 40, 45), (220, 220, 220))
-# of a weave, a share of the colour
+# strength of a weave, as a share of the colour
 STRENGTH = {"shirt": 0.22, "trousers": 0.14, "skin": 0.05, "shoes": 0.1}
 
 
 @dataclass(frozen=True, eq=False)
 class Outfit:
-    """The colour of each bone (26, 3), its weave (TILE, TILE), and how strong that is (26,)."""
+    """The colour of each bone (26, 3), a weave (TILE, TILE), and its strength (26,)."""
 
     colours: Array = field(repr=False)
     strengths: Array = field(repr=False)
@@ -61,7 +60,10 @@ class Outfit:
 
 
 def outfit(number: int, behind: Image) -> Outfit:
-    """Return clothes by their number, seen before a picture: what has its colour is as what is about its middle."""
+    """Return clothes by their number.
+
+    A garment without a colour has that of the middle of the picture behind it.
+    """
     rng = np.random.default_rng([number, 3])
     height, width = behind.shape[:2]
     about = behind[height // 3 : 4 * height // 5, width // 4 : 3 * width // 4].reshape(
@@ -84,7 +86,7 @@ def outfit(number: int, behind: Image) -> Outfit:
 
 
 def _weave(rng: np.random.Generator) -> NDArray[np.float32]:
-    """Return a pattern of mean 0 and deviation 1 that goes on where it ends."""
+    """Return a periodic pattern of mean 0 and standard deviation 1."""
     whole = np.zeros((TILE, TILE), dtype=np.float32)
     for waves in ROUGH:
         small = np.pad(
@@ -99,13 +101,13 @@ def _weave(rng: np.random.Generator) -> NDArray[np.float32]:
 
 
 FILMED = (1768, 994)  # pixels of the video
-# frames, an odd number: a pixel is empty in most of them
+# an odd number of frames: a pixel is empty in most of them
 EMPTY = (0, 8, 16, 24, 30, *range(216, 230))
-# frames from the first, whose difference from the empty picture is what lives in it
+# the first frames; their differences from the empty picture are its movements
 LIVING = 31
-PEOPLE = 25  # grey levels: where it ever differs by more, somebody is there
-SEEN = (1240, 697)  # pixels of the part that one camera sees
-# left and top of that of each camera
+PEOPLE = 25  # grey levels: a pixel that ever differs by more shows a person
+SEEN = (1240, 697)  # pixels of the part that a camera sees
+# left and top of each camera's part
 CORNERS = ((260, 297), (0, 297), (120, 250), (330, 200))
 FLICKER = 0.012  # of the brightness, slowly; and a third as much from frame to frame
 NOISE = 2.0  # grey levels, of the sensor
@@ -116,11 +118,14 @@ class Plate:
     """The empty pictures of one camera."""
 
     still: NDArray[np.float32] = field(repr=False)  # (height, width, 3)
-    # (frames, height, width, 3), added to it
+    # (frames, height, width, 3), movements that are added to it
     living: NDArray[np.int8] = field(repr=False)
 
     def frame(self, k: int) -> NDArray[np.float32]:
-        """Return the picture of frame k, without flicker or noise: to and fro through what lives."""
+        """Return the picture of frame k, without flicker or noise.
+
+        The movements run forwards and backwards.
+        """
         last = len(self.living) - 1
         return np.asarray(self.still + self.living[last - abs(k % (2 * last) - last)])
 
@@ -143,14 +148,14 @@ def plate(video: str | Path, camera: int, size: tuple[int, int]) -> Plate:
 
 
 def sensed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Image:
-    """Return what a sensor makes of the picture of frame k."""
+    """Return the sensor's picture of frame k."""
     gain = 1.0 + FLICKER * (np.sin(0.21 * k) + rng.normal() / 3.0)
     noise = NOISE * rng.standard_normal(image.shape, dtype=np.float32)
     return np.asarray(np.clip(gain * image + noise, 0.0, 255.0).astype(np.uint8))
 
 
 def check_video(path: str) -> Video:
-    """Return the video of empty pictures. Raises ValueError where it is another one."""
+    """Return the video of empty pictures. Raises ValueError if it is another one."""
     video = Video.of(path)
     frames = max(EMPTY) + 1
     count = video.count() if video.size == FILMED else 0
@@ -159,21 +164,25 @@ def check_video(path: str) -> Video:
         wanted = f"{wanted} pixels and {frames} frames"
         came = f"{came} and {count} frames" if count else f"{came}"
         raise InputError(
-            f"{path}: expected the demonstration video of Sports2D, {wanted}, got {came}"
+            f"{path}: expected the demonstration video of Sports2D, {wanted}, "
+            f"got {came}"
         )
     return video
 
 
 @lru_cache(maxsize=1)
 def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.int8]]]:
-    """Return the whole empty picture, and what the first frames differ from it by where nobody is."""
+    """Return the empty picture, and the movements of the first frames in it.
+
+    Movements are zero where a person is.
+    """
     video = check_video(path)
     frames = {
         k: image
         for k, image in enumerate(video.frames(0, None, FILMED))
         if k in EMPTY or k < LIVING
     }
-    half = len(EMPTY) // 2  # of an odd number: the median is one of them
+    half = len(EMPTY) // 2  # an odd number of frames: the median is one of them
     still = np.partition([frames[k] for k in EMPTY], half, axis=0)[half].astype(
         np.float32
     )
@@ -195,23 +204,23 @@ def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.int8]]]:
     return still, away
 
 
-FINER = 2  # pixels to a side of a pixel, in which bodies are painted
-LIGHT = np.array([0.45, -0.75, 0.48])  # the way the light goes, in the world
+FINER = 2  # a body is painted with this many pixels along a pixel's side
+LIGHT = np.array([0.45, -0.75, 0.48])  # direction of the light in the world
 AMBIENT = 0.55  # share of the light that comes from everywhere
-SHADE = 0.4  # share of the light that a cast shadow takes
+SHADE = 0.4  # share of the light that a cast shadow removes
 SOFT = 3.0  # pixels: the spread of a shadow's edge
-# by how much more than its radius a cone is painted, so that no pixel of its mask is
-# without colour
+# a painted cone's radius in units of the true one, so that every pixel of its mask has
+# a colour
 OVER = 1.06
 _PARENTS = np.array(PARENTS[1:])
 _HIPS = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
 _SPINE = JOINTS.index("root"), JOINTS.index("thorax")
-# these go forward themselves
+# feet and toes, which point forwards
 _FORWARD = np.array([kind(bone) in ("foot", "toes") for bone in BONES])
 
 
 class Posed(NamedTuple):
-    """Somebody in one frame."""
+    """A person in one frame."""
 
     body: Body
     pose: Array  # (66,)
@@ -252,7 +261,7 @@ def composited(
 
 
 def true_masks(camera: Camera, people: Sequence[Posed]) -> list[Mask]:
-    """Return what is seen of each person: those whose root is nearer hide the others."""
+    """Return the visible mask of each person: nearer roots hide farther ones."""
     whole = [project(one.body, camera, one.pose, one.place) for one in people]
     depths = [camera.project(one.place)[1] for one in people]
     seen = []
@@ -267,7 +276,7 @@ def true_masks(camera: Camera, people: Sequence[Posed]) -> list[Mask]:
 
 
 def _box(mask: Mask) -> Any:
-    """Return the part of a fine mask that is not empty, of whole coarse pixels; None where all is."""
+    """Return the bounding box of a fine mask in coarse pixels, or None if empty."""
     rows = np.flatnonzero(mask.any(axis=1))
     columns = np.flatnonzero(mask.any(axis=0))
     if not len(rows):
@@ -279,7 +288,7 @@ def _box(mask: Mask) -> Any:
 
 
 def _painted(camera: Camera, box: Any, people: Sequence[Posed]) -> NDArray[np.float32]:
-    """Return the colours (height, width, 3) of the nearest surfaces in a part of a picture."""
+    """Return the colours (height, width, 3) of the nearest surfaces in a box."""
     shape = box[0].stop - box[0].start, box[1].stop - box[1].start
     colours = np.zeros((*shape, 3), dtype=np.float32)
     nearest = np.full(shape, np.inf, dtype=np.float32)
@@ -292,7 +301,10 @@ def _painted(camera: Camera, box: Any, people: Sequence[Posed]) -> NDArray[np.fl
 
 
 def _cones(camera: Camera, box: Any, one: Posed) -> Iterator[tuple[Any, Array, Array]]:
-    """Yield the part of the box that each bone covers, with depths (inf where it is not) and colours there."""
+    """Yield each bone's part of the box, with depths and colours there.
+
+    Depths are infinite where the bone is not.
+    """
     joints = one.body.skeleton.joints(one.pose, one.place)
     pixels, depths = camera.project(joints)
     scale = np.sqrt(camera.focal.prod()) / depths
@@ -352,7 +364,10 @@ def _lit(
     axis: Array,
     reference: Array,
 ) -> Array:
-    """Return the colours of a bone's surface: its weave goes around the axis from a direction that turns with it."""
+    """Return the colours of a bone's surface.
+
+    The weave goes around the axis, from a direction that turns with the bone.
+    """
     long = float(np.linalg.norm(axis))
     axis = axis / max(long, 1e-9)
     first = reference - (reference @ axis) * axis
@@ -371,7 +386,7 @@ def _lit(
 
 
 def _shadow(camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
-    """Return what share of the light is left at each pixel of the ground y = 0, where bodies cast a soft shadow."""
+    """Return the share of light at each pixel of the ground y = 0, under shadows."""
     dark = np.zeros((camera.height, camera.width), dtype=np.uint8)
     for one in people:
         joints = one.body.skeleton.joints(one.pose, one.place)
@@ -385,7 +400,7 @@ def _shadow(camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
                 one.body.radii[bone].mean() * camera.focal[0] / depths[ends].mean()
             )
             points = np.clip(16.0 * pixels[ends], -1e6, 1e6).astype(int)
-            # the ground is seen at a grazing angle, and so is the thickness of what lies on it
+            # the ground is seen at a grazing angle, which also flattens thickness on it
             cv2.line(
                 dark,
                 points[0].tolist(),
@@ -400,15 +415,15 @@ def _shadow(camera: Camera, people: Sequence[Posed]) -> NDArray[np.float32]:
 
 
 CYCLE = (20, 50)  # frames that a walking cycle may last
-ALONG = 0.5 * np.pi  # the way +x, about the vertical, where 0 is +z
+ALONG = 0.5 * np.pi  # direction of +x about the vertical, where 0 is +z
 
 
 @dataclass(frozen=True, eq=False)
 class Actor:
-    """Somebody in a scene: his body, how he moves, when he is there at all, and which clothes he wears."""
+    """A person in a scene: body, motion, presence and clothes."""
 
     body: Body
-    # of the whole scene; where he is not there, it means nothing
+    # of the whole scene; meaningless where the person is absent
     motion: Motion = field(repr=False)
     present: NDArray[np.bool_] = field(repr=False)  # (T,)
     outfit: int
@@ -420,9 +435,10 @@ def frames_of(name: str, start: int = 0, stop: int | None = None) -> Motion:
 
 
 def walked_on(motion: Motion, metres: float) -> Motion:
-    """Return a walk that goes on for so many metres: the cycle of a clip, again and again.
+    """Return a walk over some metres: one cycle of a clip, repeated.
 
-    What the cycle's last pose differs from its first by is spread over all of it, so that nothing jumps.
+    The difference between the cycle's last and first pose is spread over the cycle, so
+    that nothing jumps.
     """
     start, stop = cycle(motion)
     count = stop - start
@@ -447,7 +463,10 @@ def walked_on(motion: Motion, metres: float) -> Motion:
 
 
 def cycle(motion: Motion) -> tuple[int, int]:
-    """Return the first frame of a clip's best cycle, and the frame after it: the one that is most like the first."""
+    """Return the first frame of a clip's best cycle, and the frame after it.
+
+    The frame after it is the most similar to the first.
+    """
     joints = motion.skeleton.joints(motion.poses)
     feature = np.concatenate([joints[:-1], 5.0 * np.diff(joints, axis=0)], axis=1)
     best = (np.inf, 0, 0)
@@ -460,7 +479,8 @@ def cycle(motion: Motion) -> tuple[int, int]:
 
 
 def facing_elsewhere(motion: Motion, angle: float) -> Motion:
-    poses, (x, y, z) = motion.poses.copy(), motion.translations.T
+    poses = motion.poses.copy()
+    x, y, z = motion.translations.T
     poses[:, 0] += angle
     sine = np.sin(angle)
     cosine = np.cos(angle)
@@ -482,7 +502,7 @@ def moved(motion: Motion, by: Array) -> Motion:
 
 
 def heading(motion: Motion) -> float:
-    """Return the way that a motion goes as a whole, about the vertical."""
+    """Return the overall direction of a motion about the vertical."""
     way = motion.translations[-1] - motion.translations[0]
     return float(np.arctan2(way[0], way[2]))
 
@@ -495,7 +515,7 @@ def middle_of(motion: Motion) -> Array:
 
 
 def longest(motion: Motion) -> float:
-    """Return the way along which a motion covers most ground, about the vertical."""
+    """Return the direction in which a motion extends farthest, about the vertical."""
     flat = motion.translations[:, [0, 2]]
     _, _, axes = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
     return float(np.arctan2(axes[0, 0], axes[0, 1]))
@@ -504,7 +524,7 @@ def longest(motion: Motion) -> float:
 def through(
     motion: Motion, body: Body, reach: float, *, back: bool = False, aside: float = 0.0
 ) -> Motion:
-    """Return a walk from x = -reach to x = reach, or back, `aside` metres nearer to z."""
+    """Return a walk from x = -reach to x = reach, or back, `aside` metres towards z."""
     long = walked_on(motion, 2.0 * reach)
     ahead = on_ground(
         facing_elsewhere(long, (-ALONG if back else ALONG) - heading(long)), body
@@ -513,7 +533,10 @@ def through(
 
 
 def one_after_other(parts: Sequence[Motion | int]) -> tuple[Motion, NDArray[np.bool_]]:
-    """Return motions one after the other, and in which frames somebody is there; a number is frames without anybody."""
+    """Return motions one after the other, and the frames in which a person is present.
+
+    A number stands for frames without a person.
+    """
     first = next(part for part in parts if isinstance(part, Motion))
     poses = []
     places = []
@@ -547,27 +570,27 @@ SIZE = (640, 360)  # pixels of a frame
 # metres of a camera from the middle, and above the ground
 DISTANCE = 8.0
 HEIGHT = 0.95
-ACROSS = np.radians(36.0)  # that a camera sees
-# degrees
+ACROSS = np.radians(36.0)  # field of view
+# degrees of the cameras, by their number
 PLACES: Mapping[int, Sequence[float]] = {
     1: (0.0,),
     2: (-30.0, 30.0),
     4: (-30.0, 30.0, 150.0, 210.0),
 }
-REACH = {1: 3.4, 2: 5.2, 4: 5.2}  # metres to either side, where nobody is seen any more
-# frames without anybody: before and after, and until somebody comes back
+REACH = {1: 3.4, 2: 5.2, 4: 5.2}  # metres to either side, out of view
+# frames without a person: before and after, and until a person comes back
 BARE = 10
 AWAY = 20
-FARTHER = 1.5  # that whoever passes aside goes to either side, for each metre aside
+FARTHER = 1.5  # extra metres to either side for each metre aside
 NEARER = 0.7  # metres from the middle, of each of two who pass
-# of each bone, the one on the other side
+# the bone on the other side, for each bone
 MIRRORED = [joint - 1 for joint in MIRROR[1:]]
-# percent that a part of the body may be thicker or thinner than the library's
+# largest difference of a part's girth from the library's, in percent
 GIRTH = 10.0
-LONGEST = 240  # frames of somebody who is always there
+LONGEST = 240  # frames of a person who is always present
 
-# Who goes through (clips of one cycle at least), and who is always there (from which frame on, to which): others in
-# each try.
+# Clips of people who walk through, with at least one cycle; and clips with first and
+# last frame of people who are always present. Each seed takes others.
 WALKS = ("16_47", "02_01", "49_01")
 STAYING: Mapping[str, Sequence[tuple[str, int, int]]] = {
     "stands": (("49_15", 0, 150), ("14_04", 0, 150), ("29_02", 100, 250)),
@@ -579,12 +602,12 @@ STAYING: Mapping[str, Sequence[tuple[str, int, int]]] = {
     ),
     "squats": (("02_06", 180, 400), ("14_06", 0, 130), ("14_20", 0, 120)),
 }
-TREADMILL = 4.0  # metres to either side, that are walked on the spot
+TREADMILL = 4.0  # metres to either side, walked on the spot
 
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """Actors and cameras; who is followed is the first actor."""
+    """Actors and cameras. The first actor is tracked."""
 
     actors: Sequence[Actor]
     cameras: Sequence[Camera] = field(repr=False)
@@ -594,7 +617,7 @@ class Situation:
 
     @property
     def people(self) -> Sequence[str]:
-        """Who they are, in the library."""
+        """The actors' subjects in the library."""
         return sorted({actor.motion.name.partition("_")[0] for actor in self.actors})
 
 
@@ -614,7 +637,7 @@ SHOWS = {
 
 def situation(name: str, views: int, seed: int) -> Situation:
     rng = np.random.default_rng([seed, views])
-    # degrees, so that no side view is exactly one
+    # degrees; a side view is never exact
     turned = rng.uniform(-8.0, 8.0) + 90.0 * (name == "towards")
     target = np.array([0.0, HEIGHT, 0.0])
     cameras = [
@@ -649,7 +672,7 @@ def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
 
 
 def _dressed(motion: Motion, seed: int) -> tuple[Motion, Body]:
-    """Return a motion, and a body whose parts are thicker and thinner than proportions say, left and right alike."""
+    """Return a motion, and its body with random girths, symmetric left and right."""
     body = Body.of(motion.skeleton)
     shares = (
         1.0
@@ -680,7 +703,10 @@ def _returning(name: str, views: int, seed: int, *, back: bool) -> Actor:
 
 
 def _staying(frames: tuple[str, int, int], seed: int, *, along: bool) -> Actor:
-    """Return somebody who is always there: he walks along x, or faces the first camera about."""
+    """Return a person who is always present.
+
+    They walk along x, or roughly face the first camera.
+    """
     motion, body = _dressed(frames_of(*frames), seed)
     if along:
         turn = ALONG - longest(motion)
@@ -715,10 +741,10 @@ def _lasting(actor: Actor, count: int) -> Actor:
 def film(
     situation: Situation, plates: Sequence[Plate], seed: int, folder: Path
 ) -> tuple[list[Path], NDArray[np.bool_]]:
-    """Return the videos that are written to a folder, one a camera, and the visible part of each actor.
+    """Return the videos written to a folder, and the visible part of each actor.
 
-    That is a mask for each camera and frame, (actors, views, T, height, width). `plates` are the empty pictures of each
-    camera.
+    There is a video for each camera. The visible parts are masks (actors, views, T,
+    height, width). `plates` are the empty pictures of each camera.
     """
     rng = np.random.default_rng([seed, 4])
     videos = []
@@ -743,7 +769,7 @@ def film(
 def _frames(
     situation: Situation, camera: Camera, behind: Plate
 ) -> Iterator[tuple[list[Posed], list[Mask]]]:
-    """Yield who is there in each frame, and the visible part of each actor."""
+    """Yield the people in each frame, and the visible part of each actor."""
     clothes = [
         outfit(actor.outfit, behind.still.astype(np.uint8))
         for actor in situation.actors

@@ -1,4 +1,4 @@
-"""The cost of following a person with the library: milliseconds a frame, memory, and a step of a fit."""
+"""The cost of tracking with the library: time per frame, memory, a fit's step."""
 
 import resource
 from collections.abc import Iterator
@@ -22,16 +22,16 @@ from posefit.tracking.options import TrackOptions
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
 
-# twenty-seven seconds, which are gone through forwards and backwards as often as it
-# takes
+# 27 seconds, which are played forwards and backwards as often as needed
 CLIP = "14_13"
-POSES = 40  # of a call, by which the effort of a step is measured
+POSES = 40  # in a call that measures the effort of a step
 
 
 def follow_figures(frames: int) -> dict[str, float]:
-    """Return what following so many frames takes on one thread, with the library of everybody else.
+    """Return the cost of tracking `frames` frames on one thread.
 
-    `ms` is the CPU time of a frame, and `mb` the process's peak memory. `step_poses` is how many costs of poses take as
+    The library is without the clip's subject. `ms` is the CPU time of a frame, and `mb`
+    the process's peak memory. `step_poses` is the number of pose costs that take as
     long as a step of a fit.
     """
     training = [
@@ -56,7 +56,7 @@ def follow_figures(frames: int) -> dict[str, float]:
 
     with threadpool_limits(1):
         tracker = registry().offer("tracker", "exemplars").factory(task)
-        # loads what is compiled
+        # loads compiled code
         list(tracker.track(observations(2), np.random.default_rng(0)))
         began = process_time()
         for _ in tracker.track(observations(frames), np.random.default_rng(0)):
@@ -98,7 +98,7 @@ def _step_poses(task: Task, scene: Scene) -> float:
 @click.command(cls=Command, help=__doc__)
 @click.argument("frames", type=click.IntRange(1))
 def main(frames: int) -> None:
-    """Print the figures; a thousand frames take one or two minutes."""
+    """Print the figures. A thousand frames take one or two minutes."""
     for name, value in follow_figures(frames).items():
         click.echo(f"{name:12} {round(value, 3):,g}")
 

@@ -1,14 +1,18 @@
-"""Figures 8 and 10 of the SAPSO paper: poses of single real images, and 100 frames of a real film, tracked.
+"""Figures 8 and 10 of the SAPSO paper on real footage.
 
-    python docs/studies/footage_figures.py "S1/Image_Data/Walking_1_(C1).avi" --height 1.75 --out humaneva
+    python docs/studies/footage_figures.py "S1/Image_Data/Walking_1_(C1).avi"
+        --height 1.75 --out humaneva
 
-Masks are those of a mixture of Gaussians, as in the paper. It says neither which frames it took nor what it knew of
-camera, body and place: here the camera is the data set's or a guess, the place in each image is aligned to the mask,
-and the first yaw is unknown.
+Figure 8 shows poses of single real images, figure 10 a track of 100 frames. Masks come
+from a mixture of Gaussians, as in the paper. The paper does not say which frames it
+used, or what it knew of camera, body and place. Here the camera is the data set's or a
+guess, the place in each image is aligned to the mask, and the first yaw is unknown.
 
-What belongs to a film is looked up in the layouts of KTH's actions (Schuldt, Laptev and Caputo, ICPR 2004), HumanEva-I
-(Sigal, Balan and Black, IJCV 2010) and CMU's motion capture database, as public readers of these sets expect them. None
-of the sets may be passed on, and none was at hand; HumanEva's calibrations are read as its own Matlab code does.
+A film's files are found by the layouts of KTH's actions (Schuldt, Laptev and Caputo,
+ICPR 2004), HumanEva-I (Sigal, Balan and Black, IJCV 2010) and CMU's motion capture
+database, as public readers of these sets expect them. None of the sets may be
+redistributed, and none was available here. HumanEva's calibrations are read as in its
+own Matlab code.
 """
 
 import re
@@ -28,12 +32,12 @@ from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
-from posefit.footage.masks import Range, span
 from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
+from posefit.footage.views import Range, span
 from posefit.geometry.calibration import Calibration
 from posefit.motion.motion import Motion
 from posefit.output.drawing import draw_body, write
@@ -58,14 +62,14 @@ ACTIVITIES: dict[str, Activity] = {
     "jog": "run",
     "running": "run",
 }
-# the first frames of its films are copies of one: a fault of their codec
+# the first frames of HumanEva's films are copies of one: a fault of their codec
 HUMANEVA_START = 5
 MAX_TEXT_BYTES = 1_000_000
 MILLIMETRES = 1e3  # in a metre
-IMAGES = 6  # estimated by themselves, and shown
+IMAGES = 6  # number of images that are estimated alone and shown
 TALL = 300  # pixels of a picture in a figure
-SQUARE = 0.65  # of the person's height in pixels: half the side of such a picture
-SOLID = 0.65  # how much of the film the body hides
+SQUARE = 0.65  # half the side of such a picture, in units of the person's height
+SOLID = 0.65  # opacity of the body on the film
 SINGLE = "PCA + SAPSO, images"
 TRACKED = (*PAPER, LETTER)
 LABELS = {SINGLE: SINGLE} | {
@@ -76,20 +80,21 @@ Estimates = dict[int, Frame]  # the poses of some frames of a scene
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A film, and what its data set knows of it."""
+    """A film, and what its data set states about it."""
 
     name: str
     film: Path
     activity: Activity | None = None
-    frames: Range = (None, None)  # those that show the person
+    frames: Range = (None, None)  # in which the person is visible
     calibration: Calibration | None = None
-    skeleton: Path | None = None  # the person's own, an .asf file
+    skeleton: Path | None = None  # the person's .asf file
 
 
 def recording_of(film: Path) -> Recording:
-    """Return a film with what its data set knows of it: nothing where its name is of no data set.
+    """Return a film with what its data set states about it.
 
-    Raises InputError where files that belong to it are missing or are not what they should be.
+    A name of no data set gives nothing. Raises InputError if files that belong to the
+    film are missing or invalid.
     """
     name = existing(film).stem
     above = film.resolve().parent.parent
@@ -113,7 +118,10 @@ def recording_of(film: Path) -> Recording:
 
 
 def _kth_frames(table: Path, name: str) -> Range:
-    """Return the first frames that show the person; the file counts from 1, and names the last one."""
+    """Return the first range of frames with the person, from 0 and exclusive.
+
+    The file counts from 1 and includes the last frame.
+    """
     text = read_text(existing(table), MAX_TEXT_BYTES)
     line = re.search(rf"^\s*{name}\s+frames\s+(\d+)\s*-\s*(\d+)", text, re.MULTILINE)
     if line is None:
@@ -124,10 +132,12 @@ def _kth_frames(table: Path, name: str) -> Range:
 
 
 def read_calibration(path: Path, size: tuple[int, int]) -> Calibration:
-    """Return a camera of HumanEva's .cal file for films of a size. Raises InputError where it is none.
+    """Return a camera of HumanEva's .cal file for films of a size.
 
-    Its 22 numbers are two focal lengths, two of the principal point, the skew, which is left out, five of the
-    distortion, nine of the rotation row by row and three of the translation, of camera_from_world in millimetres.
+    Its 22 numbers are two focal lengths, two of the principal point, the skew, which is
+    ignored, five of the distortion, nine of the rotation row by row and three of the
+    translation. Rotation and translation are camera_from_world, in millimetres. Raises
+    InputError if the file is invalid.
     """
     words = read_text(existing(path), MAX_TEXT_BYTES).split()
     try:
@@ -141,7 +151,8 @@ def read_calibration(path: Path, size: tuple[int, int]) -> Calibration:
         valid = False
     if not valid or len(words) < 22 or min(values[:2]) <= 0.0:
         raise InputError(
-            f"{path}: expected 22 numbers: focal lengths, centre, skew, distortion, rotation, translation"
+            f"{path}: expected 22 numbers: focal lengths, centre, skew, "
+            "distortion, rotation, translation"
         )
     matrix = np.array(
         [[values[0], 0.0, values[2]], [0.0, values[1], values[3]], [0.0, 0.0, 1.0]]
@@ -154,7 +165,10 @@ def read_calibration(path: Path, size: tuple[int, int]) -> Calibration:
 def filmed_scene(
     recording: Recording, frames: Range = (None, None), **view: Any
 ) -> tuple[Scene, int]:
-    """Return the scene of 100 frames of a film, or of those chosen, and the number of its first frame."""
+    """Return a film's scene and the number of its first frame.
+
+    The scene has 100 frames, or the chosen ones.
+    """
     count = Video.of(recording.film).count()
     start, stop = span(recording.frames if frames == (None, None) else frames, count)
     if frames == (None, None):
@@ -171,10 +185,10 @@ def filmed_scene(
 
 
 def estimates_of(scene: Scene, training: Sequence[Motion]) -> dict[str, Estimates]:
-    """Return the poses of all frames by the paper's methods, and of a few images each by itself. Sections 5.3, 5.4.
+    """Return the poses of all frames by the paper's methods, and of single images.
 
-    The first yaw of a track is unknown, with restarts, and every yaw of an image; as in the paper no build is fitted
-    and nothing is smoothed.
+    Sections 5.3 and 5.4. The first yaw of a track is unknown, with restarts, and so is
+    every yaw of an image. As in the paper, no build is fitted and nothing is smoothed.
     """
     estimates: dict[str, Estimates] = {}
     for name in TRACKED:
@@ -196,7 +210,7 @@ def estimates_of(scene: Scene, training: Sequence[Motion]) -> dict[str, Estimate
 
 
 def figures_of(estimates: Estimates, scene: Scene) -> dict[str, float]:
-    """Return what fits how well: means over an estimate's usable frames."""
+    """Return how well an estimate fits, averaged over its usable frames."""
     usable = [frame for k, frame in estimates.items() if scene.observations[k].usable]
     return {
         "frames": len(estimates),
@@ -209,9 +223,10 @@ def figures_of(estimates: Estimates, scene: Scene) -> dict[str, float]:
 def picture(
     scene: Scene, estimates: dict[str, Estimates], frames: Sequence[int], first: int
 ) -> Image:
-    """Return the person in frames of a film side by side, and below with the body of each estimate.
+    """Return the person in frames of a film side by side, with the estimates below.
 
-    `frames` are their numbers in the scene, whose first frame has the number `first` in the film.
+    `frames` are numbers in the scene. The scene's first frame has the number `first` in
+    the film.
     """
     assert scene.pictures is not None
     films = {k: image for k, image in enumerate(scene.pictures()) if k in frames}
@@ -241,12 +256,14 @@ def picture(
 
 
 def _square(image: Any, silhouette: Silhouette) -> Image:
-    """Return the square of a picture that shows the person, black beyond its borders and darker under its label."""
+    """Return the square of a picture around the person.
+
+    It is black beyond the borders, and darker under its label.
+    """
     (x, y), tall = extent_of(silhouette)
     half = SQUARE * tall
-    placed = (
-        TALL / (2.0 * half) * np.array([[1.0, 0.0, half - x], [0.0, 1.0, half - y]])
-    )
+    shift = np.array([[1.0, 0.0, half - x], [0.0, 1.0, half - y]])
+    placed = TALL / (2.0 * half) * shift
     square: Image = np.asarray(
         cv2.warpAffine(image, placed, (TALL, TALL)), dtype=np.uint8
     )
@@ -255,7 +272,7 @@ def _square(image: Any, silhouette: Silhouette) -> Image:
 
 
 def table_of(name: str, figures: dict[str, dict[str, float]]) -> Table:
-    """Return what is known of a film's estimates, without a truth."""
+    """Return the table of a film's estimates; there is no truth to compare with."""
     rows = [
         [
             LABELS[method],
@@ -275,7 +292,7 @@ def table_of(name: str, figures: dict[str, dict[str, float]]) -> Table:
 @click.option(
     "--activity",
     type=click.Choice(["walk", "run"]),
-    help="What films show whose names do not say it.",
+    help="The activity of films if their names do not state it.",
 )
 @CLIPS
 @click.option(
@@ -296,8 +313,9 @@ def main(
 ) -> None:
     """Figures 8 and 10 of Acta Automatica Sinica 38(5), on real films.
 
-    FILMS are of KTH's actions, HumanEva-I or CMU's motion capture database as unpacked, or any others. Of each film 100
-    frames are taken, from the first that shows the person by what its data set says, unless --frames chooses others.
+    FILMS are films of KTH's actions, HumanEva-I or CMU's motion capture database as
+    unpacked, or any others. By default 100 frames of a film are taken, from the first
+    that shows the person according to the data set; --frames chooses others.
     """
     view = {
         "height": height,
@@ -307,7 +325,8 @@ def main(
     for recording in recordings:
         if recording.activity is None and activity is None:
             raise InputError(
-                f"--activity must be given for films that do not say it, such as {recording.film}"
+                "--activity must be given for films with names that do not state it, "
+                f"such as {recording.film}"
             )
     motions = paper_motions(clips, FRAMES_OF_THE_PAPER)
     with new_folder(out) as folder:
@@ -320,7 +339,11 @@ def main(
                 {name: figures_of(each, scene) for name, each in estimates.items()},
             )
             (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
-            head = f"{recording.name}: {shows}, frames {first} to {first + scene.count - 1}, camera {scene.placing}"
+            last = first + scene.count - 1
+            head = (
+                f"{recording.name}: {shows}, frames {first} to {last}, "
+                f"camera {scene.placing}"
+            )
             click.echo("\n".join([f"{head}\n\n{table}\n", *scene.warnings]))
             shown = list(estimates[SINGLE])
             single = {SINGLE: estimates.pop(SINGLE)}

@@ -1,10 +1,12 @@
-"""What are the functions of the suite? Their features, beside bbob's; slices; which methods reach which targets.
+"""Features and slices of the suite's functions, and which methods reach which targets.
 
-Features ask a function for costs alone, in the box [-1, 1]^d. Points are drawn as a first population is: feasible, and
-around the start where there is one. The optimum is the lowest cost of what is known and of where the descents end; they
-are CMA-ES from a drawn point, without a restart. What is near costs at most the *level*, the median of points `NEAR`
-half-sides a coordinate off the optimum, so that no scale of costs matters. Noise is in all features but in
-conditioning, and in what decides where a descent has ended.
+The features are compared with bbob's. They use only costs in the box [-1, 1]^d. Random
+points are drawn like a first population: feasible, and around the start if there is
+one. The optimum is the lowest known cost: the suite's, or that of a descent. A descent
+is a CMA-ES from a random point, without restarts. A point is near the optimum if it
+costs at most the *level*. The level is the median cost of points that are `NEAR`
+half-sides per coordinate off the optimum, so that the scale of costs does not matter.
+Noise is included except in `conditioning`, and in deciding where a descent has ended.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -39,12 +41,12 @@ LONGEST = 1000
 # half-sides a coordinate: near the optimum; a step
 NEAR = 0.01
 STEP = 0.1
-DESCENT = 0.2  # half-sides a coordinate, of a descent's first step
-# of `conditioning`, and how much an axis may change in one
+DESCENT = 0.2  # first step of a descent, in half-sides a coordinate
+# rounds of `conditioning`, and the range of change of an axis in one
 ROUNDS = 8
 REACH = 2.0 ** np.arange(-4.0, 4.01, 0.5)
 WAY = np.linspace(0.0, 1.0, 101)[:, None]
-# pixels of a slice; how far it goes, in distances to the next basin; in a row
+# a slice: its pixels, its reach in distances to the next basin; slices in a row
 TILE = 220
 WINDOW = 1.3
 ACROSS = 3
@@ -87,10 +89,11 @@ def descent(
 def conditioning(
     cost: Cost, best: Array, level: float, rng: np.random.Generator
 ) -> float:
-    """Return the squared ratio of the longest axis to the shortest of the set around an optimum that costs the level.
+    """Return the squared ratio of longest and shortest axis of the optimum's level set.
 
-    Of a quadratic function that is the condition number of its Hessian. In every round an ellipsoid is fitted to where
-    random directions, stretched by the axes so far, meet the level.
+    For a quadratic function that is the condition number of its Hessian. In every round
+    an ellipsoid is fitted to the points at which random directions, stretched by the
+    current axes, reach the level.
     """
     d = len(best)
     ratios = []
@@ -117,7 +120,10 @@ def conditioning(
 
 
 def _distance(cost: Cost, best: Array, ways: Array, level: float) -> Array:
-    """Return where each way (n, d) from the optimum meets the level first, from 1/16 to 16, or the box's size."""
+    """Return the distance at which each way (n, d) from the optimum meets the level.
+
+    It is 1/16 to 16; a way that does not meet it has the distance to the box.
+    """
     costs = cost(
         (best + ways[:, None] * REACH[:, None]).reshape(-1, len(best))
     ).reshape(len(ways), -1)
@@ -138,9 +144,10 @@ def _distance(cost: Cost, best: Array, ways: Array, level: float) -> Array:
 def features(
     cost: Cost, noise_free: Cost, known: Array, points: Array, rng: np.random.Generator
 ) -> tuple[Row, list[tuple[float, Array]]]:
-    """Return the features of a function, and the best cost and point of each basin, the optimum's first.
+    """Return the features of a function, and the best cost and point of each basin.
 
-    `known` (d,) is the optimum, or a point near it; `points` (n, d) are drawn at random.
+    The optimum's basin is first. `known` (d,) is the optimum or a point near it;
+    `points` (n, d) are random.
     """
     d = len(known)
     costs = cost(points)
@@ -157,7 +164,7 @@ def features(
     basins = [(least, best)]
     arrived = 0
     for value, point in sorted(placed[2:], key=lambda end: end[0]):
-        # on the way to each
+        # the highest cost on the way to each basin
         tops = [
             float(noise_free(place + WAY * (point - place)).max())
             for _, place in basins
@@ -171,7 +178,7 @@ def features(
             basins.append((value, point))
     rows = np.arange(POINTS)
     pairs = rng.permuted(np.tile(np.arange(d), (POINTS, 1)), axis=1)[:, :2].T
-    moved = np.repeat(points[None], 3, axis=0)  # one coordinate, another one, both
+    moved = np.repeat(points[None], 3, axis=0)  # one coordinate, another, both
     for k, (coordinate, way) in enumerate(
         zip(pairs, 0.25 * rng.choice([-1.0, 1.0], (2, POINTS)), strict=True)
     ):
@@ -221,9 +228,10 @@ def bbob(number: int, dimension: int) -> Row:
 def measured(
     number: int, instance: int, dimension: int
 ) -> tuple[Row, Array, Shares, Array]:
-    """Return a problem's features, its targets, the costs by method after each of the budgets, and a slice.
+    """Return a problem's features, targets, costs by method and budget, and a slice.
 
-    Each budget is a search of its own, as some methods plan ahead; what has reached the last target is not repeated.
+    Each budget is a separate search, because some methods plan ahead. A method that has
+    reached the last target is not run again.
     """
     problem = suite(SUITE, number, instance, dimension)
     rng = np.random.default_rng([instance, number])
@@ -249,17 +257,18 @@ def measured(
 def sliced(
     cost: Cost, basins: list[tuple[float, Array]], rng: np.random.Generator, title: str
 ) -> Array:
-    """Return a picture (TILE, TILE, 3) of the plane through the optimum and the best of two other basins, in bands."""
-    (least, best), others = (
-        basins[0],
-        [point - basins[0][1] for _, point in basins[1:3]],
-    )
+    """Return a picture (TILE, TILE, 3) of a plane through the optimum, in bands.
+
+    The plane also passes through the best points of two other basins.
+    """
+    least, best = basins[0]
+    others = [point - best for _, point in basins[1:3]]
     spans = np.array([*others, *rng.uniform(-1.0, 1.0, (2 - len(others), len(best)))]).T
     plane, _ = np.linalg.qr(spans)
     scale = WINDOW * np.linalg.norm(spans[:, 0])
     across = scale * np.linspace(-1.0, 1.0, TILE)
     grid = np.stack(np.meshgrid(across, across[::-1]), axis=-1).reshape(-1, 2)
-    # bands from one doubling to the next
+    # each band spans a doubling of the cost
     doubled = np.log2((cost(best + grid @ plane.T) - least).clip(0.25)).round()
     shade = (
         np.rint(255.0 * (doubled + 2.0) / 8.0)
@@ -303,13 +312,16 @@ def shares_of(
 
 
 def medians(rows: Sequence[Row]) -> Row:
-    """Return the medians of features, and the mean share of descents that end elsewhere."""
+    """Return the medians of features, and the mean of `elsewhere`."""
     row = {name: float(np.median([one[name] for one in rows])) for name in rows[0]}
     return {**row, "elsewhere": float(np.mean([one["elsewhere"] for one in rows]))}
 
 
 def nearest(rows: Mapping[Key, Row], others: Mapping[Key, Row]) -> Iterator[Key]:
-    """Yield which other of as many dimensions each function is nearest to, by features of a deviation of 1 over all."""
+    """Yield the most similar other function of the same dimension for each function.
+
+    Features are scaled to a standard deviation of 1 over all functions.
+    """
     values = np.array(
         [[row[name] for name in COMPARED] for row in [*rows.values(), *others.values()]]
     )
@@ -319,9 +331,8 @@ def nearest(rows: Mapping[Key, Row], others: Mapping[Key, Row]) -> Iterator[Key]
         away = zip(
             others, np.linalg.norm(values[len(rows) :] - own, axis=1), strict=True
         )
-        yield min((distance, other) for other, distance in away if other[1] == key[1])[
-            1
-        ]
+        same = ((distance, other) for other, distance in away if other[1] == key[1])
+        yield min(same)[1]
 
 
 def feature_lines(rows: Mapping[Key, Row], others: Mapping[Key, Row]) -> Iterator[str]:
@@ -347,7 +358,7 @@ def feature_lines(rows: Mapping[Key, Row], others: Mapping[Key, Row]) -> Iterato
 
 
 def share_lines(shares: Mapping[int, Shares]) -> Iterator[str]:
-    """Yield the table of targets reached, of each function in percent by method after each budget."""
+    """Yield the table of reached targets in percent, by method after each budget."""
     cells = []
     for number, table in shares.items():
         wins = [
@@ -368,7 +379,7 @@ def share_lines(shares: Mapping[int, Shares]) -> Iterator[str]:
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--picture", metavar="FILE", help="New .jpg of slices.")
+@click.option("--picture", metavar="FILE", help="New .jpg for the slices.")
 @WORKERS
 def main(picture: str | None, workers: int | None) -> None:
     if picture is not None:

@@ -1,7 +1,8 @@
-"""Which frames are lost, in which left and right are exchanged, and how well the tracker detects it.
+"""How well the tracker detects lost frames, and exchanged left and right.
 
-Follows recorded clips of many motions from all sides, with clean and with realistic masks, fits the logistic models of
-`posefit_exemplars`, and evaluates them on people they were not fitted to.
+The study tracks recorded clips of many motions from all sides, with clean and with
+realistic masks. It fits the logistic models of `posefit_exemplars`, and evaluates them
+on people to whom they were not fitted.
 """
 
 import json
@@ -49,16 +50,16 @@ from posefit_exemplars.lost_model import (
 from table import WORKERS, markdown, measured, percent
 
 RNG_STREAM = 2026  # part of every seed
-LASTING = 10  # frames of a lasting error: a third of a second
-# of the person's height: the standard deviation of how far all borders of a track are
-# outside
+LASTING = 10  # frames of a lasting error, a third of a second
+# standard deviation of a track's common border offset, as a share of the person's
+# height
 RIM = 0.006
-EDGE = 0.004  # and of a border's own deviation, drawn for each frame
-SMOOTH = 0.02  # its correlation length
-# means of their numbers, Poisson
+EDGE = 0.004  # and of the border's fluctuation in each frame
+SMOOTH = 0.02  # correlation length of the fluctuation
+# mean numbers, Poisson distributed
 BITES = 0.8
 BULGES = 0.8
-# radii of these and of missing ends, as shares of the person's height
+# radii of bites, bulges and missing ends, as shares of the person's height
 SIZES = (0.02, 0.06)
 # probabilities of a missing end and of a shadow
 MISSING = 0.3
@@ -69,9 +70,10 @@ SHADOWS = (0.1, 0.25)  # strengths of shadows
 def noisy_mask(
     mask: Mask, rim: float, lasting: np.random.Generator, fresh: np.random.Generator
 ) -> Mask:
-    """Return a mask (height, width) with errors of a camera's; one of which little would be left is unchanged.
+    """Return a mask (height, width) with the errors of a real one.
 
-    Lasting errors are drawn from `lasting`, in the same order whatever the mask; the rest from `fresh`.
+    If little of a mask would be left, it is returned unchanged. Lasting errors are
+    drawn from `lasting`, in the same order for every mask; the others from `fresh`.
     """
     if not mask.any():
         return mask
@@ -114,7 +116,10 @@ def _disc(mask: Mask, x: int, y: int, radius: int, value: bool) -> None:
 def with_mask_noise(
     observations: Sequence[Observation], seed: Sequence[int]
 ) -> list[Observation]:
-    """Return observations with errors in the masks, independent for each camera and reproducible."""
+    """Return observations with errors in the masks.
+
+    The errors are independent for each camera, and reproducible.
+    """
 
     def noisy(mask: Mask, k: int, camera: int) -> Silhouette:
         whole = np.random.default_rng([RNG_STREAM, *seed, camera])
@@ -148,7 +153,7 @@ ALL_CHANGES = {
 }
 CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES, MASKS: ALL_CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
-FRAMES = 48  # of a clip at most
+FRAMES = 48  # at most, of a clip
 ON_THE_SPOT: dict[str, tuple[Clip, ...]] = {
     "gestures": (
         Clip("29_05", FRAMES, 1, "moves their arms"),
@@ -170,7 +175,7 @@ ON_THE_SPOT: dict[str, tuple[Clip, ...]] = {
     ),
 }
 EVERY = {**GROUPS, **ON_THE_SPOT}
-COMMON = (WALKS, *ON_THE_SPOT)  # most footage
+COMMON = (WALKS, *ON_THE_SPOT)  # groups like most footage
 
 
 class Case(NamedTuple):
@@ -188,7 +193,7 @@ class Case(NamedTuple):
 
 
 def cases() -> list[Case]:
-    """Return the tracks, those of one person together, since they share a library."""
+    """Return the tracks. A person's tracks are adjacent, as they share a library."""
     clips = [(group, clip) for group, some in EVERY.items() for clip in some]
     conditions = [name for name in CONDITIONS if name != MASKS]
     tracks = []
@@ -211,16 +216,15 @@ def cases() -> list[Case]:
 Row = Mapping[str, Any]
 Flags = NDArray[np.bool_]
 
-# millimetres by which a mirrored pose is nearer to the truth; below, its sides hardly
+# millimetres by which a mirrored pose is nearer to the truth; below, the sides hardly
 # differ
 EXCHANGED = 10.0
 STRENGTH = 0.03  # variance of the normal prior of weights
-# share of exchanged sides among the frames whose sides are known, where `BOUNDS` allow
-# it
+# accepted share of exchanged sides among frames with known sides, within `BOUNDS`
 SWAPPED = 0.02
-BOUNDS = (0.01, 0.5)  # of the probability from which sides are unknown
+BOUNDS = (0.01, 0.5)  # range of the probability from which sides are unknown
 DIGITS = 6
-# The features of each model: evidence of a frame, and its means
+# Features of each model: the evidence of a frame, and its means
 LOST_SIGNS = ("cost", "cost, lately", "farthest", "farthest, lately", "views")
 SIDES_SIGNS = (
     *(
@@ -235,13 +239,13 @@ SIDES_SIGNS = (
 class Predictions(NamedTuple):
     """The predictions for the frames of a row."""
 
-    lost: Array  # (T,) probability that each is lost
-    exchanged: Array  # (T,) probability that its sides are exchanged
+    lost: Array  # (T,) probability that a frame is lost
+    exchanged: Array  # (T,) probability that a frame's sides are exchanged
     unknown: Flags  # (T,)
 
 
 def features(row: Row) -> Array:
-    """Return the features (T, F) of a track's frames, as the tracker has them."""
+    """Return the features (T, F) of a track's frames, as in the tracker."""
     memory = EvidenceMeans(row["fps"])
     return np.array([memory.features(values) for values in row["evidence"]])
 
@@ -252,25 +256,29 @@ def lost_frames(rows: Sequence[Row]) -> Flags:
 
 
 def swapped_frames(rows: Sequence[Row]) -> Flags:
-    """Return in which frames of all rows left and right are exchanged."""
+    """Return the frames of all rows in which left and right are exchanged."""
     return np.concatenate(
         [np.array(row["mirrored_gain_mm"]) > EXCHANGED for row in rows]
     )
 
 
 def fit(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return the models fitted to rows, as JSON holds them. Raises ValueError where they are of one person."""
+    """Return the models fitted to rows, ready for JSON.
+
+    Raises ValueError if the rows are of one person.
+    """
     return _fitted(rows, [features(row) for row in rows])
 
 
 def judge(rows: Sequence[Row]) -> list[Predictions]:
-    """Return the predictions for each row by models that were fitted to other people.
+    """Return the predictions for each row by models fitted to other people.
 
-    Raises ValueError where there are fewer than three: of the others, too, each is left out once.
+    Raises ValueError if there are fewer than three people: the fit, too, leaves out
+    each of the other people once.
     """
     if len(people := dict.fromkeys(row["subject"] for row in rows)) < 3:
         raise InputError(
-            f"rows must be of three people or more, got those of {', '.join(people)}"
+            f"rows must be of three people or more, got {', '.join(people)}"
         )
     known = [features(row) for row in rows]
     predictions: dict[int, Predictions] = {}
@@ -288,7 +296,7 @@ def judge(rows: Sequence[Row]) -> list[Predictions]:
 
 
 def _left_out(rows: Sequence[Row]) -> list[tuple[list[int], list[int]]]:
-    """Return the rows of each person, and those of the others."""
+    """Return the rows of each person, and the rows of the others."""
     people = list(dict.fromkeys(row["subject"] for row in rows))
     each = [
         [k for k, row in enumerate(rows) if row["subject"] == person]
@@ -298,7 +306,10 @@ def _left_out(rows: Sequence[Row]) -> list[tuple[list[int], list[int]]]:
 
 
 def _fitted(rows: Sequence[Row], known: Sequence[Array]) -> dict[str, Any]:
-    """Return both models, and the probability from which sides are unknown, by models without each person in turn."""
+    """Return both models, and the probability from which sides are unknown.
+
+    That probability comes from models without each person in turn.
+    """
     lost = _logistic("lost", np.concatenate(known), lost_frames(rows), LOST_SIGNS)
     sides = _logistic(
         "swapped", np.concatenate(known), swapped_frames(rows), SIDES_SIGNS
@@ -323,7 +334,10 @@ def _fitted(rows: Sequence[Row], known: Sequence[Array]) -> dict[str, Any]:
 
 
 def _unknown(exchanged: Array, swapped: Flags) -> float:
-    """Return the probability of exchanged sides from which they are unknown: of the rest about `SWAPPED` are."""
+    """Return the probability of exchanged sides from which they are unknown.
+
+    About a share `SWAPPED` of the other frames is exchanged.
+    """
     order = np.argsort(exchanged, kind="stable")
     shares = np.cumsum(swapped[order]) / np.arange(1, len(order) + 1)
     few = np.flatnonzero(shares <= SWAPPED)
@@ -335,12 +349,13 @@ def _unknown(exchanged: Array, swapped: Flags) -> float:
 def _logistic(
     name: str, known: Array, truth: Flags, signs: Sequence[str]
 ) -> dict[str, Any]:
-    """Return a logistic model of some of the features (n, F), as JSON holds it."""
+    """Return a logistic model of some of the features (n, F), ready for JSON."""
     from sklearn.linear_model import LogisticRegression
 
     if truth.all() or not truth.any():
         raise InputError(
-            f"frames must be {name} and not {name}, got {int(truth.sum())} of {len(truth)}"
+            f"some frames must be {name} and some not, "
+            f"got {int(truth.sum())} of {len(truth)}"
         )
     mean = known.mean(axis=0)
     spread = known.std(axis=0)
@@ -356,11 +371,11 @@ def _logistic(
     return {"weights": named, "bias": round(bias, DIGITS)}
 
 
-RECALL = 0.95  # of lost frames, at which false alarms are counted
+RECALL = 0.95  # of lost frames, for which false alarms are counted
 
 
 def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:
-    """Return the row of a track: its frames' errors, and the evidence that the tracker has."""
+    """Return the row of a track: errors of its frames, and the tracker's evidence."""
     scene = cell_scene(cell)
     if track.condition == MASKS:
         seed = [track.clip.instance, *track.clip.name.encode()]
@@ -390,13 +405,13 @@ def key_of(row: Row) -> tuple[Any, ...]:
 
 
 def cameras(row: Row) -> str:
-    """Return by how many cameras a row is."""
+    """Return the number of cameras of a row, in words."""
     count = len(row["views_degrees"])
     return f"{count} camera{'s' * (count > 1)}"
 
 
 def line_of(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Iterator[str]:
-    """Yield how well swapped sides and lost frames of rows are noticed."""
+    """Yield how well exchanged sides and lost frames of rows are detected."""
     swapped = swapped_frames(rows)
     lost = lost_frames(rows)
     lost_by, exchanged, unknown = (
@@ -409,25 +424,26 @@ def line_of(rows: Sequence[Row], predictions: Sequence[Predictions]) -> Iterator
 
 
 def share(flags: Flags, of: Flags) -> str:
-    """Return the percentage of some frames that have a flag; a dash without any."""
+    """Return the percentage of the frames `of` that have a flag, or a dash."""
     return percent(float(flags[of].mean()) if of.any() else None)
 
 
 def auroc(scores: Array, positive: Flags) -> str:
-    """Return how often a positive has a higher score than a negative, ties a half; a dash without both."""
+    """Return how often a positive scores higher than a negative, or a dash.
+
+    Ties count half.
+    """
     from sklearn.metrics import roc_auc_score
 
-    return (
-        "-"
-        if positive.all() or not positive.any()
-        else f"{roc_auc_score(positive, scores):.3f}"
-    )
+    if positive.all() or not positive.any():
+        return "-"
+    return f"{roc_auc_score(positive, scores):.3f}"
 
 
 def lost_lines(
     rows: Sequence[Row], predictions: Sequence[Predictions]
 ) -> Iterator[str]:
-    """Yield the printed table, and the error of the least doubted frames."""
+    """Yield the printed table, and the error of the frames least likely lost."""
     from sklearn.metrics import roc_curve
 
     every = list(zip(rows, predictions, strict=True))
@@ -449,25 +465,29 @@ def lost_lines(
     alarms, recalls, _ = roc_curve(lost, probable, drop_intermediate=False)
     half = errors[np.argsort(probable, kind="stable")[: len(errors) // 2]]
     needed = percent(alarms[np.searchsorted(recalls, RECALL)])
-    yield f"\nto recall {percent(RECALL, 0)} % of the lost frames takes {needed} % false alarms"
-    yield f"the least doubted half of the frames is {half.mean():.0f} mm off, all are {errors.mean():.0f}"
+    recall = percent(RECALL, 0)
+    yield f"\nto recall {recall} % of the lost frames takes {needed} % false alarms"
+    yield (
+        f"the least doubted half of the frames is {half.mean():.0f} mm off, "
+        f"all are {errors.mean():.0f}"
+    )
 
 
 @click.command(cls=Command, help=__doc__)
 @click.option(
     "--rows",
     metavar="FILE",
-    help="A file for a row a line: the same command continues there.",
+    help="File with one row a line. An earlier run there is continued.",
 )
 @click.option(
     "--store",
     metavar="FILE.json",
-    help="New file for the fitted models, for exemplars to read.",
+    help="New file for the fitted models, which exemplars can read.",
 )
 @WORKERS
 def main(rows: str | None, store: str | None, workers: int | None) -> None:
     with new_file(store) if store else nullcontext() as stored:
-        # all are made, and so checked, before any runs
+        # all cells are made, and thereby checked, before any runs
         cells = [(track, cell_of(track.spec)) for track in cases()]
         jobs = {
             (track.group, track.clip.name, *track[2:]): partial(row_of, cell, track)

@@ -1,8 +1,9 @@
-"""Learns the boxes of the suite from the library of recorded motions, and writes `posefit/suites/boxes.npz`.
+"""Learns the boxes of the suite from the library of recorded motions.
 
     python docs/studies/make_boxes.py
 
-The file of a suite is never replaced: its numbers would change. This documents how it was made.
+It writes `posefit/suites/boxes.npz`. A suite's file is never replaced, because its
+numbers would change. This program documents how the file was made.
 """
 
 from pathlib import Path
@@ -25,10 +26,10 @@ from posefit.suites.boxes import (
     is_upright,
 )
 
-# quantiles of the poses learned: of each latent, and of the distance from the mean
+# quantiles of the training poses: of each latent, and of the distance from the mean
 BOX = 0.99
 ELLIPSOID = 0.98
-# of a joint angle: quantile left out at either end, and what is added then
+# joint angles: the quantile left out at either end, and the margin added afterwards
 RANGE = 0.005
 MARGIN = np.radians(5.0)
 

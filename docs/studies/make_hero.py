@@ -1,6 +1,9 @@
-"""Draws the moving picture of the README: `python docs/studies/make_hero.py docs/pictures/hero.gif`.
+"""Draws the animation of the README.
 
-Two cameras see the silhouettes of somebody whom the library has never seen; the tracked body turns beside them.
+    python docs/studies/make_hero.py docs/pictures/hero.gif
+
+Two cameras see the silhouettes of a person who is not in the library. Next to them the
+tracked body turns.
 """
 
 import sys
@@ -17,18 +20,18 @@ from posefit.output.drawing import BACKGROUND, LINES, TEXT, draw_body, write
 VIEWS = (20.0, 110.0)  # degrees
 SILHOUETTE = (232, 232, 232)
 GROUND = (16, 14, 13)
-# pixels of a silhouette, and of the stage beside both
+# pixels of a silhouette, and of the square picture next to both
 WIDE = 288
 TALL = 216
 STAGE = 432
 FRAMES = 60
 RATE = 15
 COLOURS = 64
-DISTANCE = 4.6  # metres between the body and the camera that goes round it
+DISTANCE = 4.6  # metres from the body to the camera that circles it
 
 
 def stage(body: posefit.Body, pose: Array, place: Array, azimuth: float) -> Any:
-    """Return a picture (STAGE, STAGE, 3) of a body on the ground, its shadow below it."""
+    """Return a picture (STAGE, STAGE, 3) of a body on the ground, with its shadow."""
     image = np.full((STAGE, STAGE, 3), BACKGROUND, np.uint8)
     middle = np.array([place[0], 0.9, place[2]])
     camera = posefit.Camera.around(
@@ -67,7 +70,7 @@ def stage(body: posefit.Body, pose: Array, place: Array, azimuth: float) -> Any:
 
 
 def main(out: str) -> None:
-    """Track somebody, and draw the picture."""
+    """Track a person, and draw the animation."""
     track = posefit.track(
         "16_16", train=["library:-16"], view_degrees=VIEWS, frames=(0, FRAMES)
     )

@@ -1,8 +1,9 @@
-"""Measures the errors of VSMM's joint rules: `python docs/studies/make_joint_errors.py`. Step 2, Interpretation V7.
+"""Measures the errors of joint rules: `python docs/studies/make_joint_errors.py`.
 
-The rules look at silhouettes of built-in motions from all sides, whose truth is known, and expect every point about
-where it is. Left and right share their errors, and no point is biased to one side. What is farther off than OUTLIER is
-another point taken for it; it is counted, printed and left out.
+Step 2, Interpretation V7. The rules see silhouettes of built-in motions from all sides,
+with known truth, and expect every point near its true place. Left and right share their
+errors, and no point is biased to one side. An error above OUTLIER means that another
+point was taken. Such errors are counted, printed and left out.
 """
 
 import json
@@ -29,16 +30,15 @@ MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a
 AZIMUTHS = np.radians([0.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0])
 DISTANCE = 4.4  # metres
 SIZE = (320, 240)
-# legs: how far from the truth a point is expected, as after a good prediction
+# legs: distance of the expected point from the truth, as after a good prediction
 OFF = 0.05
 OUTLIER = 0.16  # legs
-# legs: the deviation granted to points that are only carried along with the root
-# (Interpretation V8)
+# legs: standard deviation of points that only move with the root (Interpretation V8)
 CIRCULAR = 0.25
 
 
 def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
-    """Return the errors (2,) in legs of each point where it was detected."""
+    """Return the errors (2,) in legs of the detections of each point."""
     unbiased = default_rules()._replace(bias=np.zeros((len(POINTS), 2)))
     errors_of: dict[str, list[Array]] = {name: [] for name in POINTS}
     for name, azimuth in product(MOTIONS, AZIMUTHS):
@@ -70,7 +70,7 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
 
 @click.command()
 def main() -> None:
-    """Write joints.json beside the rules."""
+    """Write joints.json next to the rules."""
     errors_of = detection_errors(np.random.default_rng(0))
     frames = len(errors_of["root"])
     stored: dict[str, dict[str, Any]] = {}
@@ -88,8 +88,10 @@ def main() -> None:
         if sides[0] in BODY:
             bias = np.zeros(2)
             spread = np.full(2, CIRCULAR)
+        seen = len(errors) / (frames * len(sides))
+        outliers = 1 - len(kept) / len(errors)
         print(
-            f"{name:10s} seen {len(errors) / (frames * len(sides)):.2f} outliers {1 - len(kept) / len(errors):.2f} "
+            f"{name:10s} seen {seen:.2f} outliers {outliers:.2f} "
             f"bias {bias[1]:+.3f} deviation {spread[0]:.3f} {spread[1]:.3f} legs"
         )
         stored |= {

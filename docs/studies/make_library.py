@@ -1,9 +1,10 @@
-"""Makes the library of recorded motions: `python docs/studies/make_library.py CMU30_DIR`.
+"""Makes the recorded library: `python docs/studies/make_library.py CMU30_DIR`.
 
-CMU30_DIR holds clips at 30 frames a second: one NN.npz a subject with `poses` (T, 66) in radians, `translations` (T, 3)
-in metres, `names` and `lengths` of the clips, and their skeletons in asf/NN.asf. Of each clip those poses are stored
-between which the others can be interpolated, no joint more than a centimetre off. It is run by hand when a person is
-added; its result, recorded.npz, is what the package carries.
+CMU30_DIR holds clips at 30 frames a second. There is one NN.npz for each subject, with
+`poses` (T, 66) in radians, `translations` (T, 3) in metres, and `names` and `lengths`
+of the clips. Skeletons are in asf/NN.asf. Of each clip only some poses are stored; the
+others are interpolated, with no joint more than a centimetre off. Run it by hand when a
+person is added. The package contains its result, recorded.npz.
 """
 
 import json
@@ -24,26 +25,28 @@ from posefit.motion.asf import parse_asf
 from posefit.motion.recorded import FPS, STEP
 
 ORIGIN = (
-    "Recorded motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "Recorded motions of mocap.cs.cmu.edu. "
+    "The data used in this project was obtained from mocap.cs.cmu.edu. "
     "The database was created with funding from NSF EIA-0196217."
 )
-# metres that a joint of a pose left out may be away from where it is interpolated
+# largest distance in metres of an interpolated joint from the recorded one
 TOLERANCE = 0.01
-LONGEST_GAP = 8  # frames from one stored pose to the next
+LONGEST_GAP = 8  # frames between stored poses
 
 
 def kept_frames(
     skeleton: Skeleton, poses: Array, translations: Array
 ) -> NDArray[np.int64]:
-    """Return which frames of poses (T, 66) and translations (T, 3) to keep, the first and the last among them.
+    """Return the frames of poses (T, 66) and translations (T, 3) to store.
 
-    Each gap is as long as it can be, so that a body at rest leaves few poses.
+    The first and the last are among them. Each gap is as long as possible, so that a
+    body at rest needs few poses.
     """
     values = np.column_stack([poses, translations])
     joints = skeleton.joints(poses, translations)
 
     def replaceable(start: int, stop: int) -> bool:
-        """Whether the frames between two that are stored can be interpolated."""
+        """Return whether the frames between two stored ones can be interpolated."""
         share = np.linspace(0.0, 1.0, stop - start + 1)[1:-1, None]
         between = (1.0 - share) * values[start] + share * values[stop]
         away = (
@@ -67,11 +70,14 @@ def kept_frames(
 @click.command(cls=Command)
 @click.argument("root", metavar="CMU30_DIR", type=click.Path(path_type=Path))
 def main(root: Path) -> None:
-    """Write recorded.npz beside this file. Raises ValueError where CMU30_DIR holds no subject."""
+    """Write recorded.npz into the package.
+
+    Raises ValueError if CMU30_DIR holds no subject.
+    """
     files = sorted(root.glob("*.npz"), key=lambda path: int(path.stem))
     if not files:
         raise InputError(
-            f"CMU30_DIR must hold one .npz a subject, got {root} without any"
+            f"CMU30_DIR must hold one .npz per subject, got {root} without any"
         )
     skeletons: list[dict[str, Any]] = []
     names = []
@@ -81,6 +87,9 @@ def main(root: Path) -> None:
     numbers = []
     for path in files:
         skeleton = parse_asf(root / "asf" / f"{path.stem}.asf").skeleton
+        limits = None
+        if skeleton.limits is not None:
+            limits = np.round(np.degrees(skeleton.limits), 4).tolist()
         skeletons.append(
             {
                 "name": path.stem,
@@ -89,15 +98,14 @@ def main(root: Path) -> None:
                     np.degrees(joint_angles_from_rotation(skeleton.axes)), 4
                 ).tolist(),
                 "channels": skeleton.channels,
-                "limits_degrees": None
-                if skeleton.limits is None
-                else np.round(np.degrees(skeleton.limits), 4).tolist(),
+                "limits_degrees": limits,
             }
         )
         with np.load(path) as stored:
             if float(stored["fps"]) != FPS:
                 raise InputError(
-                    f"{path}: expected clips at {FPS:g} frames a second, got {float(stored['fps']):g}"
+                    f"{path}: expected clips at {FPS:g} frames a second, "
+                    f"got {float(stored['fps']):g}"
                 )
             clips = zip(
                 stored["names"].tolist(), stored["lengths"].tolist(), strict=True
@@ -114,7 +122,8 @@ def main(root: Path) -> None:
             changes = np.diff(steps, axis=0, prepend=0)
             if np.abs(changes).max() > np.iinfo(np.int16).max:
                 raise InputError(
-                    f"{path}: expected poses that change little by little, got a jump in {name}"
+                    f"{path}: expected poses that change gradually, "
+                    f"got a jump in {name}"
                 )
             names.append(name)
             owners.append(len(skeletons) - 1)
@@ -134,7 +143,8 @@ def main(root: Path) -> None:
         changes=np.ascontiguousarray(np.concatenate(numbers).T.astype(np.int16)),
     )
     print(
-        f"{target.name}: {len(names)} clips, {sum(counts)} poses, {target.stat().st_size} bytes"
+        f"{target.name}: {len(names)} clips, {sum(counts)} poses, "
+        f"{target.stat().st_size} bytes"
     )
 
 

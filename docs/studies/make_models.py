@@ -1,9 +1,11 @@
-"""Fits VSMM's motion models to CMU clips: `python docs/studies/make_models.py CMU_DIR`. Interpretations V4 to V7.
+"""Fits VSMM's motion models to clips: `python docs/studies/make_models.py CMU_DIR`.
 
-Ridge regression of how the quaternions go on to the next frame, "zero" as the patent writes it and "identity" as ours;
-what is stored are its coefficients, the covariance of what it leaves, means of similar poses and a hundred captured
-ones. Every clip is also used mirrored. Printed, and stored beside each model, are its errors one and ten frames ahead
-on clips that were not used, against standing still.
+Interpretations V4 to V7. A model is a ridge regression from the quaternions of a frame
+to those of the next. It is fitted in two forms: "zero" as the patent writes it, and
+"identity" as ours. Each is stored with its coefficients, the covariance of its
+residuals, means of similar poses, and a hundred captured poses. Every clip is also used
+mirrored. The errors one and ten frames ahead, on clips that were not used, are printed
+and stored with each model, next to the errors of standing still.
 """
 
 import json
@@ -37,21 +39,21 @@ from posefit_vsmm.motion import (
 )
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode, minus
 
-# share of its way from the mean pose that a joint loses in a frame where nothing else
-# is learned
+# share of its distance from the mean pose that a joint loses in a frame, if nothing
+# else is learned
 FADING = 0.07
 DRAWN = 400  # frames of a built-in motion
 POSES = 24  # typical poses of a model
 CAPTURED = 100  # captured poses of a model, in even steps
-# legs and radians: the least deviation a frame that any coordinate is granted
+# legs and radians: smallest standard deviation per frame of a coordinate
 LEAST = (0.002, np.radians(0.3))
 AHEAD = 10  # frames
-# of the whole body's quaternion and each bone's: the one of the other side
+# for the body's quaternion and each bone's, the one on the other side
 OTHER_SIDE = [0, *(1 + HELD.index(MIRROR[joint]) for joint in HELD)]
 
 
 class Excerpt(NamedTuple):
-    """A clip, or a part of it."""
+    """A clip, or part of it."""
 
     path: str
     start: int = 0
@@ -59,7 +61,10 @@ class Excerpt(NamedTuple):
 
 
 class Teaching(NamedTuple):
-    """What a model is fitted to, and what it is judged by: another person's clip, or a part kept apart."""
+    """The clips for fitting a model and for testing it.
+
+    The test clip is another person's, or a part that is not used for fitting.
+    """
 
     fitted: tuple[Excerpt, ...]
     kept: Excerpt
@@ -85,7 +90,7 @@ TEACHINGS = {
 
 
 class Recorded(NamedTuple):
-    """States (n, 43), their translations in legs, with the angles (n, 66) and the frame rate."""
+    """States (n, 43) with translations in legs, the angles (n, 66), the frame rate."""
 
     states: Array
     angles: Array
@@ -115,8 +120,11 @@ def mirrored_states(states: Array) -> Array:
 
 
 def pairs(clip: Recorded) -> tuple[Array, Array]:
-    """Return states (n, 43) and what they are a frame later at 30 a second, in the heading's frame, root at 0."""
-    # Interpretation V6: all pairs of a recording so far apart
+    """Return states (n, 43), and the states a frame later at 30 a second.
+
+    Both are in the first one's heading, with its root at 0.
+    """
+    # Interpretation V6: all pairs of a recording at this distance
     step = round(clip.fps / FPS)
     before = []
     after = []
@@ -138,7 +146,10 @@ def pairs(clip: Recorded) -> tuple[Array, Array]:
 
 
 def noise(model: MotionModels, before: Array, after: Array) -> Array:
-    """Return the covariance (33, 33) of what the model leaves, shrunk as Ledoit and Wolf propose. Interpretation V7."""
+    """Return the covariance (33, 33) of the model's residuals.
+
+    It is shrunk as proposed by Ledoit and Wolf. Interpretation V7.
+    """
     left = minus(after, model.step(before[None])[0])
     least = np.repeat(LEAST, [3, ERROR - 3])
     scale = np.maximum(np.sqrt((left**2).mean(axis=0)), least)
@@ -160,7 +171,7 @@ def typical(before: Array) -> Array:
 
 
 def ahead(model: MotionModels, clip: Recorded, frames: int) -> tuple[float, float]:
-    """Return the mean error in degrees over the quaternions of a model so many frames ahead, and of standing still."""
+    """Return a model's mean error in degrees, `frames` ahead, and standing still's."""
     step = round(clip.fps / FPS) * frames
     first = clip.states[:-step]
     second = clip.states[step:]
@@ -176,7 +187,10 @@ def _mean_degrees(errors: Array) -> float:
 
 
 def dependent(clips: list[Recorded]) -> dict[str, Any]:
-    """Return how the angles of the other joints follow the nine rotations: ridge regression over all clips."""
+    """Return the regression of the other joints' angles on the nine rotations.
+
+    It is a ridge regression over all clips.
+    """
     inputs = []
     wanted = []
     for clip in clips:
@@ -204,27 +218,26 @@ def dependent(clips: list[Recorded]) -> dict[str, Any]:
 
 
 def rounded(values: Array) -> Any:
-    """Return nested lists of numbers of five significant digits."""
-    return (
-        [float(f"{v:.5g}") for v in values]
-        if values.ndim == 1
-        else [rounded(row) for row in values]
-    )
+    """Return nested lists of numbers with five significant digits."""
+    if values.ndim == 1:
+        return [float(f"{value:.5g}") for value in values]
+    return [rounded(row) for row in values]
 
 
 def normalised_ridge(
     before: Array, after: Array, target: Array, weight: float
 ) -> tuple[Array, Array]:
-    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
+    """Return F minus the identity (43, 40) and the offset (43,), shrunk to `target`.
 
-    The penalty is `weight` a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
+    Interpretation V5. `target` is (43, 40). The penalty is `weight` per frame, in units
+    of the quaternions' mean spread, so that it does not vanish among many frames.
     """
     inputs = before[:, 3:]
     middle = inputs.mean(axis=0)
     unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
     scaled = (inputs - middle) / unit
     wanted = after - before - inputs @ target.T
-    # the way over the ground is not predicted: stepping on the spot is walking, too
+    # progress over the ground is not predicted: stepping on the spot is also walking
     wanted[:, [0, 2]] = 0.0
     mean = wanted.mean(axis=0)
     matrix = ridge(scaled, wanted - mean, weight * len(scaled)) / unit
@@ -236,7 +249,7 @@ def normalised_ridge(
     "root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU"
 )
 def main(root: Path) -> None:
-    """Write models.json beside the models. Raises ValueError where a clip it needs is missing."""
+    """Write models.json next to the models. Raises ValueError if a clip is missing."""
     stored: dict[str, Any] = {}
     every: list[Recorded] = []
     identity = np.vstack([np.zeros((3, STATE - 3)), np.eye(STATE - 3)])

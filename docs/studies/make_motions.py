@@ -1,8 +1,10 @@
-"""Fits the built-in motions and the average skeleton to CMU clips: `python docs/studies/make_motions.py CMU_DIR`.
+"""Fits the built-in motions: `python docs/studies/make_motions.py CMU_DIR`.
 
-A motion is a period and, for each free angle and the root's path, a Fourier series over that period. What is stored
-are these few numbers, no recorded frame. It is run by hand when a motion is added; its result, built_in.json, is
-what the package carries. Without an argument, CMU_DIR is the environment variable POSEFIT_CMU.
+The average skeleton is made from the same files. A motion is a period and a Fourier
+series over it, for each free angle and the root's path. Only these few numbers are
+stored, and no recorded frame. Run it by hand when a motion is added. The package
+contains its result, built_in.json. CMU_DIR is by default the environment variable
+POSEFIT_CMU.
 """
 
 import json
@@ -36,14 +38,17 @@ from posefit.motion.amc import read_clip
 from posefit.motion.asf import parse_asf
 from posefit.motion.built_in import activity_of
 
-PHASES = 48  # of a cycle, at which the arms are drawn
-SWING = np.radians(28.0)  # a waving forearm, to either side of upright
-WAVES = 2  # in a cycle
-BOB = np.radians(5.0)  # arms held out sink and rise once a cycle
+PHASES = 48  # of a cycle, for which the arms are computed
+SWING = np.radians(28.0)  # of a waving forearm, to either side of upright
+WAVES = 2  # per cycle
+BOB = np.radians(5.0)  # outstretched arms sink and rise once per cycle
 
 
 def held_out(phases: Array, side: float) -> tuple[Array, Array]:
-    """Return where upper arm and forearm point (n, 3) when the arm is held out; `side` is 1 for the left."""
+    """Return the directions (n, 3) of upper arm and forearm of an outstretched arm.
+
+    `side` is 1 for the left arm and -1 for the right.
+    """
     lift = -0.05 + np.sin(BOB) * side * np.cos(2.0 * np.pi * phases)
     flat = np.full(len(phases), side)
     return np.column_stack([flat, lift, 0.05 + 0.0 * flat]), np.column_stack(
@@ -52,7 +57,7 @@ def held_out(phases: Array, side: float) -> tuple[Array, Array]:
 
 
 def waving(phases: Array, side: float) -> tuple[Array, Array]:
-    """Return where upper arm and forearm point (n, 3) when the hand waves beside the head."""
+    """Return the directions (n, 3) of upper arm and forearm of a waving arm."""
     swing = SWING * np.sin(2.0 * np.pi * WAVES * phases)
     flat = np.full(len(phases), side)
     upper = np.column_stack([flat, -0.15 + 0.0 * flat, 0.2 + 0.0 * flat])
@@ -64,9 +69,9 @@ def waving(phases: Array, side: float) -> tuple[Array, Array]:
 def drawn(
     skeleton: Skeleton, side: str, upper: Array, fore: Array
 ) -> tuple[list[int], Array]:
-    """Return the angles' places in a pose, and the angles (n, 4), of an arm that points where it should.
+    """Return an arm's angles (n, 4) for given directions, and their places in a pose.
 
-    Each pose starts from the one before, so that the angles go on smoothly.
+    Each pose starts from the one before, so that the angles change smoothly.
     """
     shoulder, elbow, wrist = (
         JOINTS.index(side + name) for name in ("clavicle", "humerus", "radius")
@@ -100,7 +105,8 @@ def drawn(
 
 
 ORIGIN = (
-    "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "Fitted to motions of mocap.cs.cmu.edu. "
+    "The data used in this project was obtained from mocap.cs.cmu.edu. "
     "The database was created with funding from NSF EIA-0196217."
 )
 HARMONICS = 5
@@ -109,7 +115,10 @@ SUBJECTS = ("02", "05", "09", "13", "14", "16", "17", "49", "127")
 
 
 class Clip(NamedTuple):
-    """Where a style comes from: the steady part of a clip, and its shortest and longest possible period in seconds."""
+    """The source of a style: the steady part of a clip, and the range of its period.
+
+    The shortest and the longest possible period are in seconds.
+    """
 
     path: str
     start: int
@@ -118,7 +127,8 @@ class Clip(NamedTuple):
     longest: float
 
 
-# Not 127_03: it starts from standing and gathers speed to its last frame, so that no part is periodic.
+# 127_03 is not used: it starts from standing and accelerates to its last frame, so that
+# no part is periodic.
 CLIPS = {
     "walk-a": Clip("16/16_15", 2, None, 0.9, 1.35),
     "walk-b": Clip("02/02_01", 0, None, 0.9, 1.35),
@@ -140,11 +150,12 @@ CLIPS = {
     "wave-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
     "wave-b": Clip("16/16_17", 0, 200, 0.9, 1.35),
 }
-# What the arms do where they do not do what the clip's do: each side's directions, by hand.
+# Directions of the arms that differ from the clip's, for each side.
 ARMS = {"arms-out": {"l": held_out, "r": held_out}, "wave": {"r": waving}}
-ON_THE_SPOT = ("step",)  # walks whose way is taken away
+ON_THE_SPOT = ("step",)  # walks without their progress over the ground
 STANDING = 0.2  # m/s; a slower person stays in place and faces their mean heading
-# What is at its highest at phase 0 in each kind of motion: an angle rx, less another one, or less the root's height.
+# The signal that is highest at phase 0 in each kind of motion: an angle rx, minus
+# another one, or minus the root's height.
 BEATS = {
     "walk": ("rfemur", "lfemur"),  # rx is negative when the thigh is in front
     "run": ("rfemur", "lfemur"),
@@ -159,7 +170,7 @@ BEATS = {
 
 
 def basis(phases: Array, harmonics: int) -> Array:
-    """Return 1, cosines and sines (T, 1 + 2 harmonics) of phases (T,) counted in cycles."""
+    """Return 1, cosines and sines (T, 1 + 2 harmonics) of phases (T,) in cycles."""
     turns = 2.0 * np.pi * np.outer(phases, np.arange(1, harmonics + 1))
     return np.column_stack([np.ones(len(phases)), np.cos(turns), np.sin(turns)])
 
@@ -191,7 +202,8 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
 
     def residual(period: float) -> tuple[float, Array]:
         columns = basis(times / period, HARMONICS)
-        # a little damping: a clip barely longer than its period leaves the highest harmonics undetermined
+        # a little damping: a clip hardly longer than its period leaves the highest
+        # harmonics undetermined
         normal = columns.T @ columns + 1e-3 * np.eye(columns.shape[1])
         coefficients: Array = np.linalg.solve(normal, columns.T @ used).astype(
             np.float64
@@ -215,18 +227,16 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
 
 
 def in_step(coefficients: Array, free: NDArray[np.int64], kind: str) -> Array:
-    """Return coefficients (1 + 2 H, series) shifted so that phase 0 is the beat of a kind of motion."""
+    """Return coefficients (1 + 2 H, series) shifted to start at the motion's beat."""
 
     def series(name: str | None) -> Array:
         if name is None:
             return np.zeros(len(coefficients))
         # the root's height is the second series; the first three are its path
-        first = (
-            1
-            if name == "root"
-            else 3 + int(np.searchsorted(free, angle_index(JOINTS.index(name))))
-        )
-        return np.asarray(coefficients[:, first])
+        if name == "root":
+            return np.asarray(coefficients[:, 1])
+        place = int(np.searchsorted(free, angle_index(JOINTS.index(name))))
+        return np.asarray(coefficients[:, 3 + place])
 
     high, low = BEATS[kind]
     swing = series(high) - series(low)
@@ -242,7 +252,10 @@ def in_step(coefficients: Array, free: NDArray[np.int64], kind: str) -> Array:
 
 
 def armed(model: dict[str, Any], skeleton: Skeleton, kind: str) -> None:
-    """Give a model of a walk the arms of its kind, as far as a trunk that leans and turns a little lets them."""
+    """Give a model of a walk the arms of its kind.
+
+    A trunk that leans and turns a little limits how far they point as they should.
+    """
     phases = np.arange(PHASES) / PHASES
     for side, directions in ARMS.get(kind, {}).items():
         places, angles = drawn(
@@ -294,7 +307,7 @@ def average(skeletons: list[Skeleton]) -> dict[str, Any]:
 
 
 def limits_degrees(skeletons: list[Skeleton]) -> list[list[float]]:
-    """Return the widest of the joint limits that some skeletons state."""
+    """Return the widest of the joint limits that the skeletons state."""
     stated = np.array([one.limits for one in skeletons if one.limits is not None])
     low = np.degrees(stated[..., 0].min(axis=0))
     high = np.degrees(stated[..., 1].max(axis=0))
@@ -303,7 +316,10 @@ def limits_degrees(skeletons: list[Skeleton]) -> list[list[float]]:
 
 
 def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
-    """Shift a model's root height so that the lowest joint of its cycle is 3 cm above the ground, as thick as a toe."""
+    """Shift a model's root height so that its lowest joint is 3 cm above the ground.
+
+    A toe is as thick as that.
+    """
     phases = np.linspace(0.0, 1.0, 120, endpoint=False)
     values = basis(phases, HARMONICS) @ np.array(model["series"]).T
     poses = np.zeros((len(phases), 66))
@@ -319,7 +335,7 @@ def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
     "root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU"
 )
 def main(root: Path) -> None:
-    """Write built_in.json beside this file. Raises ValueError where a file it needs is missing."""
+    """Write built_in.json into the package. Raises ValueError if a file is missing."""
     needed = [f"{subject}/{subject}.asf" for subject in SUBJECTS] + [
         f"{clip.path}.amc" for clip in CLIPS.values()
     ]
@@ -343,7 +359,8 @@ def main(root: Path) -> None:
         armed(model, skeleton, activity_of(name))
         grounded(model, skeleton)
         print(
-            f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees"
+            f"{name}: period {model['period']} s, {model['speed']} m/s, "
+            f"residual {model['residual_degrees']} degrees"
         )
     target = Path(built_in.__file__).with_name("built_in.json")
     text = json.dumps(

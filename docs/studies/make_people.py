@@ -1,6 +1,9 @@
-"""Draws frames of people whom the library does not hold: `python docs/studies/make_people.py docs/pictures/people.jpg`.
+"""Draws frames of people outside the library.
 
-A row is a clip of each group of `people.py`, from 45 degrees: the best frame, four of the film, and the worst.
+    python docs/studies/make_people.py docs/pictures/people.jpg
+
+A row is a clip of each group of `people.py`, from 45 degrees: the best frame, four of
+the film, and the worst.
 """
 
 from typing import Any
@@ -15,14 +18,14 @@ from posefit.output.drawing import BACKGROUND, TEXT, draw_body, write
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
 
-STILLS = 4  # of the film, between the best and the worst frame
+STILLS = 4  # of the film, between best and worst frame
 SIDE = 208  # pixels of a still
 SILHOUETTE = (150, 150, 150)
-SOLID = 0.75  # how much of the silhouette the body hides
+SOLID = 0.75  # opacity of the body on the silhouette
 
 
 def strip(clip: Clip) -> Array:
-    """Return stills of a clip's track side by side, a picture (SIDE, SIDE * (STILLS + 2), 3)."""
+    """Return stills of a clip's track, a picture (SIDE, SIDE * (STILLS + 2), 3)."""
     cell = cell_of(cell_fields(clip, SIDES[1], clip.frames, method=METHOD))
     scene = cell_scene(cell)
     track = track_of(cell, scene)

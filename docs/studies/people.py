@@ -1,11 +1,12 @@
-"""People who are not in the library: walks, runs, jumps, turns, dances and everyday things, in recorded clips.
+"""Tracks of people outside the library, in recorded clips.
 
     python docs/studies/people.py --ledger people
     python docs/studies/people.py --recovery
 
-The first yaw is known to 25 degrees, the translation known, the body exact, the silhouettes clean; the last table is of
-some walks where none of these holds. `--recovery` measures instead whether a track is right again after the person was
-out of sight for a while.
+The clips are walks, runs, jumps, turns, dances and everyday activities. The first yaw
+is known to 25 degrees, the translation is known, the body is exact and the silhouettes
+are clean. In the last table, of some walks, none of this holds. `--recovery` measures
+something else: whether a track recovers after the person was out of sight for a while.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,12 +43,12 @@ from posefit.sweep.plan import Plan
 from posefit_reproduce.jobs import each
 from table import LEDGER, WORKERS, bar, field_text, grouped, markdown, percent, rows
 
-CHANGED = 3  # walks that are also followed in worse conditions, from 45 and 90 degrees
-SEEDED = 2  # clips of a group that are followed with more seeds, from 45 and 90 degrees
-# with which these are followed again: which hypothesis is chosen depends on a few draws
+CHANGED = 3  # walks that are also tracked in worse conditions, from 45 and 90 degrees
+SEEDED = 2  # clips of a group that are tracked with more seeds, from 45 and 90 degrees
+# the further seeds: a few random draws decide which hypothesis is chosen
 SEEDS = (1, 2)
 
-# what they are called in a table, and their fields
+# a line's name in a table, and a cell's fields
 Cells = Iterator[tuple[str, dict[str, Any]]]
 
 
@@ -63,19 +64,19 @@ def by_group(groups: Mapping[str, Sequence[Clip]]) -> Cells:
 
 
 def by_condition() -> Cells:
-    """Yield the cells of a few walks, as they are and in worse conditions."""
+    """Yield the cells of a few walks, in usual and in worse conditions."""
     for name, change in (("as above", {}), ("all worse", CHANGES["all of these"])):
         for clip, view in product(GROUPS[WALKS][:CHANGED], SIDES[1:3]):
             yield name, cell_fields(clip, view, clip.frames, seed=0, **change)
 
 
 def people_lines(aside: bool, workers: int | None, ledger: str | None) -> Iterator[str]:
-    """Yield the tables: by group and number of cameras, by group and view, and in worse conditions."""
+    """Yield the tables: by number of cameras, by view, and in worse conditions."""
     cells = (
         list(by_group(ASIDE if aside else GROUPS)),
         [] if aside else list(by_condition()),
     )
-    # a plan has no cell twice
+    # a plan contains each cell once
     different = {repr(fields): fields for some in cells for _, fields in some}
     results = dict(
         zip(
@@ -104,13 +105,13 @@ def people_lines(aside: bool, workers: int | None, ledger: str | None) -> Iterat
         yield from grouped(conditions, lambda row: [row["line"]], ["walks"])
 
 
-# frames after the person is visible again, in which the track has to be right again
+# frames after the person's return within which the track must be right again
 WITHIN = 10
-STAYS = 10  # frames after these, all of which have to be right
-# frames that the person is out of the picture before they come back the other way
+STAYS = 10  # further frames, all of which must be right
+# frames out of the picture before the person comes back the other way
 AWAY = 20
-WALKERS = 5  # walks that are tried
-BEFORE = 60  # frames that they are visible until then, and afterwards
+WALKERS = 5  # number of walks
+BEFORE = 60  # frames in view before the absence, and after it
 GAPS = {"10 frames of nothing": 10, "30 frames of nothing": 30}
 RETURN = "back the other way"
 KINDS = (*GAPS, RETURN)
@@ -120,7 +121,7 @@ TRANSLATIONS: tuple[Translation, ...] = ("known", "aligned")
 def hidden(
     observations: Sequence[Observation], start: int, stop: int
 ) -> list[Observation]:
-    """Return observations of which some show nothing, not even where the person is."""
+    """Return observations with some empty ones, which do not give the place either."""
     empty = [
         Silhouette.of(np.zeros_like(silhouette.mask))
         for silhouette in observations[start].silhouettes
@@ -135,7 +136,10 @@ def hidden(
 def trial(
     cell: TrackCell, views: Views, kind: str, translation: Translation
 ) -> tuple[bool, bool]:
-    """Return whether a track has no lost frame from ten frames after an absence on, and faces the right way there."""
+    """Return whether a track recovers after an absence, and whether it faces right.
+
+    A track has recovered if no frame is lost from ten frames after the absence on.
+    """
     scene = cell_scene(cell)
     scene, back = (
         returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
@@ -150,16 +154,16 @@ def trial(
 
 
 def with_gap(scene: Scene, frames: int) -> tuple[Scene, int]:
-    """Return the scene with empty frames in its middle, and the first after them."""
+    """Return the scene with a gap in its middle, and the first frame after the gap."""
     gone = (scene.count - frames) // 2
     back = gone + frames
     return replace(scene, observations=hidden(scene.observations, gone, back)), back
 
 
 def returned(scene: Scene, views: Views) -> tuple[Scene, int]:
-    """Return the scene whose person leaves at its end and comes back the same way, turned round, from the same place.
+    """Return the scene with the person's return, and their first visible frame then.
 
-    And the first frame in which they are visible again.
+    They leave at its end and come back the same way, turned round, from the same place.
     """
     truth = scene.truth
     assert truth is not None
@@ -185,8 +189,12 @@ def returned(scene: Scene, views: Views) -> tuple[Scene, int]:
 
 
 def recovery_lines(workers: int | None) -> Iterator[str]:
-    """Yield for each kind of absence and of translation the shares of trials in which a track was right."""
-    jobs = {}  # all cells are made, and so checked, before any runs
+    """Yield the shares of trials in which a track recovered and faced right.
+
+    There is a row for each kind of absence and of translation.
+    """
+    # all cells are made, and thereby checked, before any runs
+    jobs = {}
     for clip, view, kind, translation in product(
         GROUPS[WALKS][:WALKERS], SIDES[1:3], KINDS, TRANSLATIONS
     ):
@@ -211,8 +219,8 @@ def recovery_lines(workers: int | None) -> Iterator[str]:
 
 
 @click.command(cls=Command, help=__doc__)
-@click.option("--recovery", is_flag=True, help="Gaps, and coming back, instead.")
-@click.option("--aside", is_flag=True, help="Clips that nothing was tuned on, instead.")
+@click.option("--recovery", is_flag=True, help="Measure gaps and returns instead.")
+@click.option("--aside", is_flag=True, help="Use clips on which nothing was tuned.")
 @LEDGER
 @WORKERS
 def main(recovery: bool, aside: bool, ledger: str | None, workers: int | None) -> None:

@@ -1,9 +1,9 @@
-"""Calibration of intervals and modes for people who are not in the library.
+"""Calibration of intervals and modes for people outside the library.
 
 One person at a time is left out of library and fit.
 
-The libraries crepes and MAPIE treat every error as an independent draw. Here the clip is the exchangeable unit, as the
-errors of its frames are correlated.
+The libraries crepes and MAPIE treat every error as an independent draw. Here the clip
+is the exchangeable unit, because the errors of its frames are correlated.
 """
 
 import json
@@ -52,10 +52,10 @@ MORE = {
         Clip("135_03", 120, 1, "a form of a martial art"),
     ),
 }
-MAX_CLIPS = 4  # of a person
+MAX_CLIPS = 4  # per person
 
 
-# masks and a body as those of footage
+# masks and a body like those of footage
 HARD = {
     name: value
     for name, value in CHANGES["all of these"].items()
@@ -81,7 +81,7 @@ class Case(NamedTuple):
 
 
 def pieces() -> list[tuple[str, Clip]]:
-    """Return the clips with their groups, at most four of each person, of as many groups as they have."""
+    """Return clips with their groups: up to four per person, from different groups."""
     chosen: list[tuple[str, Clip]] = []
     clips_of = {group: (*clips, *MORE.get(group, ())) for group, clips in CLIPS.items()}
     for place in range(max(map(len, clips_of.values()))):
@@ -162,7 +162,8 @@ def sampled(case: Case) -> Samples:
     weights = np.zeros((len(posteriors), most))
     for k, frame in enumerate(posteriors):
         assert frame is not None
-        drawn[k, : len(frame)], weights[k, : len(frame)] = frame.poses, frame.weights
+        drawn[k, : len(frame)] = frame.poses
+        weights[k, : len(frame)] = frame.weights
     costs = np.array([frame.cost for frame in track.frames])
     return Samples(case, track.truth.poses, track.motion.poses, drawn, weights, costs)
 
@@ -182,19 +183,19 @@ MEMBERS = {
     name: np.array([JOINTS.index(joint) for joint in joints])
     for name, joints in GROUPS.items()
 }
-# some have no freedom, and so no error
+# some angles have no freedom, and thus no error
 ALONE = {str(angle): np.array([angle]) for angle in range(ANGLES)}
-SPREADS = np.geomspace(0.05, 2.0, 12)  # in expected errors
-EVERY = 5  # frames, of which one is used for factors, as neighbours are similar
+SPREADS = np.geomspace(0.05, 2.0, 12)  # in units of the expected error
+EVERY = 5  # only every fifth frame is used for factors: neighbours are similar
 SHARPNESSES = np.geomspace(0.05, 1.0, 24)
 TINY = 1e-12
 RIDGE = 1e-3
-STEPS = 30  # of Newton's method
+STEPS = 30  # iterations of Newton's method
 
 
 @dataclass(frozen=True, eq=False)
 class TrackFeatures:
-    """The features of a track's frames, which need no fit."""
+    """The features of a track's frames that do not depend on a fit."""
 
     track: Samples
     evidence: Array = field(repr=False)  # (T, 4)
@@ -252,7 +253,10 @@ def sharpened(weights: Array, sharpness: float) -> Array:
 
 
 def _sharpness(tracks: Sequence[TrackFeatures]) -> float:
-    """Return the power of modes' weights at which the modes that are nearest to the truth are likeliest."""
+    """Return the power of modes' weights that makes the nearest modes likeliest.
+
+    The nearest mode of a frame is the one nearest to the truth.
+    """
     weights = frame_weights(tracks)
     likelihoods = []
     pairs = [
@@ -268,18 +272,19 @@ def _sharpness(tracks: Sequence[TrackFeatures]) -> float:
 
 
 def _rounded(values: Any) -> Any:
-    """Return values as JSON holds them, numbers to four digits."""
+    """Return values ready for JSON, numbers with four digits."""
     if isinstance(values, dict):
         return {name: _rounded(value) for name, value in values.items()}
-    return (
-        [_rounded(value) for value in values]
-        if np.ndim(values)
-        else float(f"{float(values):.4g}")
-    )
+    if np.ndim(values):
+        return [_rounded(value) for value in values]
+    return float(f"{float(values):.4g}")
 
 
 def _none(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> Array:
-    """Return the coefficients (3,) of the log-odds that no mode is right: the truth is far from the nearest one."""
+    """Return the coefficients (3,) of the log-odds that no mode is right.
+
+    No mode is right if the truth is far from the nearest one.
+    """
     signs = np.array(
         [
             none_features(calibration.log(signs))
@@ -292,7 +297,10 @@ def _none(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> Array:
 
 
 def frame_weights(tracks: Sequence[TrackFeatures]) -> Array:
-    """Return the weights of all frames, which sum to 1: every clip has the same, and every frame of one."""
+    """Return the weights of all frames, which sum to 1.
+
+    Every clip has the same weight, and so has every frame of a clip.
+    """
     frames: dict[Clip, int] = {}
     for features in tracks:
         clip = features.track.case.clip
@@ -305,7 +313,7 @@ def frame_weights(tracks: Sequence[TrackFeatures]) -> Array:
 
 
 def _expected_error(tracks: Sequence[TrackFeatures]) -> Calibration:
-    """Return the logarithm of the error as a function of evidence, by weighted least squares."""
+    """Return a fit of the error's logarithm to evidence, by weighted least squares."""
     signs, errors = (
         np.concatenate([getattr(track, name) for track in tracks])
         for name in ("evidence", "error")
@@ -330,7 +338,10 @@ def _expected_error(tracks: Sequence[TrackFeatures]) -> Calibration:
 def _spreads(
     calibration: Calibration, tracks: Sequence[TrackFeatures]
 ) -> tuple[Array, Array]:
-    """Return the spreads of joints (27,) and angles (66,), in expected errors, at which the truth is likeliest."""
+    """Return the likeliest spreads of joints (27,) and angles (66,).
+
+    They are in units of the expected error.
+    """
     joints = np.zeros((len(SPREADS), len(JOINTS)))
     angles = np.zeros((len(SPREADS), ANGLES))
     weights = frame_weights(tracks)
@@ -371,7 +382,10 @@ def _spreads(
 def _factors(
     calibration: Calibration, tracks: Sequence[TrackFeatures]
 ) -> tuple[Array, Array]:
-    """Return the conformal factors of joints (levels, 27) and angles (levels, 66), each of its group."""
+    """Return the conformal factors of joints (levels, 27) and angles (levels, 66).
+
+    Each group of joints has common factors.
+    """
     clips: dict[object, list[tuple[Array, Array]]] = {}
     for features in tracks:
         clips.setdefault(features.track.case.clip, []).append(
@@ -393,12 +407,14 @@ def _factors(
 
 
 def conformal_factor(scores: Sequence[Array], level: float) -> float:
-    """Return the factor at which radii hold a share `level` of the errors in a new clip.
+    """Return the factor at which radii hold a share `level` of a new clip's errors.
 
-    `scores` has an array for each of n clips: distances over radii. Every clip counts the same, however long it is, and
-    the new one as infinitely far off: the factor is the least at which the mean over n + 1 clips of the share within it
-    is at least the level. Raises ValueError where there are too few clips for that. R. Dunn, L. Wasserman, A. Ramdas,
-    Distribution-free prediction sets for two-layer hierarchical models, 2023: the pooled CDF.
+    `scores` has an array of distances over radii for each of n clips. Every clip counts
+    the same, however long it is. The new clip counts as infinitely far off. The factor
+    is the smallest at which the mean share within it, over n + 1 clips, is at least the
+    level. Raises ValueError if there are too few clips. R. Dunn, L. Wasserman, A.
+    Ramdas, Distribution-free prediction sets for two-layer hierarchical models, 2023:
+    the pooled CDF.
     """
     if not scores or any(not len(clip) for clip in scores):
         raise InputError(
@@ -408,8 +424,9 @@ def conformal_factor(scores: Sequence[Array], level: float) -> float:
         raise InputError(f"level must be between 0 and 1, got {level}")
     clips = len(scores)
     if level > clips / (clips + 1):
+        needed = int(np.ceil(level / (1.0 - level) - 1e-9))
         raise InputError(
-            f"clips must be at least {int(np.ceil(level / (1.0 - level) - 1e-9))} for a level of {level}, got {clips}"
+            f"clips must be at least {needed} for a level of {level}, got {clips}"
         )
     values = np.concatenate([np.asarray(clip, dtype=np.float64) for clip in scores])
     weights = np.concatenate(
@@ -427,7 +444,10 @@ def conformal_factor(scores: Sequence[Array], level: float) -> float:
 def scores(
     calibration: Calibration, features: TrackFeatures, every: int = 1
 ) -> tuple[Array, Array]:
-    """Return the errors of joints (T, levels, 27) and angles (T, levels, 66), in radii of their intervals."""
+    """Return the errors of joints (T, levels, 27) and angles (T, levels, 66).
+
+    They are in units of the radii of their intervals.
+    """
     track = features.track
     turned = np.abs(wrapped(track.truth - track.reported))[::every, None]
     radii, halves = radii_of(calibration, features, every)
@@ -439,7 +459,7 @@ def scores(
 def radii_of(
     calibration: Calibration, features: TrackFeatures, every: int = 1
 ) -> tuple[Array, Array]:
-    """Return the radii of joints (T, levels, 27) and the half intervals of angles (T, levels, 66)."""
+    """Return joints' radii (T, levels, 27), angles' half intervals (T, levels, 66)."""
     joints = []
     angles = []
     track = features.track
@@ -452,7 +472,10 @@ def radii_of(
 
 
 def logistic(design: Array, truth: NDArray[np.bool_], weights: Array) -> Array:
-    """Return the coefficients (d,) of the log-odds of a truth (n,), by Newton's method with a small ridge."""
+    """Return the coefficients (d,) of the log-odds of a truth (n,).
+
+    Newton's method with a small ridge.
+    """
     coefficients = np.zeros(design.shape[1])
     for _ in range(STEPS):
         probable = 1.0 / (1.0 + np.exp(-np.clip(design @ coefficients, -30.0, 30.0)))
@@ -464,11 +487,11 @@ def logistic(design: Array, truth: NDArray[np.bool_], weights: Array) -> Array:
     return np.asarray(coefficients)
 
 
-MIN_PEOPLE = 3  # of which one is left out at a time
+MIN_PEOPLE = 3  # one of them is left out at a time
 
 
 def judged(tracks: Sequence[TrackFeatures]) -> list["Evaluation"]:
-    """Return the evaluation of each track by a calibration that was fitted to other people."""
+    """Return the evaluation of each track by a calibration fitted to other people."""
     people = list(dict.fromkeys(map(_person, tracks)))
     if len(people) < MIN_PEOPLE:
         raise InputError(
@@ -522,7 +545,7 @@ def evaluated(calibration: Calibration, features: TrackFeatures) -> Evaluation:
 def coverage(
     name: str, tracks: Sequence[Evaluation], joints: Any = slice(1, None)
 ) -> list[str]:
-    """Return the line of some joints of tracks: how much the intervals hold, and the radius of 80 %."""
+    """Return the line of some joints: shares within intervals, and 80 % radii."""
     weights = frame_weights([track.features for track in tracks])
     inside, radii = (
         np.concatenate(
@@ -536,7 +559,10 @@ def coverage(
 
 
 def coverage_lines(tracks: Sequence[Evaluation]) -> Iterator[str]:
-    """Yield the table of people left out: overall, by group of joints, by view and by kind of motion."""
+    """Yield the table of left-out people.
+
+    It has lines for all, for groups of joints, for views and for kinds of motion.
+    """
     cells = [
         coverage("all", tracks),
         *(coverage(name, tracks, members) for name, members in MEMBERS.items()),
@@ -569,9 +595,10 @@ def coverage_lines(tracks: Sequence[Evaluation]) -> Iterator[str]:
 
 
 def modes_line(evaluations: Sequence[Evaluation]) -> str:
-    """Return how often the best mode is right, as its probability says and as it is, and how often no mode is.
+    """Return how often the best mode is right, its claimed probability, and no mode's.
 
-    It is right where the truth is nearer to it than to any other mode, and as near as poses of one mode are.
+    It is right if the truth is nearer to it than to any other mode, and as near as
+    poses of one mode are.
     """
     none = np.concatenate([evaluation.none for evaluation in evaluations])
     best = [
@@ -585,14 +612,17 @@ def modes_line(evaluations: Sequence[Evaluation]) -> str:
     far = nearest[:, 1] > APART
     flags = (nearest[:, 0] == 0.0) & ~far, (1.0 - none) * best, far
     right, claimed, never = (percent(float(values.mean())) for values in flags)
-    return f"best mode: right in {right} % of the frames, claimed in {claimed} %; none is right in {never} %"
+    return (
+        f"best mode: right in {right} % of the frames, claimed in {claimed} %; "
+        f"none is right in {never} %"
+    )
 
 
 @click.command(cls=Command, help=__doc__)
 @click.option(
     "--store",
     metavar="FILE.json",
-    help="New file for the calibration, for exemplars to read.",
+    help="New file for the calibration, which exemplars can read.",
 )
 @WORKERS
 def main(store: str | None, workers: int | None) -> None:

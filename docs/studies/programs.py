@@ -1,9 +1,11 @@
-"""Opens the files of a track with the programs that they are for: OpenSim, Blender and others, at the versions below.
+"""Opens a track's files with the programs for which they are made.
 
     python docs/studies/programs.py --folder programs
 
-It needs a network, ten minutes, and a Python that OpenSim and Blender have packages for (3.11). A cell is a file, read
-by a program, of a track; programs_read.py has what is compared. It ends with status 1 where a cell is wrong.
+The programs are OpenSim, Blender and others, at the versions below. This needs a
+network, ten minutes, and a Python for which OpenSim and Blender have packages (3.11). A
+cell is a file of a track, read by a program. programs_read.py has the comparisons. The
+exit status is 1 if a cell is wrong.
 """
 
 import json
@@ -40,7 +42,7 @@ VERSIONS = {
     "pandas": ("pandas==3.1.1",),
 }
 FRAMES = 24
-# of a track: frames that show nobody, and what differs from the plainest one
+# for each track: frames that show nobody, and what differs from the plain track
 TRACKS: Mapping[str, tuple[tuple[int, ...], Mapping[str, Any]]] = {
     "plain": ((), {}),
     "held frames": ((0, 5, 6, 23), {}),
@@ -63,7 +65,7 @@ def write_track(
     fps: float = 30.0,
     frames: tuple[int, int] = (0, FRAMES),
 ) -> None:
-    """Track a walk in masks, some of them empty, and write its files and what they should hold."""
+    """Track a walk in masks, some of them empty; write files and expected content."""
     walk = built_in.motion("walk", frames=FRAMES)
     body = posefit.Body.of(walk.skeleton)
     camera = posefit.Camera.around(walk.translations[0], 0.8, 4.5, size)
@@ -93,7 +95,7 @@ def write_track(
 
 
 def installed(program: str, folder: Path, python: str) -> Path:
-    """Return the Python of a program's environment, which is made where it is missing."""
+    """Return the Python of a program's environment, which is made if missing."""
     place = folder / "environments" / program
     own = place.resolve() / "bin" / "python"
     if not (place / "done").exists():
@@ -105,9 +107,13 @@ def installed(program: str, folder: Path, python: str) -> Path:
 
 
 def read(program: str, python: Path, folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield each file that a program reads, and what is wrong with it, nothing, or a dash."""
+    """Yield each file that a program reads, and an error, nothing, or a dash.
+
+    A dash means that the program does not offer this.
+    """
     words = [str(python), str(READER), program, str(folder.resolve())]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
+    # a file without a result is wrong because the reader ended before it
     missing = dict.fromkeys(PROGRAMS[program], f"ended with {done.returncode}")
     for line in done.stdout.splitlines():
         if line.startswith('["result"'):
@@ -118,11 +124,21 @@ def read(program: str, python: Path, folder: Path) -> Iterator[tuple[str, str]]:
 
 
 @click.command()
-@click.option("--folder", type=Path, required=True, help="For tracks and environments.")
-@click.option("--python", default=sys.executable, help="For the environments.")
-@click.option("--program", "only", multiple=True, type=click.Choice([*PROGRAMS]))
+@click.option(
+    "--folder", type=Path, required=True, help="Folder for tracks and environments."
+)
+@click.option(
+    "--python", default=sys.executable, help="Python that makes the environments."
+)
+@click.option(
+    "--program",
+    "only",
+    multiple=True,
+    type=click.Choice([*PROGRAMS]),
+    help="By default all. Repeatable.",
+)
 def main(folder: Path, python: str, only: tuple[str, ...]) -> None:
-    """Print a table of programs, files and tracks, and what is wrong in it."""
+    """Print a table of programs, files and tracks, and list what is wrong."""
     for name, (empty, options) in TRACKS.items():
         if not (folder / name / EXPECTED).exists():
             write_track(folder / name, empty, **options)

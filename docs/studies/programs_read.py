@@ -1,7 +1,9 @@
-"""Reads the files of a track in a program's own environment: `python programs_read.py PROGRAM FOLDER`, by programs.py.
+"""Reads the files of a track in a program's environment, for programs.py.
 
-It prints a line of JSON for each file: its name, and what is wrong, nothing, or a dash for what is not offered.
-posefit need not be installed.
+    python programs_read.py PROGRAM FOLDER
+
+It prints a line of JSON for each file: its name, and an error, nothing, or a dash if
+the program does not offer this. posefit need not be installed.
 """
 
 import importlib
@@ -16,32 +18,35 @@ import numpy as np
 
 EXPECTED = "expected.npz"
 NOT_OFFERED = "-"
-METRES = 2e-6  # that a joint may be off; tables have micrometres
-BONE_METRES = 1e-4  # after a program's own kinematics, of numbers of 32 bits
+METRES = 2e-6  # tolerance of a joint; tables have micrometres
+BONE_METRES = 1e-4  # tolerance after a program's kinematics with 32-bit numbers
 SECONDS = 1e-6
 TASKS = "<IKMarkerTask name='{}'><apply>true</apply><weight>1</weight></IKMarkerTask>"
-# scales a thigh by the distance of two markers, and then places all markers
+# scales a thigh by the distance of two markers, then places all markers
 SCALING = """<OpenSimDocument Version="40000"><ScaleTool name="person"><mass>70</mass>
 <GenericModelMaker><model_file>model.osim</model_file>
 <marker_set_file>Unassigned</marker_set_file></GenericModelMaker>
 <ModelScaler><apply>true</apply><scaling_order>measurements</scaling_order>
 <MeasurementSet><objects><Measurement name="thigh"><apply>true</apply>
-<MarkerPairSet><objects><MarkerPair><markers>left_hip left_knee</markers></MarkerPair></objects></MarkerPairSet>
-<BodyScaleSet><objects><BodyScale name="lfemur"><axes>X Y Z</axes></BodyScale></objects></BodyScaleSet>
+<MarkerPairSet><objects><MarkerPair><markers>left_hip left_knee</markers>\
+</MarkerPair></objects></MarkerPairSet>
+<BodyScaleSet><objects><BodyScale name="lfemur"><axes>X Y Z</axes>\
+</BodyScale></objects></BodyScaleSet>
 </Measurement></objects></MeasurementSet>
 <marker_file>track.trc</marker_file><time_range>{start} {stop}</time_range>
 <output_model_file>scaled.osim</output_model_file></ModelScaler>
 <MarkerPlacer><apply>true</apply><IKTaskSet><objects>{tasks}</objects></IKTaskSet>
 <marker_file>track.trc</marker_file><time_range>{start} {stop}</time_range>
-<output_model_file>placed.osim</output_model_file></MarkerPlacer></ScaleTool></OpenSimDocument>"""
+<output_model_file>placed.osim</output_model_file></MarkerPlacer></ScaleTool>\
+</OpenSimDocument>"""
 
 
 class NotOfferedError(Exception):
-    """A program has nothing for such a track."""
+    """A program has nothing for this kind of track."""
 
 
 class Expected:
-    """What the files of a track should hold."""
+    """The content that the files of a track should have."""
 
     def __init__(self) -> None:
         with np.load(EXPECTED) as stored:
@@ -54,12 +59,12 @@ class Expected:
 
     @property
     def known(self) -> Any:
-        """The rows of the frames that were not held."""
+        """The rows of frames that were not held."""
         return np.flatnonzero(~self.held)
 
 
 def same(name: str, values: Any, expected: Any, tolerance: float) -> None:
-    """Raise ValueError where values differ from what is expected."""
+    """Raise ValueError if values differ from the expected ones."""
     values = np.asarray(values, dtype=float)
     expected = np.asarray(expected, dtype=float)
     if values.shape != expected.shape:
@@ -79,7 +84,7 @@ def blanked(expected: Expected) -> Any:
     return joints
 
 
-# ---- programs; a check is a function of what is expected, by the file that it reads
+# ---- programs; each check reads one file and compares it with the expected content
 
 
 def opensim_markers(expected: Expected) -> None:
@@ -99,7 +104,7 @@ def opensim_markers(expected: Expected) -> None:
 
 def opensim_kinematics(expected: Expected) -> None:
     opensim = importlib.import_module("opensim")
-    # Python may not drop the model before the tool does
+    # Python must not delete the model before the tool
     model = opensim.Model("model.osim")
     tool = opensim.InverseKinematicsTool()
     tool.setModel(model)
@@ -116,7 +121,7 @@ def opensim_motion(expected: Expected) -> None:
 
 
 def opensim_joints(expected: Expected, name: str, rows: Any) -> None:
-    """Raise ValueError where the model's markers are not at the joints in these rows."""
+    """Raise ValueError if the model's markers are not at the joints in these rows."""
     opensim = importlib.import_module("opensim")
     model = opensim.Model("model.osim")
     state = model.initSystem()
@@ -141,13 +146,13 @@ def opensim_scaling(expected: Expected) -> None:
     opensim = importlib.import_module("opensim")
     times = expected.times[expected.known]
     if len(times) < 2:
-        raise NotOfferedError  # it averages over a time, and one frame has none
+        raise NotOfferedError  # it averages over time, and one frame has no duration
     tasks = "".join(map(TASKS.format, expected.places))
     text = SCALING.format(start=times[0] - 1e-6, stop=times[-1] + 1e-6, tasks=tasks)
     Path("scale.xml").write_text(text)
     if not opensim.ScaleTool("scale.xml").run():
         raise ValueError("the tool did not run")
-    # Python may not drop the models before their parts
+    # Python must not delete the models before their parts
     models = [opensim.Model(name) for name in ("model.osim", "scaled.osim")]
     before, after = (
         model.getMarkerSet().get("left_knee").get_location().to_numpy()
@@ -190,7 +195,7 @@ def pyomeca_points(expected: Expected) -> None:
     markers = importlib.import_module("pyomeca").Markers.from_c3d("track.c3d")
     points = markers.values[:3].transpose(2, 1, 0) / 1e3
     same("points", points, blanked(expected), METRES)
-    # its times count from the first frame of the file
+    # its times start at the first frame of the file
     times = markers.time.values + markers.attrs["first_frame"] / markers.attrs["rate"]
     same("times", times, expected.times, 1e-6)
 
@@ -281,7 +286,7 @@ def blender_nodes(expected: Expected) -> None:
     for seconds in expected.times:
         whole, part = divmod(float(seconds) * rate, 1.0)
         scene.frame_set(int(whole), subframe=part)
-        # a node stands where its bone starts
+        # a node is where its bone starts
         knees.append(bpy.data.objects["ltibia"].matrix_world.translation.copy())
     same("knees", y_up(knees), expected.joints[:, knee(expected)], BONE_METRES)
 
@@ -291,7 +296,7 @@ def av_frames(expected: Expected) -> None:
         frames = list(video.decode(video=0))
         rate = float(video.streams.video[0].average_rate)
     same("frames", len(frames), len(expected.times), 0)
-    # of a single frame a rate says nothing
+    # a single frame has no meaningful rate
     if len(frames) > 1:
         same("rate", rate, expected.fps, 0.006)
 
@@ -310,7 +315,7 @@ def pandas_tables(expected: Expected) -> None:
 
 
 def y_up(points: Any) -> Any:
-    """Return Blender's points (n, 3), whose z is up, as posefit's."""
+    """Return Blender's points (n, 3), with z up, in posefit's axes."""
     x, y, z = np.array([list(point) for point in points]).T
     return np.column_stack([x, z, -y])
 
@@ -345,7 +350,7 @@ PROGRAMS: dict[str, dict[str, Check]] = {
 
 
 def results(program: str) -> Iterator[tuple[str, str]]:
-    """Yield each file that a program reads, and what is wrong with it, nothing, or a dash."""
+    """Yield each file that a program reads, and an error, nothing, or a dash."""
     expected = Expected()
     for name, check in PROGRAMS[program].items():
         try:
@@ -361,5 +366,5 @@ def results(program: str) -> Iterator[tuple[str, str]]:
 if __name__ == "__main__":
     os.chdir(sys.argv[2])
     for file, words in results(sys.argv[1]):
-        # programs print, too
+        # programs print text as well
         print("\n" + json.dumps(["result", file, words]), flush=True)

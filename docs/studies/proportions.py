@@ -1,7 +1,8 @@
-"""How far people's proportions differ: the numbers of a build's prior.
+"""How much people's proportions vary: the numbers of a build's prior.
 
-MEN and WOMEN are the public tables of ANSUR II, ANSUR_II_MALE_Public.csv and ANSUR_II_FEMALE_Public.csv of
-https://www.openlab.psu.edu/ansur2 (Gordon et al. 2014, NATICK/TR-15/007).
+MEN and WOMEN are the public tables of ANSUR II, ANSUR_II_MALE_Public.csv and
+ANSUR_II_FEMALE_Public.csv, from https://www.openlab.psu.edu/ansur2 (Gordon et al. 2014,
+NATICK/TR-15/007).
 """
 
 import csv
@@ -16,7 +17,7 @@ from posefit.cli.output import Command
 from posefit.reading import existing
 from table import markdown
 
-# Each proportion is a sum of measures, some with a minus, over stature.
+# Each proportion is a sum of measures, some with a minus sign, divided by stature.
 MEASURES = {
     "thighs": ("trochanterionheight", "-lateralfemoralepicondyleheight"),
     "shanks": ("lateralfemoralepicondyleheight", "-lateralmalleolusheight"),
@@ -30,7 +31,7 @@ MEASURES = {
 
 
 def proportions(table: Path) -> Array:
-    """Return the logarithms of people's stature in metres and of their proportions (people, 9)."""
+    """Return logarithms of stature in metres and of proportions, (people, 9)."""
     with existing(table).open(encoding="latin-1", newline="") as file:
         rows = list(csv.DictReader(file))
     names = {"stature", *(name.strip("-") for of in MEASURES.values() for name in of)}
@@ -40,15 +41,15 @@ def proportions(table: Path) -> Array:
         for of in MEASURES.values()
     ]
     stature = columns["stature"]
-    return np.asarray(
-        np.log(
-            np.column_stack([1e-3 * stature, *(length / stature for length in lengths)])
-        )
-    )
+    shares = [length / stature for length in lengths]
+    return np.asarray(np.log(np.column_stack([1e-3 * stature, *shares])))
 
 
 def moments(men: Array, women: Array) -> tuple[Array, Array]:
-    """Return the standard deviations (n,) and correlations (n, n) of a population of as many men as women."""
+    """Return standard deviations (n,) and correlations (n, n) of a population.
+
+    It has as many men as women.
+    """
     middle = 0.5 * (men.mean(axis=0) + women.mean(axis=0))
     covariance = sum(
         0.5 * (people - middle).T @ (people - middle) / len(people)

@@ -1,7 +1,8 @@
-"""Does it pay to observe in Race-v0? Policies that do not, that do, and that learn to, on held-out instances.
+"""Are observations worth it in Race-v0? Policies without, with, and with learning.
 
-All have the same instances, first populations and budgets, so that they are compared in pairs. The figure is
-ln(1 + best cost), which the rewards of an episode sum up to.
+They are tested on held-out instances. All have the same instances, first populations
+and budgets, so that they are compared in pairs. The figure is ln(1 + best cost), to
+which the rewards of an episode sum up.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,10 +25,10 @@ from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 NAME = "posefit/Race-v0"
 INSTANCES = 192
 SEEDS = 2
-# what a training of each learner has
+# settings of the learners' trainings
 CURIOSITIES = (0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
 SLOPES = (0.01, 0.03, 0.05, 0.1, 0.2)
-# CMA-ES: policies a generation, each in so many episodes
+# CMA-ES: policies per generation, and episodes of each
 CANDIDATES = 16
 EPISODES = 24
 GENERATIONS = 60
@@ -42,7 +43,7 @@ PPO_SETTINGS: dict[str, Any] = {
     "learning_rate": 1e-3,
     "gae_lambda": 0.98,
 }
-# of PPO's first actions: of several that are clipped to 1 the first would count
+# of PPO's first actions: if several were clipped to 1, the first would always win
 LOG_DEVIATION = -1.0
 SAC_ENVIRONMENTS = 16
 SAC_STEPS = 24_000
@@ -59,16 +60,16 @@ class Turn(NamedTuple):
 
 
 def round_robin(observation: Any, step: int) -> Array:
-    """Return the action by which searches take turns."""
+    """Return the action with which searches take turns."""
     features, _ = race_features(observation)
     searches: int = features.shape[-2]
     return race_action(np.full(features.shape[:-2], step % searches), searches)
 
 
 def restarted(observation: Any, _: int, *, slope: float) -> Array:
-    """Return the action that advances one search until its slope is below `slope`, and then another.
+    """Return the action that advances one search until its slope is below `slope`.
 
-    The next one is a search that never was advanced, or where there is none, one that begins.
+    Then another search is advanced: one that never was, or else a new one.
     """
     features = race_features(observation)[0]
     steep = features[..., 1] >= slope
@@ -78,15 +79,16 @@ def restarted(observation: Any, _: int, *, slope: float) -> Array:
 
 
 def halving(observation: Any, _: int) -> Array:
-    """Return the action of successive halving: after each of equal parts of the budget the worse half stops.
+    """Return the action of successive halving.
 
-    Those that are left take turns. K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and
-    hyperparameter optimization, AISTATS 2016.
+    The budget has equal parts. After each of them the worse half of the searches stops;
+    the others take turns. K. Jamieson, A. Talwalkar, Non-stochastic best arm
+    identification and hyperparameter optimization, AISTATS 2016.
     """
     features, common = race_features(observation)
     searches = features.shape[-2]
     parts = int(np.log2(searches)) + 1
-    # float32 shows the budget
+    # the observed budget is float32
     done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)
     ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
     left = ranks < searches // 2.0 ** done[..., None]
@@ -96,11 +98,12 @@ def halving(observation: Any, _: int) -> Array:
 
 
 def bandit(observation: Any, step: int, *, curiosity: float) -> Array:
-    """Return the action of UCB1: the lowest best cost, less what a search may gain that had few generations.
+    """Return the action of UCB1: the search with the lowest optimistic best cost.
 
-    That is `curiosity` times the root of ln(generations of all) / generations, in shown costs. It begins no search.
-    P. Auer, N. Cesa-Bianchi, P. Fischer, Finite-time analysis of the multiarmed bandit problem, Machine Learning 47,
-    2002, whose rewards are means and not bests.
+    The optimistic cost is lower by `curiosity` times the root of ln(generations of all)
+    / generations, in observed costs. The policy starts no new search. P. Auer, N.
+    Cesa-Bianchi, P. Fischer, Finite-time analysis of the multiarmed bandit problem,
+    Machine Learning 47, 2002. Their rewards are means; these are bests.
     """
     features, _ = race_features(observation)
     searches = int(features.shape[-2])
@@ -112,10 +115,11 @@ def bandit(observation: Any, step: int, *, curiosity: float) -> Array:
 
 
 def linear(observation: Any, _: int, *, weights: Array) -> Array:
-    """Return the action with the highest score, linear in what is shown of a search.
+    """Return the action with the highest score, linear in a search's features.
 
-    `weights` (..., 9), one policy or one for each row of observations: of four numbers, of these times the budget left,
-    and the score of another search. The numbers are the best cost above the best of all, slope, spread and use.
+    `weights` (..., 9) are one policy, or one for each row of observations. Four are for
+    the features: best cost above the best of all, slope, spread and use. Four are for
+    the same features times the budget left. The last is the score of a new search.
     """
     features, common = race_features(observation)
     features[..., 0] -= common[..., :1]
@@ -129,7 +133,10 @@ def linear(observation: Any, _: int, *, weights: Array) -> Array:
 def final_costs(
     policy: Policy, env: Any, numbers: Sequence[int], seeds: Sequence[int]
 ) -> tuple[Array, int]:
-    """Return ln(1 + best cost) (n,) at the end of an episode of every environment of a vector, and the steps made."""
+    """Return ln(1 + best cost) (n,) after an episode of each environment.
+
+    Also return the number of steps made.
+    """
     observations, _ = env.reset(seed=list(seeds), options={"instance": list(numbers)})
     costs = np.full(env.num_envs, np.nan)
     step = 0
@@ -148,7 +155,10 @@ def _made(count: int) -> Any:
 
 
 def chosen(policies: Sequence[Policy], seed: int) -> tuple[Policy, int]:
-    """Return the best of several policies on as many training instances as are held out, and the steps made."""
+    """Return the best of several policies on training instances, and the steps made.
+
+    There are as many instances as are held out.
+    """
     rng = np.random.default_rng(seed)
     env = _made(INSTANCES)
     numbers = rng.integers(HELD_OUT, size=INSTANCES).tolist()
@@ -183,9 +193,10 @@ def evolved(seed: int) -> tuple[Policy, int]:
 
 
 def trained(agent: str, seed: int) -> tuple[Policy, int]:
-    """Return what Stable-Baselines3 learned, a draw of its distribution, and the steps made.
+    """Return the policy learned by Stable-Baselines3, and the steps made.
 
-    The middle of the distribution is worse: one of two searches that look alike has all turns.
+    Actions are drawn from its distribution. The distribution's middle is worse: of two
+    searches with similar features one would have all turns.
     """
     import torch
     from stable_baselines3 import PPO, SAC
@@ -213,7 +224,10 @@ def trained(agent: str, seed: int) -> tuple[Policy, int]:
 
 
 def _shared_net() -> type:
-    """Return a policy of Stable-Baselines3 whose one net scores every search, and which has the number of another."""
+    """Return a policy of Stable-Baselines3 with one net that scores every search.
+
+    A new search has a separate score.
+    """
     import torch
     from stable_baselines3.common.policies import ActorCriticPolicy
     from torch import nn
@@ -230,7 +244,8 @@ def _shared_net() -> type:
             self.score = nn.Sequential(
                 nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh()
             )
-            self.last, self.another = nn.Linear(width, 1), nn.Linear(COMMON_FEATURES, 1)
+            self.last = nn.Linear(width, 1)
+            self.another = nn.Linear(COMMON_FEATURES, 1)
             self.value = nn.Sequential(
                 nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh()
             )
@@ -261,7 +276,7 @@ def _shared_net() -> type:
 
         def _build(self, schedule: Any) -> None:
             super()._build(schedule)
-            self.action_net = nn.Identity()  # scores are the actions
+            self.action_net = nn.Identity()  # the scores are the actions
             optimizer: Any = self.optimizer_class
             self.optimizer = optimizer(
                 self.parameters(), lr=schedule(1), **self.optimizer_kwargs
@@ -287,15 +302,13 @@ def policy_of(turn: Turn, env: Any) -> tuple[Policy, int]:
             [partial(bandit, curiosity=curiosity) for curiosity in CURIOSITIES],
             turn.seed,
         )
-    return (
-        evolved(turn.seed)
-        if turn.agent == "linear, CMA-ES"
-        else trained(turn.agent, turn.seed)
-    )
+    if turn.agent == "linear, CMA-ES":
+        return evolved(turn.seed)
+    return trained(turn.agent, turn.seed)
 
 
 def row_of_turn(turn: Turn) -> dict[str, Any]:
-    """Return a row: the final costs of a policy on the held-out instances, and the steps of its training."""
+    """Return a row: final costs on held-out instances, and the training's steps."""
     env = _made(INSTANCES)
     numbers = range(HELD_OUT, HELD_OUT + INSTANCES)
     policy, steps = policy_of(turn, env)
@@ -304,7 +317,10 @@ def row_of_turn(turn: Turn) -> dict[str, Any]:
 
 
 def race_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the printed table, the highest mean first; intervals are of 95 %, a bootstrap of seeds and instances."""
+    """Yield the printed table, the highest mean first.
+
+    Intervals are of 95 %, by a bootstrap of seeds and instances.
+    """
     agents = dict.fromkeys(row["agent"] for row in rows)
     costs = {
         agent: np.array([row["costs"] for row in rows if row["agent"] == agent])
@@ -326,7 +342,7 @@ def race_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 @click.option(
     "--rows",
     metavar="FILE",
-    help="A file for a row a line: the same command continues there.",
+    help="File with one row a line. An earlier run there is continued.",
 )
 @WORKERS
 def main(rows: str | None, workers: int | None) -> None:

@@ -1,13 +1,15 @@
-"""Write the tables of the plan `related` from its ledger: the methods, who wins where, the paper's sentences.
+"""Write the tables of the plan `related` from its ledger.
 
     posefit sweep docs/studies/related.toml --out results
     python docs/studies/related.py results tables
     python docs/studies/reproduced_pages.py related=tables
 
-Sentences are those of SAPSO's paper, section 1, about other methods. Each is a comparison of two methods in paired
-cells: the mean difference with its 95 % interval, for other conditions of the same motions, by
-`posefit.statistics.means`. It holds where the whole interval is on its side of 0, fails where it is on the other, and
-is open in between.
+There are tables of the methods, of the best method for each condition, and of the
+sentences of the SAPSO paper, section 1, about other methods. Each sentence is a
+comparison of two methods in paired cells. The figure is the mean difference with its 95
+% interval over other conditions of the same motions, by `posefit.statistics.means`. The
+sentence holds if the whole interval is on its side of 0, fails if it is on the other
+side, and is open otherwise.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,17 +27,17 @@ from posefit.sweep.ledger import Ledger
 from table import head_of, markdown, number, percent
 
 Row = Mapping[str, Any]
-# motion, cameras, whether the first yaw is known, whether masks are clean
+# motion, number of cameras, whether the first yaw is known, whether masks are clean
 Condition = tuple[str, int, bool, bool]
 
 
 class Sentence(NamedTuple):
-    """What the paper says of a method, as a difference that would be above 0."""
+    """What the paper says about a method, as a difference above 0."""
 
     says: str
     method: str
     reference: str
-    figure: str  # of a row, which has to be higher for the method
+    figure: str  # of a row; it must be higher for the method
     rows: Callable[[Condition], bool] = lambda _: True
 
 
@@ -106,7 +108,7 @@ def name_of(row: Row) -> str:
 
 
 def condition_of(row: Row) -> Condition:
-    """Return the motion, the cameras, and whether yaw and masks are undisturbed."""
+    """Return the motion, the number of cameras, and whether yaw and masks are exact."""
     spec = row["spec"]
     view = row["spec"].get("view_degrees", 0)
     cameras = len(view) if isinstance(view, list | tuple) else 1
@@ -119,7 +121,10 @@ def condition_of(row: Row) -> Condition:
 
 
 def methods(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the table of methods, the most accurate first: medians of all tracks, and of four parts of them."""
+    """Yield the table of methods, the most accurate first.
+
+    It has medians of all tracks, and of four parts of them.
+    """
     parts = {
         f"{views}, {masks}": (views == "one camera", masks == "clean")
         for views in ("one camera", "two")
@@ -153,7 +158,10 @@ def methods(rows: Sequence[Row]) -> Iterator[str]:
 def paired(
     rows: Sequence[Row], method: str, reference: str, figure: str
 ) -> dict[tuple[Condition, int], float]:
-    """Return the differences of a figure, by condition and seed, between the cells of two methods."""
+    """Return the paired differences of a figure between two methods' cells.
+
+    Keys are condition and seed.
+    """
     values: dict[str, dict[tuple[Condition, int], float]] = {method: {}, reference: {}}
     for row in rows:
         if name_of(row) in values:
@@ -165,7 +173,10 @@ def paired(
 
 
 def winners(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the table of who wins where, by the mean MPJPE; "or" names the next one where it is not surely behind."""
+    """Yield the table of the best method, by mean MPJPE, for each condition.
+
+    "or" names the second best if it is not significantly worse.
+    """
     lines: dict[tuple[str, int], list[str]] = {}
     for condition in sorted(
         set(map(condition_of, rows)),
@@ -205,11 +216,18 @@ def winners(rows: Sequence[Row]) -> Iterator[str]:
 def difference(
     values: Sequence[float], strata: Sequence[object], clusters: Sequence[object]
 ) -> tuple[str, str, str]:
-    """Return a mean, its interval and the verdict on a mean above 0, in words; open where there is no interval."""
+    """Return a mean, its interval and the verdict on a mean above 0, in words.
+
+    The verdict is "open" if there is no interval.
+    """
     mean = mean_interval(values, list(map(str, strata)), list(map(str, clusters)))
     if not np.isfinite(mean.low):
         return f"{mean.value:+.3g}", "-", "open"
-    verdict = "holds" if mean.low > 0.0 else "fails" if mean.high < 0.0 else "open"
+    verdict = "open"
+    if mean.low > 0.0:
+        verdict = "holds"
+    elif mean.high < 0.0:
+        verdict = "fails"
     return f"{mean.value:+.3g}", f"{mean.low:+.3g} to {mean.high:+.3g}", verdict
 
 
@@ -217,7 +235,8 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
     lines = []
     for sentence in SENTENCES:
         pairs = paired(rows, sentence.method, sentence.reference, sentence.figure)
-        what = f"`{sentence.method}` less `{sentence.reference}`, {head_of(sentence.figure)}"
+        pair = f"`{sentence.method}` less `{sentence.reference}`"
+        what = f"{pair}, {head_of(sentence.figure)}"
         cell = "open"
         if pairs:
             strata = [condition[0] for condition, _ in pairs]
@@ -256,7 +275,8 @@ def main(ledger: Path, out: Path) -> None:
         for of in (condition_of, lambda row: row["spec"]["seed"])
     )
     click.echo(
-        f"{out}: {len(rows):,} tracks, {conditions} conditions, {seeds} seeds, {version}"
+        f"{out}: {len(rows):,} tracks, {conditions} conditions, {seeds} seeds, "
+        f"{version}"
     )
 
 

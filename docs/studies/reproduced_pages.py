@@ -1,9 +1,10 @@
-"""Put what `posefit reproduce` or a study wrote into the pages that show it, and its figures into docs/pictures.
+"""Put the results of `posefit reproduce` or a study into the pages that show them.
 
     python docs/studies/reproduced_pages.py sapso=OUT vsmm=OUT footage=OUT related=OUT
 
-A page has `<!-- sapso: parts -->`, the table, and `<!-- end -->`: what is between them is OUT/parts.md. A picture that
-a page shows as ../pictures/sapso-NAME is OUT/NAME. Nothing else of a page changes.
+A page has `<!-- sapso: parts -->`, a table, and `<!-- end -->`. The table is replaced
+by OUT/parts.md. A picture that a page shows as ../pictures/sapso-NAME is copied from
+OUT/NAME to docs/pictures. Nothing else of a page changes.
 """
 
 import re
@@ -20,7 +21,7 @@ PAGES = ("sapso.md", "patent.md", "related.md")
 
 
 def filled(text: str, name: str, folder: Path) -> str:
-    """Return a page with the tables of a folder. Raises InputError where one is missing."""
+    """Return a page with a folder's tables. Raises InputError if one is missing."""
 
     def table(match: re.Match[str]) -> str:
         path = folder / f"{match[1]}.md"
@@ -28,7 +29,8 @@ def filled(text: str, name: str, folder: Path) -> str:
             raise InputError(
                 f"{path}: expected a table of posefit reproduce or a study, got none"
             )
-        return f"<!-- {name}: {match[1]} -->\n\n{path.read_text('utf-8').strip()}\n\n<!-- end -->"
+        content = path.read_text("utf-8").strip()
+        return f"<!-- {name}: {match[1]} -->\n\n{content}\n\n<!-- end -->"
 
     return re.sub(
         rf"<!-- {name}: ([\w-]+) -->.*?<!-- end -->", table, text, flags=re.DOTALL
@@ -38,7 +40,7 @@ def filled(text: str, name: str, folder: Path) -> str:
 @click.command(cls=Command)
 @click.argument("folders", nargs=-1, required=True, metavar="NAME=OUT ...")
 def main(folders: tuple[str, ...]) -> None:
-    """Write the tables and figures of such folders into the handbook."""
+    """Write the tables and figures of the folders into the handbook."""
     for page in (DOCS / "measured" / name for name in PAGES):
         text = page.read_text("utf-8")
         for name, _, out in (item.partition("=") for item in folders):

@@ -1,6 +1,7 @@
-"""What a pose costs as a function of the picture's size, the views, the dimensions and the population.
+"""The cost of a pose by picture size, number of views, dimensions and population.
 
-Each is the benchmark's problem with one number changed, on one thread, in microseconds a pose: the fastest run.
+Each is the benchmark's problem with one number changed, on one thread. Figures are
+microseconds per pose in the fastest run.
 """
 
 from functools import partial

@@ -1,6 +1,7 @@
-"""How much a track of the same film depends on the seed: FILM is the demonstration video of Sports2D, or any other.
+"""How much a track of the same film depends on the seed.
 
-Frames, height and how the person is taken out are chosen as for `posefit track`.
+FILM is the demonstration video of Sports2D, or any other. Frames, height and segmenter
+are chosen as for `posefit track`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +17,7 @@ from posefit.cli.options import EXTRACTION, FRAMES, options, track_flags
 from posefit.cli.output import Command
 from posefit.cli.tracking import extraction_of
 from posefit.evaluation.errors import LOST
-from posefit.footage.masks import Range
+from posefit.footage.views import Range
 from posefit.geometry.skeleton import BONES
 from posefit.progress import QUIET
 from posefit.tracking.front import track
@@ -26,7 +27,7 @@ LIMBS = {"thigh": ("lfemur",), "forearm": ("lradius", "lwrist")}
 
 
 def seed_row(film: str, how: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return the figures of a film tracked with a seed, and its joints in millimetres."""
+    """Return the figures of a film tracked with a seed, and its joints in mm."""
     result = track(film, seed=seed, progress=QUIET, **how)
     usable = result.table["usable"] > 0.0
     skeleton = result.motion.skeleton
@@ -46,7 +47,10 @@ def seed_row(film: str, how: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 
 def median_distance(tracks: Sequence[Array]) -> float:
-    """Return the median distance of joints (T, 27, 3) between two tracks, over all pairs, frames and joints."""
+    """Return the median distance of joints (T, 27, 3) between tracks.
+
+    It is over all pairs of tracks, all frames and all joints.
+    """
     distances = [
         np.linalg.norm(first - second, axis=2)
         for first, second in combinations(tracks, 2)
@@ -55,7 +59,7 @@ def median_distance(tracks: Sequence[Array]) -> float:
 
 
 def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the table of all seeds, and how far their joints are apart."""
+    """Yield the table of all seeds, and the distances between their joints."""
     heads = [
         "seed",
         "lost %",
@@ -77,18 +81,25 @@ def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     tracks = [np.array(row["joints_mm"]) for row in rows]
     apart = median_distance(tracks)
     about_root = median_distance([joints - joints[:, :1] for joints in tracks])
-    yield f"joints of two seeds are {apart:.0f} mm apart, median; about the root {about_root:.0f}"
+    yield (
+        f"joints of two seeds are {apart:.0f} mm apart, median; "
+        f"about the root {about_root:.0f}"
+    )
 
 
 @click.command(cls=Command, help=__doc__)
 @click.argument("film")
 @click.option(
-    "--seeds", type=click.IntRange(1), default=4, show_default=True, help="From 0 on."
+    "--seeds",
+    type=click.IntRange(1),
+    default=4,
+    show_default=True,
+    help="Number of seeds, from 0.",
 )
 @click.option(
     "--rows",
     metavar="FILE",
-    help="Of a row a line as they come; what it holds is not measured again.",
+    help="File with one row a line. An earlier run there is continued.",
 )
 @WORKERS
 @options((FRAMES, *track_flags("height"), *EXTRACTION))

@@ -1,21 +1,26 @@
-"""What a search gains that begins where a silhouette points, on people whom nothing was learned from.
+"""The benefit of a search that starts from a look-up of the silhouette.
 
     python docs/studies/starts.py look
     python docs/studies/starts.py evaluations
     python docs/studies/starts.py images
     python docs/studies/starts.py tracks
 
-Every image shows a pose of a recorded clip at any yaw; the person's clips are left out of what the look-up and the
-prior learn from. A camera stands 3.5 to 5 metres away; the person is up to 0.8 metres off its axis, and only their
-height is known. `look` counts how many modes it takes until one faces as the person does. `evaluations` follows the
-best cost of a search in walks, blind and from the start. `images` fits single images. `tracks` follows the first frames
-of walks and turns from all sides; a track goes wrong whose mean error is above 150 mm.
+The people are outside the training data. Every image shows a pose of a recorded clip at
+any yaw; look-up and prior learn without the person's clips. The camera is 3.5 to 5
+metres away. The person is up to 0.8 metres off its axis, and only their height is
+known.
+
+`look` counts the modes until one faces in the right direction. `evaluations` records
+the best cost of a search in walks, blind and from the start. `images` fits single
+images. `tracks` tracks the first frames of walks and turns from all sides; a track
+fails if its mean error is above 150 mm.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
+from unittest.mock import patch
 
 import click
 import numpy as np
@@ -37,6 +42,7 @@ from posefit.progress import QUIET
 from posefit.silhouette.mask import Mask
 from posefit.sweep.cell import ALL_AROUND, cell_scene
 from posefit.sweep.check import cell_of
+from posefit.tracking import polish
 from posefit.uncertainty.modes import other_modes
 from posefit_exemplars.lookup import Lookup
 from table import markdown, percent
@@ -47,16 +53,16 @@ MODES = (1, 2, 3, 8)
 MARKS = (40, 200, 2440)  # evaluations
 RIGHT_DEGREES = 45.0
 WRONG_DEGREES = 60.0
-# images of a clip in each study
+# images of each clip in each study
 LOOKED = 4
 SEARCHED = 3
 FITTED = 2
-FRAMES = 20  # of a clip that is tracked
+FRAMES = 20  # of a tracked clip
 
 
 @dataclass(frozen=True)
 class Image:
-    """A mask and what it shows."""
+    """A mask and the truth behind it."""
 
     clip: Clip
     camera: posefit.Camera
@@ -71,12 +77,12 @@ class Image:
         return np.asarray(1000.0 * away.mean(axis=1))
 
     def turned_degrees(self, poses: Array) -> Array:
-        """Return how far the yaws of poses (n, 66) are off."""
+        """Return the errors of the yaws of poses (n, 66) in degrees."""
         return np.asarray(np.degrees(np.abs(wrapped(poses[:, 0] - self.pose[0]))))
 
 
 def images(group: str, each: int) -> Iterator[Image]:
-    """Yield so many images of each clip of a group."""
+    """Yield `each` images of each clip of a group."""
     rng = np.random.default_rng(61)
     for clip in GROUPS[group]:
         motion = recorded.clip(clip.name).motion()
@@ -99,7 +105,7 @@ def images(group: str, each: int) -> Iterator[Image]:
 
 
 def training_of(clip: Clip, only: str = "") -> list[Motion]:
-    """Return the motions of all other people, or those of one group."""
+    """Return the motions of all other people, or only of those in a group."""
     names = [
         each.name for each in GROUPS.get(only, ()) if each.subject != clip.subject
     ] or [clip.library]
@@ -107,7 +113,7 @@ def training_of(clip: Clip, only: str = "") -> list[Motion]:
 
 
 def task_of(image: Image, training: list[Motion]) -> Task:
-    """Return the task of an image: the average body of the person's height, and no more."""
+    """Return the task of an image. Only the person's height is known."""
     average = posefit.Body.of(average_skeleton())
     share = image.body.stature / average.stature
     return Task(
@@ -127,12 +133,12 @@ def printed(heads: Sequence[str], cells: Sequence[Sequence[str]], words: int) ->
 
 @click.group()
 def main() -> None:
-    """Measure starts."""
+    """Measure searches that start from a look-up."""
 
 
 @main.command()
 def look() -> None:
-    """Print how many modes it takes until one is right, by group."""
+    """Print how many modes are needed until one is right, by group."""
     cells = []
     for group in GROUPS:
         right = []
@@ -163,7 +169,10 @@ def look() -> None:
 
 @main.command()
 def evaluations() -> None:
-    """Print the mean of the best cost after so many evaluations, all yaws searched, blind and from the start."""
+    """Print the mean best cost after some evaluations, blind and from the start.
+
+    All yaws are searched.
+    """
     costs: dict[str, list[Array]] = {}
     priors: dict[str, Any] = {}
     for seed, image in enumerate(images(WALKS, SEARCHED)):
@@ -206,7 +215,8 @@ def evaluations() -> None:
     )
 
 
-# what is fitted, by which method, and the groups whose clips, of other people, a prior learns from
+# what is fitted, the method, and the groups from which a prior learns, without the
+# person
 IMAGES = (
     (WALKS, "sapso@pca", ()),
     (WALKS, "exemplars", ()),
@@ -218,7 +228,7 @@ IMAGES = (
 
 @main.command("images")
 def single_images() -> None:
-    """Print the errors of single images, and those of the best of the poses shown."""
+    """Print the errors of single images, and of the best of the alternatives shown."""
     cells = []
     for group, method, learned in IMAGES:
         off = []
@@ -230,16 +240,19 @@ def single_images() -> None:
                 for clip in GROUPS[name]
                 if clip.subject != image.clip.subject
             ]
-            fit = posefit.fit(
-                image.mask,
-                method=method,
-                camera=image.camera,
-                height=image.body.stature,
-                body_frames=0,
-                smooth=False,
-                progress=QUIET,
-                train=others if "@" in method else [image.clip.library],
-            )
+            if "@" not in method:
+                others = [image.clip.library]
+            # what is looked up by default, without the person
+            library = training_of(image.clip)
+            with patch.object(polish, "_library", lambda _fps, known=library: known):
+                fit = posefit.fit(
+                    image.mask,
+                    method=method,
+                    camera=image.camera,
+                    height=image.body.stature,
+                    progress=QUIET,
+                    train=others,
+                )
             skeleton = fit.track.motion.skeleton
             shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[
                 :ALTERNATIVES
@@ -267,7 +280,7 @@ def single_images() -> None:
 
 @main.command()
 def tracks() -> None:
-    """Print how many tracks of walks and turns go wrong whose first yaw and place are unknown."""
+    """Print how many tracks of walks and turns fail, with yaw and place unknown."""
     errors = []
     for clip, view in product((*GROUPS[WALKS], *GROUPS["turns"]), SIDES):
         cell = cell_of(

@@ -1,8 +1,8 @@
-"""How many steps does FitImage-v0 make in a second of a processor, natively and in Gymnasium's Sync and Async vectors?
+"""Steps of FitImage-v0 per second: the native vector, Gymnasium's Sync and Async.
 
-Episodes have eight steps, their resets are in the time, and all training instances were met before. Kinds take turns,
-and the best turn counts. Seconds are those of a processor, the sum over processes, so that other programs
-do not count.
+Episodes have eight steps, and the time includes their resets. All training instances
+were met before. The kinds take turns, and the best turn counts. Seconds are CPU
+seconds, summed over processes, so that other programs do not count.
 """
 
 from collections.abc import Iterator
@@ -20,14 +20,15 @@ from table import markdown
 
 NAME = "posefit_envs:posefit/FitImage-v0"
 COUNTS = (1, 64, 1024)
-# of each environment in a turn: two episodes, each with a reset; turns of each kind
+# calls and steps of each environment in a turn: two episodes, each with a reset; number
+# of turns of each kind
 CALLS = 18
 STEPS = 16
 TURNS = 5
 
 
 def steps_per_second(kind: str, count: int) -> Iterator[float]:
-    """Yield the steps in a second of vector environments, turn by turn, resets included."""
+    """Yield a vector environment's steps per second, turn by turn, with resets."""
     env: Any = gym.make_vec(
         NAME, count, None if kind == "native" else kind, errors=False
     )

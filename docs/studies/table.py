@@ -1,9 +1,9 @@
-"""Run a sweep plan and print its rows as a table; the other studies print with it, too.
+"""Run a sweep plan and print its rows as a table; other studies share its functions.
 
-    python docs/studies/table.py docs/studies/accuracy.toml --by method --by motion --by view_degrees
+    python docs/studies/table.py docs/studies/accuracy.toml --by method --by motion
 
-A line is a group of cells that have the fields of `--by` in common: medians over its cells, or means of shares. What is
-in `--ledger` is not run again.
+Each line is a group of cells with the same fields of `--by`. It has medians over the
+cells, or means of shares. Rows in `--ledger` are not run again.
 """
 
 import json
@@ -38,20 +38,20 @@ WORKERS = click.option(
     "--workers",
     type=click.IntRange(1),
     metavar="N",
-    help="Processes; one a core by default.",
+    help="Number of processes; by default one per core.",
 )
 LEDGER = click.option(
     "--ledger",
     metavar="DIR",
-    help="Folder of finished rows: the same command continues there.",
+    help="Folder of finished rows. An earlier run there is continued.",
 )
 bar = partial(progress, unit="run")
 
 
 def rows(plan: Plan, workers: int | None, ledger: str | None) -> list[dict[str, Any]]:
-    """Return the rows of a plan's cells, in its order; those that a folder `ledger` holds are not run again.
+    """Return the rows of a plan's cells in the plan's order.
 
-    Raises ValueError where a cell failed.
+    Cells in the folder `ledger` are not run again. Raises ValueError if a cell failed.
     """
     with nullcontext(ledger) if ledger else TemporaryDirectory() as folder:
         tally = swept(plan, folder, Pool(workers or cores(), Limits(), run_cell), say)
@@ -65,7 +65,7 @@ def rows(plan: Plan, workers: int | None, ledger: str | None) -> list[dict[str, 
 
 
 def earlier(path: str | None, key: Callable[[Row], K]) -> dict[K, Row]:
-    """Return the rows of a file, each under its key; none where there is no file."""
+    """Return the rows of a file under their keys, or nothing if there is no file."""
     if path is None or not Path(path).exists():
         return {}
     return {
@@ -77,7 +77,7 @@ def earlier(path: str | None, key: Callable[[Row], K]) -> dict[K, Row]:
 def kept(
     path: str | None, ended: Iterator[tuple[K, Row]], count: int
 ) -> Iterator[tuple[K, Row]]:
-    """Yield rows under their keys as they come, each written to a file at once where one is named."""
+    """Yield rows under their keys as they come, and write each to the file, if any."""
     for key, row in bar(ended, count):
         if path is not None:
             with Path(path).open("a", encoding="utf-8") as file:
@@ -86,7 +86,7 @@ def kept(
 
 
 def keyed(kind: Any) -> Callable[[Row], Any]:
-    """Return the function from a row to the named tuple of a kind that holds its fields."""
+    """Return the function that makes a named tuple of a kind from a row's fields."""
     return lambda row: kind(*(row[name] for name in kind._fields))
 
 
@@ -97,7 +97,10 @@ def measured(
     workers: int | None,
     limits: Limits | None = None,
 ) -> dict[K, Row]:
-    """Return the row of each job under its key; those that a file holds are not measured again, new ones go there."""
+    """Return the row of each job under its key.
+
+    Rows in the file are not measured again, and new ones are added to it.
+    """
     done = earlier(path, key)
     missing = {name: job for name, job in jobs.items() if name not in done}
     done |= each(missing, workers, partial(kept, path), limits) if missing else {}
@@ -105,20 +108,20 @@ def measured(
 
 
 def head_of(name: str, which: str = "") -> str:
-    """Return the head of a figure's column: which of its values (such as median), its label, and its unit."""
+    """Return the head of a figure's column: a word such as median, label, and unit."""
     measure = MEASURES[name]
     return " ".join(word for word in (which, measure.label, measure.unit) if word)
 
 
 def number(name: str, value: float | None) -> str:
-    """Return a value with a figure's digits, in its unit."""
+    """Return a value with a figure's number of digits, in its unit."""
     return MEASURES[name].number(value)
 
 
 def markdown(
     heads: Sequence[str], cells: Sequence[Sequence[str]], words: int = 1
 ) -> Iterator[str]:
-    """Yield the lines of a table whose first columns are words and whose others are numbers."""
+    """Yield the lines of a table. The first columns, `words` of them, are text."""
     yield f"| {' | '.join(heads)} |"
     yield "|" + "---|" * words + "---:|" * (len(heads) - words)
     yield from (f"| {' | '.join(row)} |" for row in cells)
@@ -136,7 +139,10 @@ def quantiles(drawn: Array) -> tuple[float, float]:
 
 
 def drawn_means(values: Array) -> Array:
-    """Return means (2000,) of values (seeds, instances), by a bootstrap of both; all have the same instances."""
+    """Return means (2000,) of values (seeds, instances), by a bootstrap of both.
+
+    All draws of seeds have the same instances.
+    """
     rng = np.random.default_rng(0)
     columns = rng.integers(values.shape[1], size=(RESAMPLES, values.shape[1]))
     seeds = rng.integers(len(values), size=(RESAMPLES, len(values)))
@@ -146,7 +152,10 @@ def drawn_means(values: Array) -> Array:
 
 
 def interval(values: Array, clusters: Sequence[object]) -> tuple[float, float]:
-    """Return the 95 % interval of the median of values (n,), by a bootstrap over the clusters that they are of."""
+    """Return the 95 % interval of the median of values (n,).
+
+    A bootstrap draws whole clusters of values.
+    """
     rng = np.random.default_rng(0)
     groups = [
         values[[k for k, name in enumerate(clusters) if name == one]]
@@ -163,7 +172,10 @@ def interval(values: Array, clusters: Sequence[object]) -> tuple[float, float]:
 def grouped(
     found: Sequence[Row], labels: Callable[[Row], Sequence[str]], names: Sequence[str]
 ) -> Iterator[str]:
-    """Yield the table of rows: a line for each of `labels`, in the order of the rows; `names` are the labels' heads."""
+    """Yield the table of rows, with a line for each group of equal `labels`.
+
+    The order is that of the rows. `names` are the heads of the labels.
+    """
     groups: dict[tuple[str, ...], list[Row]] = {}
     for row in found:
         groups.setdefault(tuple(labels(row)), []).append(row)
@@ -190,14 +202,15 @@ def _cells(mine: Sequence[Row]) -> list[str]:
     distances = np.array([row["mpjpe_mm"] for row in mine])
     motions = [row["spec"]["motion"] for row in mine]
     low, high = interval(distances, motions)
+    spread = ""
+    if len(set(motions)) > 1:
+        spread = f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}"
     return [
         str(len(mine)),
         number("error_degrees", float(np.median(errors))),
         number("error_degrees", float(errors.max())),
         number("mpjpe_mm", float(np.median(distances))),
-        f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}"
-        if len(set(motions)) > 1
-        else "",
+        spread,
         *(percent(float(np.mean([row[name] for row in mine]))) for name in SHARES),
         f"{np.median([row['baselines_degrees']['mean_pose'] for row in mine]):.1f}",
         f"{np.median([row['baselines_mm']['nearest'] for row in mine]):.0f}",
@@ -205,7 +218,7 @@ def _cells(mine: Sequence[Row]) -> list[str]:
 
 
 def field_text(row: Row, field: str) -> str:
-    """Return a field of a row's cell as a label; what a cell leaves at its default is a dash."""
+    """Return a field of a row's cell as a label; a dash if it has the default."""
     value = row["spec"].get(field)
     if isinstance(value, Mapping) and value:
         return ", ".join(
@@ -227,13 +240,13 @@ def field_text(row: Row, field: str) -> str:
     "--by",
     multiple=True,
     metavar="FIELD",
-    help="A field of cells to group by. Again for more.",
+    help="A field by which to group cells. Repeatable.",
 )
 @click.option(
     "--clips",
     envvar="POSEFIT_CMU",
     metavar="DIR",
-    help="Folder of CMU clips that the plan's paths are in.",
+    help="Folder of CMU clips, to which the plan's paths are relative.",
 )
 @LEDGER
 @WORKERS

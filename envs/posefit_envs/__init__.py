@@ -4,22 +4,28 @@
 
     env = gym.make("posefit_envs:posefit/FitImage-v0", motion="run", instance=17)
     observation, info = env.reset(seed=0)
-    observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+    action = env.action_space.sample()
+    observation, reward, terminated, truncated, info = env.step(action)
 
-`FitImage-v0` is the pose in one silhouette, by few proposals; `Track-v0` follows a sequence; `Race-v0` says which of
-several searches goes on. Their docstrings are their manual. Importing this package registers them; the environments
-themselves are imported when they are made. `drive` runs an optimiser against an environment or a vector of them,
-`drive_each` one in every environment of a vector, `track_reference` returns what a tracker would commit in Track-v0,
-and `to_sb3_vec_env` adapts a vector environment to Stable-Baselines3.
+`FitImage-v0` asks for the pose in one silhouette, within a few proposals. `Track-v0`
+follows a sequence of silhouettes. In `Race-v0` several searches share a budget, and
+each action chooses which one continues. Their docstrings are their manual.
 
-A step draws proposals in scenes of a `Stage`, and counts them in a `posefit.Problem`, or in `posefit.Problems` for a
-vector. Each environment's file has its single class and its vector class, written on the same functions.
+Importing this package registers the environments; each module is imported when its
+environment is made. `drive` runs an optimiser against an environment or a vector of
+them, and `drive_each` one in every environment of a vector. `track_reference` returns
+what a tracker would commit in Track-v0. `to_sb3_vec_env` adapts a vector environment to
+Stable-Baselines3.
+
+A step rasterises proposals in the scenes of a `Stage`. It counts them in a
+`posefit.Problem`, or in `posefit.Problems` for a vector. Each environment's file has a
+single class and a vector class, which share their functions.
 
 | looking for | file |
 |---|---|
-| FitImage-v0, Track-v0, Race-v0: from an action to a reward | fit.py, track.py, race.py |
-| what they share: actions, rewards, infos, when episodes begin and end | base.py |
-| arguments, and what an instance shows (the numbers: `posefit.motion.instances`) | world.py |
+| FitImage-v0, Track-v0, Race-v0: from action to reward | fit.py, track.py, race.py |
+| what they share: actions, rewards, infos, start and end of episodes | base.py |
+| arguments, and the scene of an instance (see `posefit.motion.instances`) | world.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
 | rendering | rendering.py |
 | single environments and vectors in any autoreset mode, row by row | rows.py |

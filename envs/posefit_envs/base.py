@@ -1,4 +1,4 @@
-"""What single and vector environments share: arguments, actions, rewards, infos, and when episodes begin and end."""
+"""What all environments share: arguments, actions, rewards, infos, episode ends."""
 
 import inspect
 from abc import ABC, abstractmethod
@@ -34,7 +34,7 @@ ENDED = "the episode has ended: reset before the next step"
 
 
 def image_spaces(world: World) -> tuple[Box, Box]:
-    """Return the space of a world's proposals, and that of its pictures."""
+    """Return the space of a world's proposals and the space of its pictures."""
     width, height = world.size
     views = len(world.view_degrees)
     return (
@@ -44,21 +44,29 @@ def image_spaces(world: World) -> tuple[Box, Box]:
 
 
 def checked_world(env: object, arguments: Mapping[str, Any]) -> World:
-    """Return the world of the arguments that are not the environment's own. Raises ArgumentError, TypeError."""
+    """Return the world that an environment's arguments describe.
+
+    Keyword-only parameters of the class belong to the environment and are left out.
+    Raises ArgumentError or TypeError if an argument is wrong.
+    """
     parameters = inspect.signature(type(env)).parameters.values()
     own = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     world = world_of(own, **arguments)
-    checked(lambda: world.learned)  # names motions and priors that are unknown
+    # names motions and priors that are unknown
+    checked(lambda: world.learned)
     return world
 
 
 def checked_actions(
     env: "SearchEnv | SearchVectorEnv", actions: object, shape: tuple[int, ...]
 ) -> Array:
-    """Return actions of that shape as float64, which does not round them.
+    """Return actions of that shape as float64, without rounding.
 
-    What is not in [-1, 1] is clipped, and the environment warns of it once. Raises gymnasium.error.InvalidAction where
-    they have another shape, or are not finite numbers.
+    Values outside [-1, 1] are clipped, and the environment warns about it once.
+
+    Raises:
+        gymnasium.error.InvalidAction: If the shape is wrong, or a value is not a finite
+            number.
     """
     try:
         given = np.asarray(as_numpy("actions", actions)[0])
@@ -80,7 +88,8 @@ def checked_actions(
         return values
     if not env.warned:
         logger.warn(
-            f"actions must lie in [-1, 1], got {largest:.6g} from 0; it is clipped, as all others will be"
+            "actions must lie in [-1, 1], "
+            f"got {largest:.6g} from 0: actions are clipped from now on"
         )
         env.warned = True
     return np.clip(values, -1.0, 1.0, out=values)
@@ -93,26 +102,29 @@ def reward_of_cost(cost: Number) -> Number:
 
 
 def log_cost(cost: Number) -> Number:
-    """Return a cost of 0 to 100 on a logarithmic scale of 0 to 1: ln(1 + cost) / ln 101."""
+    """Return ln(1 + cost) / ln 101: a cost of 0 to 100 on a scale of 0 to 1."""
     shown: Number = np.log1p(cost) / LOG_HIGHEST_COST
     return shown
 
 
 def log_improvement(before: Number, after: Number) -> Number:
-    """Return the reward of a best cost that falls: ln((1 + before) / (1 + after))."""
+    """Return ln((1 + before) / (1 + after)), the reward of an improved best cost."""
     fall: Number = np.log1p(before) - np.log1p(after)
     return fall
 
 
 def error_degrees(truth: Array, pose: Array) -> Any:
-    """Return the mean difference of poses (..., 66) from the truth (...), in degrees."""
+    """Return the mean error of poses (..., 66) from the truth (...), in degrees."""
     return np.degrees(np.abs(wrapped(truth - pose))).mean(axis=-1)
 
 
 def proposal_infos(
     stage: Stage, drawn: Drawn, numbers: NDArray[np.int64], errors: bool
 ) -> Infos:
-    """Return the infos (n, ...) of proposals that were drawn, by name; with `errors` against the truth."""
+    """Return the infos (n, ...) of evaluated proposals by name.
+
+    With `errors`, they include the error against the truth.
+    """
     infos: Infos = {
         "cost": drawn.costs.copy(),
         "areas": drawn.areas,
@@ -126,7 +138,7 @@ def proposal_infos(
 def checked_options(
     options: Mapping[str, Any] | None, known: Sequence[str]
 ) -> Mapping[str, Any]:
-    """Return a reset's options. Raises ArgumentError where one is not known."""
+    """Return a reset's options. Raises ArgumentError if a name is unknown."""
     for name in options or {}:
         if name not in known:
             came = f"{quoted(name)}{suggestion(str(name), known)}"
@@ -137,36 +149,45 @@ def checked_options(
 
 
 class SearchEnv(Env[Any, Any], ABC):
-    """A single environment: an episode is an instance of its world."""
+    """A single environment. Each episode is one instance of its world."""
 
-    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
+    # a plain dictionary, as Gymnasium declares it
+    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012
     action_space: Box
 
     def __init__(self, render_mode: str | None, arguments: Mapping[str, Any]) -> None:
         check_mode(render_mode)
         self.render_mode = render_mode
         self.world = checked_world(self, arguments)
-        self.warned = False  # that an action is clipped
-        # of the instance; None before the first reset
+        # whether the warning about clipped actions was given
+        self.warned = False
+        # the instance's number; None before the first reset
         self.number: int | None = None
         self.ended = False
         self._problem: Problem | None = None
 
     @property
     def problem(self) -> Problem:
-        """The problem whose evaluations the steps are. Raises gymnasium.error.ResetNeeded before the first reset."""
+        """The problem that counts the steps' evaluations.
+
+        Raises gymnasium.error.ResetNeeded before the first reset.
+        """
         self.check_reset()
         assert self._problem is not None
         return self._problem
 
     @property
     def instance(self) -> Instance:
-        """The episode's instance. Raises gymnasium.error.ResetNeeded before the first reset."""
+        """The episode's instance. Raises ResetNeeded before the first reset."""
         instance: Instance = self.problem.instance
         return instance
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state with the problem's own: a problem alone is not sent where its evaluations get lost."""
+        """Return the state, with the problem as a plain dictionary.
+
+        A Problem refuses to be pickled alone, because its count of evaluations would be
+        lost. Here the whole environment is pickled, and the count goes along.
+        """
         return {**vars(self), "_problem": self._problem and vars(self._problem)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -178,7 +199,7 @@ class SearchEnv(Env[Any, Any], ABC):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, Infos]:
-        """Begin with an instance; `options={"instance": 17}` chooses it."""
+        """Begin an episode; `options={"instance": 17}` chooses the instance."""
         chosen = checked_options(options, ("instance",)).get("instance")
         super().reset(seed=seed)
         if chosen is None:
@@ -189,7 +210,7 @@ class SearchEnv(Env[Any, Any], ABC):
         return self.begin(self.number)
 
     def checked_action(self, action: object) -> Array:
-        """Return an action as float64. Raises gymnasium.error.ResetNeeded where no episode goes on."""
+        """Return an action as float64. Raises ResetNeeded if the episode has ended."""
         self.check_reset()
         if self.ended:
             raise error.ResetNeeded(ENDED)
@@ -201,7 +222,7 @@ class SearchEnv(Env[Any, Any], ABC):
             raise error.ResetNeeded(NOT_BEGUN)
 
     def render(self) -> Any:
-        """Return the picture (height, width, 3) where `render_mode` is "rgb_array"."""
+        """Return the picture (height, width, 3), or None without a render mode."""
         if self.render_mode is None:
             return None
         self.check_reset()
@@ -213,20 +234,26 @@ class SearchEnv(Env[Any, Any], ABC):
 
     @abstractmethod
     def picture(self) -> Picture:
-        """Return the picture of what was proposed last."""
+        """Return the picture of the latest proposal."""
 
 
 class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
-    """`num_envs` environments side by side: a proposal in each is one compiled call, whatever their instances.
+    """`num_envs` environments side by side, evaluated in one compiled call.
 
-    The arguments are those of the single environment, and `threads`, the number that draw, which changes nothing but
-    the time. Seeded with s, environment i does what a single one does that is seeded with s + i. `autoreset_mode` is
-    Gymnasium's `AutoresetMode`: by NEXT_STEP the step after an episode's last one resets; by SAME_STEP the last one
-    does, whose own observation and infos are then the infos `final_obs` and `final_info`; DISABLED resets none, and the
-    caller does, with the option "reset_mask".
+    The arguments are those of the single environment, and `threads`: the number of
+    rasterising threads, which changes only the time. Seeded with s, environment i
+    behaves like a single one seeded with s + i.
+
+    `autoreset_mode` is Gymnasium's `AutoresetMode`:
+
+    - NEXT_STEP: the step after an episode's last step resets.
+    - SAME_STEP: the last step resets. The episode's last observation and infos are in
+      the infos `final_obs` and `final_info`.
+    - DISABLED: the caller resets, with the option "reset_mask".
     """
 
-    metadata = {  # noqa: RUF012, as Gymnasium has it
+    # a plain dictionary, as Gymnasium declares it
+    metadata = {  # noqa: RUF012
         "render_modes": list(MODES),
         "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
@@ -253,20 +280,22 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self.num_envs = checked(whole, "num_envs", num_envs, 1)
         self.threads = checked(whole, "threads", threads, 1)
         self.render_mode = render_mode
-        self.warned = False  # that an action is clipped
+        # whether the warning about clipped actions was given
+        self.warned = False
         self.steps = np.zeros(num_envs, dtype=np.int64)  # of each episode
         self.ended = np.zeros(num_envs, dtype=bool)
-        self._longest = (
-            np.inf
-            if max_episode_steps is None
-            else checked(whole, "max_episode_steps", max_episode_steps, 1)
-        )
-        # with their seeds
+        self._longest = np.inf
+        if max_episode_steps is not None:
+            self._longest = checked(whole, "max_episode_steps", max_episode_steps, 1)
+        # random generators with their seeds, made when first used
         self._generators: dict[int, tuple[np.random.Generator, int]] = {}
-        self.numbers = np.full(num_envs, -1)  # of the instances; -1 before a reset
+        # of the instances; -1 before the first reset
+        self.numbers = np.full(num_envs, -1)
+        # attributes that a user has added, by their names: a value for each environment
+        self._own: dict[str, tuple[Any, ...]] = {}
 
     def set_spaces(self, action_space: Box, observation_space: Box) -> None:
-        """Set the spaces of one environment, and those of all."""
+        """Set the spaces of one environment, and the batched spaces of all."""
         self.single_action_space = action_space
         self.single_observation_space = observation_space
         self.action_space = batch_space(action_space, self.num_envs)
@@ -300,9 +329,11 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, Infos]:
-        """Begin with an instance each; `options={"instance": 17}` chooses one for all, [17, 18, ...] one for each.
+        """Begin episodes; `options={"instance": 17}` chooses one instance for all.
 
-        The option "reset_mask" selects the environments that begin; the others go on, and show what they showed.
+        A list, [17, 18, ...], chooses one for each environment. The option "reset_mask"
+        selects the environments that begin; the others continue, and their observations
+        stay the same.
         """
         options = dict(checked_options(options, ("instance", "reset_mask")))
         mask = checked_mask(options.get("reset_mask"), self.num_envs)
@@ -319,7 +350,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         return observations, self._with_started(infos, mask)
 
     def restart(self, mask: Flags, numbers: Sequence[int | None] | None = None) -> None:
-        """Begin an episode in some environments, each with an instance that is chosen or drawn."""
+        """Begin episodes in some environments, with chosen or random instances."""
         for i in np.flatnonzero(mask).tolist():
             number = None if numbers is None else numbers[i]
             if number is None:
@@ -332,7 +363,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     def begin_step(self, actions: Any) -> tuple[Array, Flags]:
         """Return the actions as float64, and which environments (n,) step.
 
-        The others' episodes have ended before, and by NEXT_STEP they begin another one instead.
+        The episodes of the others have ended: under NEXT_STEP they begin a new one
+        instead.
         """
         proposals = checked_actions(self, actions, self.action_space.shape or ())
         self.check_reset()
@@ -340,7 +372,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         if self.ended.any():
             if self.autoreset_mode is AutoresetMode.DISABLED:
                 raise error.ResetNeeded(
-                    f'{ENDED}, with the option "reset_mask", got {np.flatnonzero(self.ended).tolist()} that have ended'
+                    f'{ENDED}, with the option "reset_mask"; ended environments: '
+                    f"{np.flatnonzero(self.ended).tolist()}"
                 )
             self.restart(self.ended.copy())
         self.steps += stepping
@@ -355,10 +388,20 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         infos: Infos,
         row_infos: Mapping[int, Infos] = {},
     ) -> tuple[Any, Array, Flags, Flags, Infos]:
-        """Return what a step returns: rows of environments that began instead have the infos of a reset.
+        """Return what a step returns.
 
-        `ends` are which episodes terminated and which were truncated; Gymnasium's time limit truncates others too.
-        `row_infos` are further infos of some environments. By SAME_STEP those that ended begin again at once.
+        Environments that began an episode instead of stepping have the infos of a
+        reset. Under SAME_STEP, environments whose episode has ended begin again at
+        once.
+
+        Args:
+            stepping: Which environments (n,) stepped.
+            observations: Observations (n, ...) after the step.
+            rewards: Rewards (n,).
+            ends: Which episodes terminated and which were truncated. The time limit of
+                Gymnasium truncates others too.
+            infos: Infos (n, ...) by name.
+            row_infos: Further infos of single environments.
         """
         terminated = stepping & ends[0]
         truncated = stepping & (ends[1] | (self.steps >= self._longest))
@@ -385,25 +428,27 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         return observations, rewards, terminated, truncated, step_infos
 
     def _with_started(self, infos: Infos, started: Flags) -> Infos:
-        """Return infos with those that only the environments have whose episode has just started."""
+        """Return infos, completed with the infos that only a starting episode has."""
         for i in np.flatnonzero(started).tolist():
             infos = self._add_info(infos, self.started_infos(i), i)
         return infos
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of each environment, as Gymnasium's own vectors do."""
+        """Return an attribute of each environment, as Gymnasium's vectors do."""
         if name in ("action_space", "observation_space"):
             return (getattr(self, f"single_{name}"),) * self.num_envs
         if name == "np_random_seed":
             return self.np_random_seed
         if name == "np_random":
             return self.np_random
+        if name in self._own:
+            return self._own[name]
         if name in self.row_attributes:
             return tuple(self.row_attribute(name, i) for i in range(self.num_envs))
         return (getattr(self, name),) * self.num_envs
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method, and return what it returns for each environment; an attribute is returned as it is."""
+        """Return a method's result, or an attribute, once for each environment."""
         if name == "render":
             return self.render() or (None,) * self.num_envs
         method = getattr(self, name, None)
@@ -411,15 +456,41 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             return (method(*args, **kwargs),) * self.num_envs
         return self.get_attr(name)
 
-    def set_attr(self, name: str, value: Any) -> None:
-        """Set an attribute, which all environments share."""
-        setattr(self, name, value)
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each environment, as Gymnasium's own vectors do.
 
-    # attributes of single environments that each environment has for itself
+        Args:
+            name: any name. What the environments have in common, such as `world`, stays common to all.
+            values: a list or a tuple has a value for each environment; anything else is the value of all.
+
+        Raises:
+            gymnasium.error.Error: there is another number of values, values that must be common differ, or the
+                attribute is one that `reset` sets, such as `number`.
+
+        """
+        if not isinstance(values, list | tuple):
+            values = [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise error.Error(
+                f"values must be one for each of the {self.num_envs} environments, got {len(values)}"
+            )
+        if name in self.row_attributes:
+            raise error.Error(f"{name} must be set by the options of reset")
+        if name in self._own or not hasattr(self, name):
+            self._own[name] = tuple(values)
+            return
+        first, *others = values
+        if not all(np.array_equal(first, other) for other in others):
+            raise error.Error(
+                f"{name} must be the same in all environments, got different values"
+            )
+        setattr(self, name, first)
+
+    # attributes that differ between the environments
     row_attributes: tuple[str, ...] = ("instance", "number", "problem")
 
     def row_attribute(self, name: str, i: int) -> Any:
-        """Return an attribute that environment i has for itself."""
+        """Return an attribute of environment i."""
         self.check_reset()
         if name == "number":
             return int(self.numbers[i])
@@ -428,7 +499,10 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     @property
     def problems(self) -> Problems:
-        """The problems whose evaluations the steps are. Raises gymnasium.error.ResetNeeded before the first reset."""
+        """The problems that count the steps' evaluations.
+
+        Raises gymnasium.error.ResetNeeded before the first reset.
+        """
         self.check_reset()
         return self._problems
 
@@ -445,15 +519,18 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """Return the infos (n, ...) of a reset, by name."""
 
     def started_infos(self, i: int) -> Infos:
-        """Return what only the first infos of an episode of environment i hold."""
+        """Return the infos of environment i that only a starting episode has."""
         return {}
 
     @abstractmethod
     def picture(self, i: int) -> Picture:
-        """Return the picture of what was proposed last in environment i."""
+        """Return the picture of the latest proposal in environment i."""
 
     def render(self) -> Any:
-        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
+        """Return a picture (height, width, 3) for each environment.
+
+        Return None without a render mode.
+        """
         if self.render_mode is None:
             return None
         self.check_reset()
@@ -461,7 +538,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
 
 def row_of(infos: Infos, i: int) -> Infos:
-    """Return the infos of environment i, of infos (n, ...) by name."""
+    """Return the infos of environment i from infos (n, ...) by name."""
     row = {}
     for name, values in infos.items():
         row[name] = values[i].item() if values.ndim == 1 else values[i].copy()
@@ -469,14 +546,15 @@ def row_of(infos: Infos, i: int) -> Infos:
 
 
 def mixed(mask: Flags, chosen: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-    """Return values (n, ...): those chosen where the mask (n,) is true, others elsewhere."""
+    """Return values (n, ...): `chosen` where the mask (n,) is true, else `others`."""
     return np.where(mask.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, others)
 
 
 def masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
-    """Return infos as Gymnasium has them: `values` where the mask (n,) is true, zeros elsewhere, and the masks.
+    """Return infos in Gymnasium's form: values by name, with a mask for each name.
 
-    A name that `others` has too has those values where the mask is false.
+    A value is from `values` where the mask (n,) is true. Elsewhere it is from `others`,
+    or zero if `others` lacks the name.
     """
     everywhere = bool(mask.all())
     somewhere = bool(mask.any())
@@ -494,10 +572,11 @@ def masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
 
 
 def checked_mask(mask: Any, count: int) -> Flags:
-    """Return which environments (count,) a reset is for: those of its option "reset_mask", or all.
+    """Return the option "reset_mask" (count,), or True for all environments.
 
-    Raises what Gymnasium's own vectors raise: TypeError for anything but an array of booleans, and ValueError for
-    another shape, or where no environment is chosen.
+    Raises:
+        TypeError: If it is not an array of booleans.
+        ValueError: If its shape is wrong, or it selects no environment.
     """
     if mask is None:
         return np.ones(count, dtype=bool)
@@ -521,7 +600,10 @@ def checked_mask(mask: Any, count: int) -> Flags:
 
 
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    """Return a seed for each environment: s gives s, s + 1, ... Raises ArgumentError for anything but whole numbers."""
+    """Return a seed for each environment; one number s gives s, s + 1, ...
+
+    Raises ArgumentError if a seed is not a whole number.
+    """
     if seed is None:
         return [None] * count
     if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
@@ -533,9 +615,10 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
 
 
 def _instances(chosen: Any, count: int) -> list[int | None]:
-    """Return the instance that a reset chooses for each environment, None where it chooses none.
+    """Return the instance of each environment, or None where one is to be drawn.
 
-    One number is for all. Raises ArgumentError where the count is wrong, or there is no such instance.
+    One number applies to all. Raises ArgumentError if the count is wrong, or an
+    instance does not exist.
     """
     if chosen is None:
         return [None] * count
@@ -543,6 +626,7 @@ def _instances(chosen: Any, count: int) -> list[int | None]:
         return [checked(instance_number, chosen)] * count
     if np.ndim(chosen) != 1 or len(chosen) != count:
         raise ArgumentError(
-            f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}"
+            f"instance must be one number or {count}, one for each environment, "
+            f"got {quoted(chosen)}"
         )
     return [checked(instance_number, number) for number in chosen]

@@ -1,4 +1,4 @@
-"""Optimisers that search by stepping an environment, and trackers that give its references."""
+"""Optimisers that search by stepping an environment; trackers as a reference."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import replace
@@ -22,10 +22,13 @@ from posefit_envs.track import TrackEnv, committed_infos
 
 
 class FitImageSteps:
-    """Costs of proposals by stepping `posefit/FitImage-v0`: a single environment or a vector, in any autoreset mode.
+    """Costs of proposals, found by stepping `posefit/FitImage-v0`.
 
-    An episode that ends begins again with the same instance. Raises gymnasium.error.Error for another environment, and
-    for one whose wrappers change actions.
+    The environment is a single one or a vector, in any autoreset mode. An episode that
+    ends begins again with the same instance.
+
+    Raises:
+        gymnasium.error.Error: For another environment, or if a wrapper changes actions.
     """
 
     def __init__(self, env: AnyEnv) -> None:
@@ -37,7 +40,10 @@ class FitImageSteps:
     def begin(
         self, seed: int, instances: int | Sequence[int] | None
     ) -> tuple[list[SearchSpace], list[int]]:
-        """Reset with an instance for all or each, or with random ones; return what each searches, and their numbers."""
+        """Reset, and return the search space and instance number of each row.
+
+        `instances` is one number for all, a list, or None for random instances.
+        """
         rows = self._rows
         chosen: Any = instances
         if instances is None or isinstance(instances, int | np.integer):
@@ -56,8 +62,12 @@ class FitImageSteps:
         return np.array([info["cost"] for info in infos])
 
     def costs(self, proposals: Array) -> Array:
-        """Return the costs (m,) of any number of proposals (m, d), in environments of one instance."""
+        """Return the costs (m,) of proposals (m, d); all rows share one instance.
+
+        The number of proposals need not be a multiple of the number of rows.
+        """
         count = self._rows.count
+        # the last step has a proposal in every row: repeat the last one
         filling = np.repeat(proposals[-1:], -len(proposals) % count, axis=0)
         turns = np.concatenate([proposals, filling])
         turns = turns.reshape(-1, count, proposals.shape[1])
@@ -66,7 +76,7 @@ class FitImageSteps:
 
 
 def _check_actions_reach(env: AnyEnv) -> None:
-    """Raise gymnasium.error.Error for another environment than FitImage-v0, and where a wrapper changes actions."""
+    """Raise gymnasium.error.Error unless actions reach FitImage-v0 unchanged."""
     wrapper: Any = env
     while wrapper is not env.unwrapped:
         if isinstance(wrapper, ActionWrapper | VectorActionWrapper):
@@ -95,19 +105,32 @@ def drive(
     evaluations: int = 2440,
     **settings: Any,
 ) -> Problem:
-    """Return the problem, minimised by an optimiser that steps `posefit/FitImage-v0`, a single one or a vector.
+    """Return the problem, minimised by stepping `posefit/FitImage-v0`.
 
-    A population of any size is proposed in as many steps as it takes; the last of them is filled up with its last
-    proposal, which does not count. An episode that ends begins again with the same instance: only `evaluations` end the
-    search. Actions are float64, so the result is the library's, bit for bit, in every autoreset mode. Raises
-    gymnasium.error.Error for another environment or one whose wrappers change actions, where the budget does not hold
-    one population, and where the environments have several instances: `drive_each` is for those.
+    A population takes as many steps as it needs. If it does not fill the last step, its
+    last proposal is repeated; repeats are not counted. An episode that ends begins
+    again with the same instance, so only `evaluations` end the search. Actions are
+    float64: the result is the library's, bit for bit, in every autoreset mode.
+
+    Args:
+        env: A single environment, or a vector whose environments share one instance.
+        optimiser: A name, or an optimiser that was made for the search space.
+        seed: Seed of the environments and the optimiser.
+        instance: Number of the instance; by default a random one.
+        evaluations: The budget.
+        settings: Settings of the optimiser.
+
+    Raises:
+        gymnasium.error.Error: For another environment, if a wrapper changes actions, if
+            the budget is below one population, or if the instances differ (use
+            `drive_each`).
     """
     steps = FitImageSteps(env)
     (space, *_), numbers = steps.begin(seed, instance)
     if len(set(numbers)) > 1:
         raise error.Error(
-            f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each"
+            "instance must be the same in all environments, "
+            f"got {quoted(numbers)}: use drive_each"
         )
     if isinstance(optimiser, str):
         optimiser = _optimiser(space, optimiser, seed, evaluations, settings)
@@ -127,11 +150,21 @@ def drive_each(
     evaluations: int = 2440,
     **settings: Any,
 ) -> list[Problem]:
-    """Return the problem of each environment of a vector of `FitImage-v0`, minimised by a search of its own.
+    """Return the problem of each environment, minimised by a separate search.
 
-    The searches run side by side, a proposal of each in a step, with a population of any size and the seeds `seed`,
-    `seed` + 1 and so on. `instances` names an instance for each environment; by default each has a random one. Raises
-    gymnasium.error.Error as `drive` does.
+    The searches run side by side: each step evaluates one proposal of each. Populations
+    may have any size. The seeds are `seed`, `seed` + 1 and so on.
+
+    Args:
+        env: A vector of `FitImage-v0`.
+        optimiser: The optimiser's name.
+        seed: Seed of the first search.
+        instances: An instance for each environment; by default random ones.
+        evaluations: The budget of each search.
+        settings: Settings of the optimiser.
+
+    Raises:
+        gymnasium.error.Error: As in `drive`, except that instances may differ.
     """
     steps = FitImageSteps(env)
     problems = []
@@ -162,13 +195,24 @@ def track_reference(
     train: Sequence[str] = (),
     **settings: Any,
 ) -> list[dict[str, Any]]:
-    """Return the infos of what a tracker would commit in each frame of the current episode of `posefit/Track-v0`.
+    """Return the infos of the poses that a tracker commits in a Track-v0 episode.
 
-    The tracker has the environment's budget for a frame, and the same silhouettes: all of them, if it looks ahead, so
-    it is a reference for policies and no policy. Its poses need not lie in the box of proposals. It learns from
-    `train`, named as in `posefit.track`; by default from what the environment's prior learns from. The episode is not
-    stepped. Raises gymnasium.error.ResetNeeded before the first reset, gymnasium.error.Error for another environment,
-    and ValueError where a name or a setting is wrong.
+    The tracker has the environment's budget for a frame, and the same silhouettes. If
+    it looks ahead, it reads all of them, so it is a reference for policies and not a
+    policy. Its poses may lie outside the box of proposals. The episode is not stepped.
+
+    Args:
+        env: `posefit/Track-v0`, after a reset.
+        tracker: The tracker's name.
+        seed: Seed of the tracker.
+        train: Training motions, named as in `posefit.track`; by default the training
+            motions of the environment's prior.
+        settings: Settings of the tracker.
+
+    Raises:
+        gymnasium.error.ResetNeeded: Before the first reset.
+        gymnasium.error.Error: For another environment.
+        ValueError: If a name or a setting is wrong.
     """
     bare = env.unwrapped
     if not isinstance(bare, TrackEnv):
@@ -196,9 +240,9 @@ def track_reference(
 
 
 def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float, None]:
-    """Yield the proposals (d,) of an optimiser, each to be sent its cost, as `minimise` would evaluate them.
+    """Yield an optimiser's proposals (d,) one by one; each must be sent its cost.
 
-    Raises gymnasium.error.Error where the budget does not hold one population.
+    Raises gymnasium.error.Error if the budget is below one population.
     """
     while len(proposals := optimiser.ask()):
         if len(proposals) > problem.remaining_evaluations:
@@ -210,7 +254,8 @@ def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float,
         optimiser.tell(proposals, costs)
     if not problem.evaluations:
         raise error.Error(
-            f"evaluations must hold one population of {len(proposals)}, got {problem.budget}"
+            f"evaluations must hold one population of {len(proposals)}, "
+            f"got {problem.budget}"
         )
 
 

@@ -1,4 +1,4 @@
-"""FitImage-v0: one silhouette and few proposals of a pose; what is observed are pictures."""
+"""FitImage-v0: a few proposals of the pose in one silhouette; observed as pictures."""
 
 from functools import partial
 from typing import Any
@@ -33,26 +33,32 @@ MAX_EVALUATIONS = 8
 
 
 def shows_truth(world: World, number: int) -> bool:
-    """Return whether a reset gives the true proposal: of training instances only, so that others hold no answer."""
+    """Return whether a reset gives the true proposal.
+
+    Only training instances give it, so that held-out ones contain no answer.
+    """
     return world.errors and number not in HELD_OUT
 
 
 class FitImageEnv(SearchEnv):
     """
     ## Description
-    A silhouette of a person is observed. Each step proposes a pose; the mismatch of its body with the silhouette is the
-    cost. An episode is a few proposals for one silhouette, too few to search blindly: an agent must look.
+    The observation shows the silhouette of a person. Each step proposes a pose; its
+    cost is the mismatch between the silhouette and the proposed body. An episode is a
+    few proposals for one silhouette. They are too few for a blind search: an agent must
+    look.
 
     ## Action Space
-    `Box(-1, 1, (d,), float32)`: a proposal, with `prior="pca"` and a known translation d = 9.
+    `Box(-1, 1, (d,), float32)`: a proposal. With `prior="pca"` and a known translation,
+    d = 9.
 
     | Num | Meaning | Min and max stand for |
     |---|---|---|
     | 0, 1, 2 | root yaw, pitch, roll | 45, 15, 15 degrees to either side of a guess |
-    | 3, 4, 5 | root translation, with `translation="searched"` only | 0.5 m to either side of a guess |
+    | 3, 4, 5 | root translation if `translation="searched"` | 0.5 m around a guess |
     | the rest | latents of the prior | the range of its training poses |
 
-    Actions outside are clipped, with one warning. float64 is not rounded.
+    Actions outside are clipped, with one warning. float64 actions are not rounded.
 
     ## Observation Space
     `Box(0, 255, (height, width, 2 views), uint8)`, for each view:
@@ -63,35 +69,50 @@ class FitImageEnv(SearchEnv):
     | 1 | the silhouette of the last proposal; empty before the first |
 
     ## Rewards
-    -ln(1 + cost) of the proposal, whose cost is 0 to 100: SAPSO (4). It needs no normalisation, and as a proposal
-    changes nothing but the next picture, a discount `gamma` of 0 learns fastest.
+    -ln(1 + cost) of the proposal, with a cost of 0 to 100: SAPSO (4). It needs no
+    normalisation. A proposal changes only the next picture, so a discount `gamma` of 0
+    learns fastest.
 
     ## Starting State
-    An instance: its number gives the person, the pose, the cadence, the camera, and the guesses. Without
-    `instance` each reset draws a number of the `split`; `reset(options={"instance": 17})` chooses one.
+    An instance. Its number determines the person, the pose, the cadence, the camera,
+    and the guesses. Without `instance` each reset draws a number of the `split`;
+    `reset(options={"instance": 17})` chooses one.
 
     ## Episode End
-    Truncates after `max_evaluations` proposals. It never terminates: the end has nothing to do with the silhouette.
+    Truncates after `max_evaluations` proposals. It never terminates, because the end
+    does not depend on the silhouette.
 
     ## Information
-    `cost`, `best_cost`, `evaluations`, `areas` (views, 3) R, B, Y in pixels, `instance`, and unless `errors=False`
-    `error_degrees` of the proposal against the truth. A reset gives `instance`, and unless `errors=False` `truth` (d,),
-    the nearest proposal to the true pose: of training instances only, so that held-out ones have no answer to read.
+    A step gives `cost`, `best_cost`, `evaluations`, `areas` (views, 3) R, B, Y in
+    pixels, and `instance`. Unless `errors=False` it also gives `error_degrees`, the
+    proposal's error against the truth.
+
+    A reset gives `instance`. Unless `errors=False` it also gives `truth` (d,), the
+    proposal nearest to the true pose, for training instances only: held-out ones have
+    no answer to read.
 
     ## Arguments
-    - `motion="walk"`: a built-in motion, or an .amc or .bvh file; several built-in ones, or "all" kinds of them.
-    - `held_out_people=False`: `motion` is then of kinds of built-in motions, and an instance one person's style of it,
-      a held-out instance the last person's. By default it is the mean of all styles.
-    - `instance=None`: 0 to 19,999. `split="train"` draws of 0 to 9,999, `"test"` of the others, which are held out.
-    - `yaw="guessed"`: the root's yaw is known to 20 degrees. "unknown": the person faces anywhere, and the first
-      number stands for 180 degrees to either side of facing the first camera.
-    - `view_degrees=45.0`: where the camera stands, 0 in front of the person; several for several views.
-    - `prior="pca"`, `train=None`: the prior and the motions it learns from; by default other people's.
-    - `translation="known"`: or "searched", about a guess up to 0.25 m off in each direction, or "aligned".
+    - `motion="walk"`: a built-in motion, or an .amc or .bvh file; or a list of built-in
+      motions; or "all" for all kinds of built-in motions.
+    - `held_out_people=False`: if true, `motion` names kinds of built-in motions. An
+      instance shows one person's style of it; a held-out instance shows the last
+      person's. If false, the mean of all styles is shown.
+    - `instance=None`: 0 to 19,999. `split="train"` draws from 0 to 9,999, `"test"` from
+      the others, which are held out.
+    - `yaw="guessed"`: the root's yaw is known to 20 degrees. "unknown": the person
+      faces anywhere, and the first number spans 180 degrees to either side of facing
+      the first camera.
+    - `view_degrees=45.0`: where the camera is, 0 in front of the person; a list for
+      several views.
+    - `prior="pca"`, `train=None`: the prior, and the motions from which it learns; by
+      default other people's.
+    - `translation="known"`: or "searched", around a guess up to 0.25 m off in each
+      direction, or "aligned".
     - `size=(64, 48)`: width and height in pixels.
-    - `noise=None`: corruptions of the silhouette and their strengths, such as `{"holes": 0.3, "shadow": 0.5}`; see
-      `posefit.silhouette.corruption`.
-    - `mismatch_percent=0.0`: the largest difference of the fitted body's bones and radii from the person's.
+    - `noise=None`: corruptions of the silhouette and their strengths, such as
+      `{"holes": 0.3, "shadow": 0.5}`; see `posefit.silhouette.corruption`.
+    - `mismatch_percent=0.0`: the largest difference between the bones and radii of the
+      fitted body and the person's.
     - `errors=True`: whether infos hold `truth`, and errors against it.
     - `max_evaluations=8`.
 
@@ -123,7 +144,7 @@ class FitImageEnv(SearchEnv):
         return self.stage.pictures(self.stage.all_rows)[0], infos
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, Infos]:
-        """Evaluate a proposal. Raises gymnasium.error.ResetNeeded where the episode has ended."""
+        """Evaluate a proposal. Raises ResetNeeded if the episode has ended."""
         proposal = self.checked_action(action)[None]
         problem = self.problem
         drawn = self.stage.draw(proposal, self.stage.all_rows)
@@ -152,7 +173,7 @@ class FitImageEnv(SearchEnv):
 
 
 class FitImageVectorEnv(SearchVectorEnv):
-    """`num_envs` environments as FitImageEnv."""
+    """A vector of `num_envs` FitImageEnv environments."""
 
     row_attributes = ("instance", "number", "problem", "space")
 
@@ -186,13 +207,13 @@ class FitImageVectorEnv(SearchVectorEnv):
         return {"instance": self.numbers.copy()}
 
     def started_infos(self, i: int) -> Infos:
-        """Return the true proposal of environment i, where a reset gives it."""
+        """Return the true proposal of environment i, if a reset gives it."""
         if not shows_truth(self.world, int(self.numbers[i])):
             return {}
         return {"truth": self._problems[i].truth}
 
     def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
-        """Evaluate a proposal in each environment; one whose episode has ended resets instead, or at once."""
+        """Evaluate a proposal in each environment; ended episodes reset."""
         proposals, stepping = self.begin_step(actions)
         rows = np.flatnonzero(stepping)
         problems = self._problems
@@ -220,7 +241,7 @@ class FitImageVectorEnv(SearchVectorEnv):
 
 
 def _label(number: int | None, cost: float, best: float, evaluations: int) -> str:
-    """Return the words below a picture."""
+    """Return the label below a picture."""
     if not evaluations:
         return f"instance {number}"
     return f"cost {cost:.1f}, best {best:.1f}, {evaluations} evaluations"

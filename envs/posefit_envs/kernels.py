@@ -1,6 +1,7 @@
-"""Many scenes at once: numba loops over stacked arrays, a row a scene. Shapes are checked by the callers.
+"""Numba loops over many scenes at once: arrays are stacked, one row per scene.
 
-Each row is computed as one alone is, by the same inner functions, so that its bits do not depend on its neighbours.
+A row runs through the same inner functions as a single scene, so its bits do not depend
+on its neighbours. Callers check the shapes.
 """
 
 from typing import NamedTuple
@@ -29,7 +30,7 @@ from posefit.silhouette.rasteriser import (
 
 
 class Scenes(NamedTuple):
-    """What the drawn scenes (n) differ in: bodies, cameras and silhouettes."""
+    """The properties in which the scenes (n) differ: bodies, cameras, silhouettes."""
 
     offsets: Array  # (n, 26, 3) bones in their own frames
     radii: Array  # (n, 26, 2)
@@ -44,7 +45,10 @@ class Scenes(NamedTuple):
 
 @jit
 def unpack_scenes(proposals, centres, halves, anchors, poses, translations, latents):
-    """Write root angles, translations and latents of proposals (n, k, d); return whether all of them are finite."""
+    """Write root angles, translations and latents of proposals (n, k, d).
+
+    Return whether all of them are finite.
+    """
     finite = True
     upright = np.zeros((3 + latents.shape[2], 2))
     for i in range(proposals.shape[0]):
@@ -63,7 +67,10 @@ def unpack_scenes(proposals, centres, halves, anchors, poses, translations, late
 
 @jit
 def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations):
-    """Move translations (n, k, 3) of some rows to where poses (n, k, 66) fill the borders (n, views, 4)."""
+    """Align translations (n, k, 3) so that poses (n, k, 66) fill borders (n, views, 4).
+
+    Only the scenes in `rows` are aligned.
+    """
     many = poses.shape[1]
     block = np.empty(LANES, np.int64)
     lanes = empty_lanes()
@@ -90,9 +97,10 @@ def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations)
 
 @jit
 def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures):
-    """Write the areas (views, n, k, 3) R, B, Y of poses (n, k, 66) in some rows, each in its own scene.
+    """Write the areas R, B, Y (views, n, k, 3) of poses (n, k, 66) in some rows.
 
-    Each pixel of a body in `pictures` (n, height, width, views) gets `value` too, unless there are no pictures.
+    Each pose is rasterised in its row's scene. Each pixel of a body is set to `value`
+    in `pictures` (n, height, width, views), unless that array is empty.
     """
     views = scenes.places.shape[1]
     many = poses.shape[1]

@@ -1,6 +1,6 @@
-"""Policies on environments: an episode of one, and what observations and actions of Race-v0 mean.
+"""Rollouts of policies, and readable observations and actions of Race-v0.
 
-A policy is called with an observation and the number of the step, and returns an action.
+A policy is called with an observation and the step's number. It returns an action.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,11 +22,17 @@ def rollout(
     instance: int | Sequence[int],
     seed: int,
 ) -> Any:
-    """Return the last infos of an episode of a policy on an instance, with its `actions` (k, d) and `rewards` (k,).
+    """Return the last infos of a policy's episode, with its actions and rewards.
 
-    Of a vector, in any autoreset mode, it is a list of them, one of each environment: `instance` is then one for all or
-    a list, the seeds are `seed`, `seed` + 1 and so on, and the policy is called with the observations of all. An
-    environment whose episode has ended begins it again until all others have ended.
+    The infos gain `actions` (k, d) and `rewards` (k,). For a vector, in any autoreset
+    mode, the result is a list, with an element for each environment. An environment
+    whose episode has ended begins again until all others have ended.
+
+    Args:
+        env: An environment or a vector.
+        policy: The policy; in a vector it gets the observations of all environments.
+        instance: The instance's number, or a list with one for each environment.
+        seed: The seed; environment i of a vector has `seed` + i.
     """
     rows = rows_of(env)
     numbers = [instance] * rows.count if isinstance(instance, int) else instance
@@ -57,9 +63,11 @@ def rollout(
 
 
 def race_features(observation: Any) -> tuple[Array, Array]:
-    """Return what observations (..., 4 k + 3) of Race-v0 show of its k searches (..., k, 4), and in common (..., 3).
+    """Return the features (..., k, 4) of k searches, and the common ones (..., 3).
 
-    Of a search: best cost, slope, spread and share of the budget used; in common: best cost, budget left, budget.
+    They are read from observations (..., 4 k + 3) of Race-v0. A search has best cost,
+    slope, spread and share of the budget used. In common are best cost, budget left and
+    budget.
     """
     shown = np.asarray(observation, dtype=np.float64)
     each = shown[..., :-COMMON_FEATURES]
@@ -70,5 +78,8 @@ def race_features(observation: Any) -> tuple[Array, Array]:
 
 
 def race_action(choice: Any, searches: int) -> Array:
-    """Return the actions (..., searches + 1) of Race-v0 that make choices (...), whole numbers from 0 to searches."""
+    """Return actions (..., searches + 1) of Race-v0 that make the choices (...).
+
+    A choice is a whole number from 0 to `searches`.
+    """
     return np.asarray(2.0 * np.eye(searches + 1)[np.asarray(choice)] - 1.0)

@@ -1,4 +1,4 @@
-"""Race-v0: searches of one silhouette share a budget; an action says which of them goes on, or begins another."""
+"""Race-v0: searches share a budget; an action continues one, or starts a new one."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -36,19 +36,21 @@ from posefit_envs.world import (
 OPTIMISER = "pso"
 SEARCHES = 8
 POPULATION_SIZE = 8
-GENERATIONS = (100, 220)  # the least and the most that an episode has
+# smallest and largest budget of an episode
+GENERATIONS = (100, 220)
 SEARCH_FEATURES = 4
 COMMON_FEATURES = 3
-SMOOTHING = 0.2  # weight of the last generation in a slope
-# in ln(1 + cost) a generation, that shows as 1, and that a search begins with
+# weight of the latest generation in a slope
+SMOOTHING = 0.2
+# slope observed as 1, in ln(1 + cost) per generation; also a new search's slope
 MAX_SLOPE = 0.1
-# in half-ranges, that show as 0 and 1
+# spreads observed as 0 and 1, in half-ranges
 MIN_SPREAD = 1e-3
 MAX_SPREAD = 1.0
 
 
 class Races:
-    """n races side by side, a row each: the searches, and what is observed of them."""
+    """n races side by side, one row each: their searches and observed features."""
 
     def __init__(
         self,
@@ -98,7 +100,7 @@ class Races:
         )
 
     def begin(self, row: int, number: int, seed: int) -> None:
-        """Begin a race on an instance; its first populations are evaluated by `evaluate_first`."""
+        """Begin a race on an instance. `evaluate_first` evaluates its populations."""
         self.stage.set_scene(row, first_scene(self.world, number))
         self.problems.begin(row, partial(first_problem, self.world, number))
         rng = np.random.default_rng(seed)
@@ -109,7 +111,7 @@ class Races:
             self._begin_search(row, search)
 
     def _begin_search(self, row: int, search: int) -> None:
-        """Begin a search in the place of one of a race's."""
+        """Replace one of a race's searches by a new one."""
         space = self.stage.space(row)
         rng = np.random.default_rng(int(self._rngs[row].integers(2**63)))
         self._optimisers[row][search] = checked(
@@ -126,7 +128,10 @@ class Races:
             self._generation(rows, np.full(len(rows), search))
 
     def advance(self, rows: Rows, actions: Array) -> Array:
-        """Make the generations that actions (m, searches + 1) choose in some races; return the rewards (m,)."""
+        """Run the generations that actions (m, searches + 1) choose in some races.
+
+        Return the rewards (m,).
+        """
         before = self.problems.best_costs[rows]
         chosen = actions.argmax(axis=1)
         for k in np.flatnonzero(chosen == self.searches).tolist():
@@ -138,7 +143,7 @@ class Races:
         return log_improvement(before, self.problems.best_costs[rows])
 
     def _generation(self, rows: Rows, chosen: NDArray[np.int64]) -> None:
-        """Make one generation of the chosen search (m,) of some races (m,): ask, evaluate, tell."""
+        """Run one generation of the chosen search (m,) of some races (m,)."""
         pairs = list(zip(rows.tolist(), chosen.tolist(), strict=True))
         count = self.population_size
         proposals = np.zeros((len(self.problems), count, self.world.dimensions))
@@ -153,8 +158,8 @@ class Races:
         costs = self.stage.costs(proposals, rows)
         self.problems.count(rows, proposals[rows], costs[rows])
         for row, search in pairs:
-            told = proposals[row].copy(), costs[row].copy()
-            self._optimisers[row][search].tell(*told)
+            costs_of_search = costs[row].copy()
+            self._optimisers[row][search].tell(proposals[row].copy(), costs_of_search)
         self._remember((rows, chosen), proposals[rows], costs[rows])
 
     def _remember(
@@ -163,7 +168,7 @@ class Races:
         proposals: Array,
         costs: Array,
     ) -> None:
-        """Update what is observed of searches by their proposals (m, k, d) and costs (m, k)."""
+        """Update the features of searches from proposals (m, k, d) and costs (m, k)."""
         before = self.costs[at]
         searched = self.used[at] > 0
         bests = self.bests[at]
@@ -207,7 +212,7 @@ class Races:
             "instance": numbers.copy(),
         }
         if self.world.errors:
-            # a pose does not depend on where the body is aligned
+            # alignment moves the body but not the pose, so no row is aligned
             nobody = self.stage.all_rows[:0]
             poses = self.stage.decode(problems.best[:, None], nobody)[0][:, 0]
             infos["error_degrees"] = error_degrees(self.stage.truths, poses)
@@ -227,20 +232,23 @@ class Races:
 class RaceEnv(SearchEnv):
     """
     ## Description
-    Several searches look for the pose in one silhouette, each with an optimiser of its own, of the same kind, and a
-    first population of its own. They share a budget of generations, which is too small for all of them, and many get
-    stuck. Each step is one generation of one search, and the action chooses which; or another search begins in the
-    place of the worst.
+    Several searches look for the pose in one silhouette. Each has a separate optimiser
+    of the same kind, and a separate first population. They share a budget of
+    generations that is too small for all of them, and many get stuck. Each step is one
+    generation of one search, which the action chooses. The action may also replace the
+    worst search by a new one.
 
     ## Action Space
-    `Box(-1, 1, (searches + 1,), float32)`: the largest number is the choice, the first of several that are equal.
+    `Box(-1, 1, (searches + 1,), float32)`: the largest number is the choice; of equal
+    ones, the first.
 
     | Num | Meaning |
     |---|---|
-    | 0 to searches - 1 | this search has its next generation |
-    | searches | the search whose best cost is the highest ends, and another begins in its place |
+    | 0 to searches - 1 | this search runs its next generation |
+    | searches | the search with the highest best cost is replaced by a new one |
 
-    The generation of a search that begins is its first population. Actions outside are clipped, with one warning.
+    The first generation of a new search is its first population. Actions outside are
+    clipped, with one warning.
 
     ## Observation Space
     `Box(0, 1, (4 searches + 3,), float32)`, with k searches:
@@ -248,37 +256,44 @@ class RaceEnv(SearchEnv):
     | Num | Meaning |
     |---|---|
     | 0 to k - 1 | best cost of each search: ln(1 + cost) / ln 101 |
-    | k to 2 k - 1 | its slope: a moving average of the fall of ln(1 + cost) a generation, of which 0.1 or more is 1 |
-    | 2 k to 3 k - 1 | spread of its particles' bests, 0.001 to 1 half-ranges, by its logarithm |
-    | 3 k to 4 k - 1 | its generations, the first too, / the budget |
-    | 4 k | best cost of all, those that ended too: ln(1 + cost) / ln 101 |
+    | k to 2 k - 1 | its slope: moving mean of ln(1 + cost)'s fall; 0.1 or more is 1 |
+    | 2 k to 3 k - 1 | spread of its particles' bests: 0.001 to 1 half-ranges, log |
+    | 3 k to 4 k - 1 | its generations, including the first, / the budget |
+    | 4 k | best cost of all searches, including replaced ones: ln(1 + cost) / ln 101 |
     | 4 k + 1 | generations left / the budget |
     | 4 k + 2 | the budget / the largest budget |
 
-    A slope is 1 at first; a generation counts 0.2, and those before it 0.8. Particle j of a search is proposal j of
-    every population of its optimiser.
+    A slope is 1 at first. A generation's weight is 0.2, that of the earlier ones 0.8.
+    Particle j of a search is proposal j of every population of its optimiser.
 
     ## Rewards
     ln((1 + best cost before) / (1 + best cost after)).
 
     ## Starting State
-    The first population of each search, drawn uniformly and evaluated, which the budget does not count; the instance as
-    in `FitImage-v0`. The budget is drawn from `generations`.
+    The first population of each search, drawn uniformly and evaluated; the budget does
+    not include it. The instance is chosen as in `FitImage-v0`. The budget is drawn from
+    `generations`.
 
     ## Episode End
-    Terminates when the budget is used. It is never truncated.
+    Terminates when the budget is used up. It is never truncated.
 
     ## Information
-    `best_cost`, `proposal` (d,) that costs it, `evaluations`, `instance`, and unless `errors=False` `error_degrees`, of
-    the best pose against the truth; a reset too.
+    A step and a reset give `best_cost`, the `proposal` (d,) with that cost,
+    `evaluations`, and `instance`. Unless `errors=False` they also give `error_degrees`,
+    the best pose's error against the truth.
 
     ## Arguments
-    As in `FitImage-v0`, with `optimiser="pso"`, any optimiser of posefit or a plugin that takes a `population_size`,
-    `searches=8`, 2 or more, `population_size=8` of each, 2 or more, and `generations=(100, 220)`, the least and the
-    largest budget, instead of `max_evaluations`.
+    As in `FitImage-v0`, without `max_evaluations`, and with:
+
+    - `optimiser="pso"`: any optimiser of posefit or a plugin that takes a
+      `population_size`.
+    - `searches=8`: 2 or more.
+    - `population_size=8`: of each search, 2 or more.
+    - `generations=(100, 220)`: the smallest and the largest budget.
 
     ## Searches
-    An optimiser has its default settings, and where its schedule follows from a budget, that of the largest.
+    An optimiser has its default settings. If its schedule follows from a budget, it is
+    planned for the largest budget.
 
     ## Version History
     - v0: not released yet; until then a version changes without a number.
@@ -312,7 +327,7 @@ class RaceEnv(SearchEnv):
         return self.races.observations()[0], self._infos()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
-        """Make one generation. Raises gymnasium.error.ResetNeeded where the episode has ended."""
+        """Run one generation. Raises ResetNeeded if the episode has ended."""
         action = self.checked_action(action)[None]
         reward = self.races.advance(np.array([0]), action)[0]
         self.ended = bool(self.races.left[0] == 0)
@@ -324,7 +339,10 @@ class RaceEnv(SearchEnv):
 
     @property
     def problem(self) -> Problem:
-        """The episode's problem, for a search of its own. Raises gymnasium.error.ResetNeeded before the first reset."""
+        """The episode's problem, independent of the race's searches.
+
+        Raises gymnasium.error.ResetNeeded before the first reset.
+        """
         self.check_reset()
         return self.races.problems[0]
 
@@ -334,7 +352,10 @@ class RaceEnv(SearchEnv):
 
 
 class RaceVectorEnv(SearchVectorEnv):
-    """`num_envs` environments as RaceEnv; the populations of their chosen searches are evaluated in one call."""
+    """A vector of `num_envs` RaceEnv environments.
+
+    The populations of their chosen searches are evaluated in one call.
+    """
 
     def __init__(
         self,
@@ -375,7 +396,7 @@ class RaceVectorEnv(SearchVectorEnv):
         return self.races.infos(self.numbers)
 
     def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
-        """Make one generation in each environment; one whose episode has ended resets instead, or at once."""
+        """Run one generation in each environment; ended episodes reset."""
         actions, stepping = self.begin_step(actions)
         rows = np.flatnonzero(stepping)
         rewards = np.zeros(self.num_envs)
@@ -392,13 +413,17 @@ class RaceVectorEnv(SearchVectorEnv):
 
 
 def _bounds(generations: Any) -> tuple[int, int]:
-    """Return the least and the largest budget. Raises ArgumentError where they are not two numbers in this order."""
+    """Return the smallest and the largest budget.
+
+    Raises ArgumentError unless they are two whole numbers in this order.
+    """
     ends = checked(
         pair, "generations", generations, "two whole numbers such as (100, 220)"
     )
     least, most = (checked(whole, "generations", number, 1) for number in ends)
     if least > most:
         raise ArgumentError(
-            f"generations must be the least and the largest, got {least} and {most}"
+            "generations must be the smallest and the largest budget, "
+            f"got {least} and {most}"
         )
     return least, most

@@ -1,4 +1,4 @@
-"""Pictures of an environment: the silhouettes on each other, the body from its side, and the cost in words."""
+"""Rendered frames: overlaid silhouettes, the body from the side, and the cost."""
 
 from typing import Any
 
@@ -29,9 +29,14 @@ def check_mode(mode: str | None) -> None:
 def render_frame(
     cost: Any, proposed: tuple[Array, Array] | None, label: str
 ) -> Picture:
-    """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side.
+    """Return the picture of a frame: overlap in each view, and a side view.
 
-    `cost` is the cost function of a frame; `proposed` is a pose (66,) with its translation (3,), or None.
+    Overlapping, missed and spilled pixels have three colours.
+
+    Args:
+        cost: The cost function of the frame.
+        proposed: A pose (66,) and its translation (3,), or None.
+        label: The words below the picture.
     """
     panels = []
     for camera, silhouette in zip(cost.cameras, cost.silhouettes, strict=True):

@@ -1,6 +1,7 @@
-"""An environment or a vector of them, in any autoreset mode, as rows: each row resets and ends for itself.
+"""A common interface to single environments and vectors: independent rows.
 
-`drive`, `rollout` and the adapter to Stable-Baselines3 are written on this. A vector may be of this package, or
+Each row resets and ends independently, in any autoreset mode. `drive`, `rollout` and
+the adapter to Stable-Baselines3 use it. A vector may be one of this package, or
 Gymnasium's SyncVectorEnv or AsyncVectorEnv of any environments.
 """
 
@@ -24,7 +25,7 @@ def rows_of(env: AnyEnv) -> "SingleRow | VectorRows":
 
 
 class SingleRow:
-    """A single environment, as a vector of one row; `VectorRows` says what its methods do."""
+    """A single environment as a vector of one row; see `VectorRows` for the methods."""
 
     count = 1
 
@@ -56,14 +57,15 @@ class SingleRow:
 
 
 class VectorRows:
-    """A vector environment, row by row; infos are a list, an element a row."""
+    """A vector environment, row by row. Infos are a list with an element per row."""
 
     def __init__(self, vector: VectorEnv[Any, Any, Any]) -> None:
         self.count = vector.num_envs
         self.mode = AutoresetMode(vector.metadata["autoreset_mode"])
         self._vector: Any = DictInfoToList(vector)
         self._begun = False
-        # the observations and infos of the last step, where rows that begin again by themselves have done so
+        # the observations and infos of the last step; rows that ended under SAME_STEP
+        # have those of their new episode
         self.begun: tuple[Any, list[Infos]] = None, []
         # which rows of the last step were cut short
         self.truncated = np.zeros(self.count, dtype=bool)
@@ -74,9 +76,10 @@ class VectorRows:
         options: Options,
         mask: Flags | None = None,
     ) -> tuple[Any, list[Infos]]:
-        """Reset some rows, all by default, each with its own options and seed; return observations and infos.
+        """Reset some rows, all by default; return observations and infos.
 
-        Rows that are not reset keep their observations; their infos mean nothing.
+        Each row has separate options and a separate seed. Rows that are not reset keep
+        their observations; their infos are meaningless.
         """
         seeds = [None] * self.count if seeds is None else list(seeds)
         waiting = np.ones(self.count, dtype=bool) if mask is None else mask.copy()
@@ -86,7 +89,8 @@ class VectorRows:
             first = options[int(np.flatnonzero(waiting)[0])]
             alike = waiting & np.array([one == first for one in options])
             chosen = dict(first)
-            # the first reset of a vector is of all; those with other options are then reset again
+            # a vector's first reset covers all rows; rows with other options are then
+            # reset again
             if self._begun:
                 chosen["reset_mask"] = alike.copy()
             observations, rows = self._vector.reset(seed=seeds, options=chosen or None)
@@ -97,10 +101,11 @@ class VectorRows:
         return observations, infos
 
     def step(self, actions: Any) -> tuple[Any, Any, Flags, list[Infos]]:
-        """Step all rows; return observations, rewards, which episodes have ended, and infos.
+        """Step all rows; return observations, rewards, which episodes ended, and infos.
 
-        Observations and infos of a row whose episode has ended are the episode's last. Reset it before the next step,
-        whatever the autoreset mode; by SAME_STEP it has also begun again by itself, see `begun`.
+        Observations and infos of a row whose episode has ended are the episode's last.
+        Reset the row before the next step, in every autoreset mode. Under SAME_STEP it
+        has also begun again: see `begun`.
         """
         observations, rewards, terminated, truncated, rows = self._vector.step(actions)
         ended = terminated | truncated
@@ -116,14 +121,14 @@ class VectorRows:
         return observations, rewards, ended, infos
 
     def attribute(self, name: str) -> list[Any]:
-        """Return an attribute of each environment. Raises AttributeError where they have none of that name."""
+        """Return an attribute of each environment. Raises AttributeError if unknown."""
         if name in ("action_space", "observation_space"):
             return [getattr(self._vector, f"single_{name}")] * self.count
         return list(self._vector.unwrapped.get_attr(name))
 
 
 def _plain(info: Infos) -> Infos:
-    """Return infos as a single environment has them: numbers of Python instead of NumPy's."""
+    """Return infos with Python's numbers instead of NumPy's."""
     plain: Infos = {}
     for name, value in info.items():
         if isinstance(value, dict):

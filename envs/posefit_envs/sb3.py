@@ -1,4 +1,4 @@
-"""An adapter of Gymnasium's vector environments to those of Stable-Baselines3."""
+"""Adapts Gymnasium's vector environments to Stable-Baselines3."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,17 +17,24 @@ if TYPE_CHECKING:
 def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
     """Return the environment as a `VecEnv` of Stable-Baselines3.
 
-    Stable-Baselines3 resets an environment in the step that ends its episode, with the last observation in
-    `info["terminal_observation"]`. Every autoreset mode can be adapted: by NEXT_STEP and DISABLED `vector` must be able
-    to reset some of its environments, by `options={"reset_mask": ...}`, as those of this package and Gymnasium's own
-    are. Options and attributes are those of each environment; attributes and methods are set and called for all of them
-    together. Raises gymnasium.error.DependencyNotInstalled without Stable-Baselines3.
+    Stable-Baselines3 resets an environment in the step that ends its episode, and puts
+    the last observation into `info["terminal_observation"]`. Every autoreset mode can
+    be adapted. Under NEXT_STEP and DISABLED, `vector` must be able to reset some of its
+    environments by `options={"reset_mask": ...}`; the vectors of this package and of
+    Gymnasium can.
+
+    Options are per environment, and attributes are read per environment. Attributes are
+    set, and methods called, for all environments together.
+
+    Raises:
+        gymnasium.error.DependencyNotInstalled: Without Stable-Baselines3.
     """
     try:
         from stable_baselines3.common.vec_env import VecEnv
     except ImportError:
         raise error.DependencyNotInstalled(
-            "to_sb3_vec_env needs Stable-Baselines3: python -m pip install stable-baselines3"
+            "to_sb3_vec_env needs Stable-Baselines3: "
+            "python -m pip install stable-baselines3"
         ) from None
     rows = VectorRows(vector)
     no_options: list[dict[str, Any]] = [{} for _ in range(rows.count)]
@@ -77,7 +84,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             self._check_all(indices)
             base: Any = vector.unwrapped
-            base.set_attr(attr_name, value)
+            base.set_attr(attr_name, [value] * self.num_envs)
 
         def env_method(
             self, method_name: str, *arguments: Any, indices: Any = None, **named: Any
@@ -96,7 +103,8 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             chosen = sorted(set(self._get_indices(indices)))
             if chosen != list(range(self.num_envs)):
                 raise error.Error(
-                    f"indices must be all of the {self.num_envs} environments, got {chosen}"
+                    f"indices must be all of the {self.num_envs} environments, "
+                    f"got {chosen}"
                 )
 
     return Adapted()

@@ -1,4 +1,4 @@
-"""Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
+"""Poses, costs and pictures of proposals in many scenes, in one compiled call."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -29,12 +29,12 @@ from posefit_envs.world import (
 
 Rows = NDArray[np.int64]
 _BODY = np.uint16(BODY)
-# pixels of an instance whose scene is remembered, in about 5 kB
+# largest scene, in pixels, that is cached; it takes about 5 kB
 LARGEST_REMEMBERED = 2 * 64 * 64
 
 
 class SceneRow(NamedTuple):
-    """What a stage stores of one observation: the columns of a row."""
+    """What a stage stores of one observation: one row of each column."""
 
     centre: Array  # (d,) of the box
     half: Array  # (d,)
@@ -80,7 +80,7 @@ class SceneRow(NamedTuple):
 
 
 def first_scene(world: World, number: int) -> SceneRow:
-    """Return the scene of an instance's first frame; small ones are remembered."""
+    """Return the scene of an instance's first frame. Small scenes are cached."""
     width, height = world.size
     remembers = width * height * len(world.view_degrees) <= LARGEST_REMEMBERED
     return (_first_scene if remembers else _first_scene.__wrapped__)(world, number)
@@ -93,7 +93,10 @@ def _first_scene(world: World, number: int) -> SceneRow:
 
 
 class Drawn(NamedTuple):
-    """Poses, costs and pictures of proposals, a row a scene; rows of scenes that were left out mean nothing."""
+    """Poses, costs and pictures of proposals, one row per scene.
+
+    Rows of scenes that were not rasterised are meaningless, except where noted.
+    """
 
     poses: Array  # (n, 66)
     translations: Array  # (n, 3)
@@ -104,9 +107,9 @@ class Drawn(NamedTuple):
 
 @final
 class Stage:
-    """Scenes of one world side by side, a row each. What differs between them is stacked, so that one call does all.
+    """Scenes of one world side by side, one row each, evaluated in one call.
 
-    A row has the same bits whatever the others hold, whatever number of rows there is, and however many `threads` draw.
+    A row's bits do not depend on the other rows, on their number, or on `threads`.
     """
 
     def __init__(self, world: World, rows: int, threads: int = 1) -> None:
@@ -138,11 +141,11 @@ class Stage:
             truth=np.empty((rows, ANGLES)),
             masks=np.empty((rows, height, (width + 7) // 8, views), dtype=np.uint8),
         )
-        # the bodies that were drawn last, and which scenes have one
+        # the bodies that were rasterised last, and which rows have one
         self._poses = np.zeros((rows, ANGLES))
         self._translations = np.zeros((rows, 3))
         self._has_body = np.zeros(rows, dtype=bool)
-        # a pixel's pair of bytes: the observed silhouette, and the body that is drawn on it
+        # a pixel's two bytes: the observed silhouette, and the body drawn over it
         self._backdrops = np.empty((rows, height, width, views), dtype=np.uint16)
         self._no_pictures = np.empty((0, height, width, views), dtype=np.uint16)
         drawn_columns = self._columns._asdict()
@@ -154,7 +157,7 @@ class Stage:
         return self._columns.truth
 
     def set_scene(self, row: int, scene: SceneRow) -> None:
-        """Let a row be a scene of the world, without a body."""
+        """Set a row's scene, without a body."""
         self._has_body[row] = False
         columns: Sequence[NDArray[Any]] = self._columns
         for column, value in zip(columns, scene, strict=True):
@@ -174,35 +177,42 @@ class Stage:
         )
 
     def set_body(self, row: int, pose: Array, translation: Array) -> None:
-        """Let a row's pictures show a body, as it is."""
+        """Set the body that a row's pictures show."""
         self._poses[row] = pose
         self._translations[row] = translation
         self._has_body[row] = True
 
     def body(self, row: int) -> tuple[Array, Array] | None:
-        """Return the pose (66,) and translation (3,) of the body that a row's pictures show; None for no body."""
+        """Return a row's body as a pose (66,) and translation (3,), or None."""
         if not self._has_body[row]:
             return None
         return self._poses[row], self._translations[row]
 
     def pictures(self, rows: Rows) -> Image:
-        """Return the pictures (m, height, width, 2 views) of some rows, each with the body that was drawn last."""
+        """Return the pictures (m, height, width, 2 views) of some rows.
+
+        Each shows the body that was rasterised last in its row.
+        """
         pictures = self._backdrops.copy()
         shown = rows[self._has_body[rows]]
-        with uncounted():  # a body that is drawn again is no evaluation
+        # to draw a body again is not an evaluation
+        with uncounted():
             self._drawn(
                 self._poses[:, None], self._translations[:, None], shown, pictures
             )
         return pictures[rows].view(np.uint8)
 
     def draw(self, proposals: Array, rows: Rows) -> Drawn:
-        """Return poses, costs and pictures of proposals (n, d) in some rows; the others' pictures show no body."""
+        """Return poses, costs and pictures of proposals (n, d), evaluated in some rows.
+
+        The pictures of the other rows show no body.
+        """
         poses, translations = self.decode(proposals[:, None], rows)
         pictures = self._backdrops.copy()
         costs, areas = self._drawn(poses, translations, rows, pictures)
         drawn_poses = poses[:, 0]
         drawn_translations = translations[:, 0]
-        # most steps draw in every row, and nothing is copied
+        # most steps cover all rows: then keep the arrays and copy nothing
         if len(rows) == len(self.all_rows):
             self._poses = drawn_poses
             self._translations = drawn_translations
@@ -219,11 +229,14 @@ class Stage:
         )
 
     def costs(self, proposals: Array, rows: Rows) -> Array:
-        """Return the costs (n, k) of proposals (n, k, d), k in each scene, in some rows."""
+        """Return the costs (n, k) of proposals (n, k, d), k per scene, in some rows."""
         return self._drawn(*self.decode(proposals, rows), rows, self._no_pictures)[0]
 
     def decode(self, proposals: Array, rows: Rows) -> tuple[Array, Array]:
-        """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), aligned in some rows."""
+        """Return poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d).
+
+        With aligned translations, only those of `rows` are set.
+        """
         n, k = proposals.shape[:2]
         columns = self._columns
         poses = np.empty((n, k, ANGLES))
@@ -260,7 +273,11 @@ class Stage:
         rows: Rows,
         pictures: NDArray[np.uint16],
     ) -> tuple[Array, NDArray[np.int64]]:
-        """Return the costs (n, k) and areas (views, n, k, 3) of poses (n, k, 66) in some rows, drawn into pictures."""
+        """Return costs (n, k) and areas (views, n, k, 3) of poses (n, k, 66).
+
+        Only the scenes in `rows` are rasterised; the bodies are painted into
+        `pictures`.
+        """
         n, k = poses.shape[:2]
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
@@ -282,6 +299,6 @@ class Stage:
         cuts = [len(rows) * share // shares for share in range(shares + 1)]
         parts = [slice(start, stop) for start, stop in pairwise(cuts)]
         work_through(parts, self.threads, lambda _: (), draw)
-        # every pixel is known
+        # no pixel is unknown here, so the areas alone give the cost
         costs = [mismatch(view) for view in areas.reshape(views, n * k, 3)]
         return mean_over_views(costs).reshape(n, k), areas

@@ -25,11 +25,14 @@ from posefit_envs.stage import Rows, SceneRow, Stage
 from posefit_envs.world import Image, Instance, World, checked, instance
 
 FRAMES = 20
-EVALUATIONS = 100  # a frame
+EVALUATIONS = 100  # per frame
 
 
 class Sequence:
-    """An instance that is followed frame by frame: each committed pose moves the next frame's box, SAPSO (6)."""
+    """An instance, followed frame by frame.
+
+    Each committed pose moves the next frame's box. SAPSO (6).
+    """
 
     def __init__(
         self, world: World, number: int, frames: int, evaluations: int
@@ -52,7 +55,7 @@ class Sequence:
         return SceneRow.of(cost, self.instance.truth.poses[self.frame])
 
     def commit(self, proposal: Array) -> bool:
-        """Commit a proposal (d,) to the current frame and go on; return whether it was the last frame."""
+        """Commit a proposal (d,) to the frame; return whether it was the last frame."""
         self._predictor.commit(proposal)
         self.frame += 1
         return self.frame == len(self.instance.observations)
@@ -61,16 +64,18 @@ class Sequence:
 class TrackEnv(SearchEnv):
     """
     ## Description
-    A person walks by, observed as a silhouette a frame. For each frame some poses are proposed; the best of them is
-    committed, the next silhouette appears, and the box of proposals moves on with the prediction, SAPSO (6).
+    A person walks by; each frame shows a silhouette. A frame takes several proposals.
+    The best of them is committed, the next silhouette appears, and the box of proposals
+    moves with the prediction, SAPSO (6).
 
     ## Action Space
-    `Box(-1, 1, (d,), float32)`: a proposal, as in `FitImage-v0`. The yaw, and a searched translation, are
-    centred on the pose that was committed last.
+    `Box(-1, 1, (d,), float32)`: a proposal, as in `FitImage-v0`. The yaw and a searched
+    translation are relative to the pose that was committed last.
 
     ## Observation Space
-    `Box(0, 255, (height, width, 2 views), uint8)`, as in `FitImage-v0`: the silhouette of the current frame, and
-    that of the last proposal. The first picture of a frame shows the pose that was committed in the frame before.
+    `Box(0, 255, (height, width, 2 views), uint8)`, as in `FitImage-v0`: the silhouette
+    of the current frame and of the last proposal. The first picture of a frame shows
+    the pose that was committed in the previous frame.
 
     ## Rewards
     -ln(1 + cost) of the proposal, as in `FitImage-v0`.
@@ -82,13 +87,18 @@ class TrackEnv(SearchEnv):
     Terminates when the last frame's pose is committed.
 
     ## Information
-    `cost`, `best_cost`, `evaluations` of the frame, `areas` (views, 3), `frame`, `instance`, and unless `errors=False`
-    `error_degrees` of the proposal. The step that commits a pose adds `committed_frame`, `committed_cost`,
-    `committed_pose` (66,), and unless `errors=False` `committed_error_degrees` and `committed_mpjpe_mm`; `frame` is
-    then the next one. A reset gives `instance` and `frame`.
+    A step gives `cost`, `best_cost`, `evaluations` of the frame, `areas` (views, 3),
+    `frame`, and `instance`. Unless `errors=False` it also gives the proposal's
+    `error_degrees`.
+
+    The step that commits a pose adds `committed_frame`, `committed_cost` and
+    `committed_pose` (66,). Unless `errors=False` it also adds `committed_error_degrees`
+    and `committed_mpjpe_mm`. Its `frame` is the next frame. A reset gives `instance`
+    and `frame`.
 
     ## Arguments
-    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `max_evaluations`.
+    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of
+    `max_evaluations`.
 
     ## Version History
     - v0: not released yet; until then a version changes without a number.
@@ -126,7 +136,7 @@ class TrackEnv(SearchEnv):
         self.stage.set_scene(0, self._sequence.scene(self._problem))
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, Infos]:
-        """Evaluate a proposal; the last one of a frame commits the best, and the next frame appears."""
+        """Evaluate a proposal; a frame's last one commits the best of the frame."""
         proposal = self.checked_action(action)[None]
         rows = self.stage.all_rows
         problem = self.problem
@@ -166,7 +176,7 @@ class TrackEnv(SearchEnv):
         return self._sequence.instance
 
     def picture(self) -> Picture:
-        """Return the picture of the last proposal, or of the pose that was committed last."""
+        """Return the picture of the last proposal, or else of the committed pose."""
         problem = self.problem
         label = _label(
             self.number,
@@ -179,7 +189,7 @@ class TrackEnv(SearchEnv):
 
 
 class TrackVectorEnv(SearchVectorEnv):
-    """`num_envs` environments as TrackEnv."""
+    """A vector of `num_envs` TrackEnv environments."""
 
     metadata = SearchVectorEnv.metadata | {"render_fps": 30}
 
@@ -226,7 +236,7 @@ class TrackVectorEnv(SearchVectorEnv):
         return {"instance": self.numbers.copy(), "frame": self._frames()}
 
     def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
-        """Evaluate a proposal in each environment; the last one of a frame commits the best there."""
+        """Evaluate a proposal in each environment; a full frame commits its best."""
         proposals, stepping = self.begin_step(actions)
         rows = np.flatnonzero(stepping)
         problems = self._problems
@@ -244,9 +254,10 @@ class TrackVectorEnv(SearchVectorEnv):
         return self.end_step(stepping, drawn.pictures, rewards, ends, infos, committed)
 
     def _commit(self, rows: Rows, pictures: Image) -> tuple[Flags, dict[int, Infos]]:
-        """Commit the best proposals of some environments, whose next frames begin in their pictures.
+        """Commit the best proposals of some environments, and draw their next frames.
 
-        Returns which episodes (n,) end with that, and the infos of what was committed by environment.
+        Return which episodes (n,) end, and the infos of the committed poses by
+        environment.
         """
         terminated = np.zeros(self.num_envs, dtype=bool)
         committed: dict[int, Infos] = {}
@@ -267,8 +278,9 @@ class TrackVectorEnv(SearchVectorEnv):
             if not terminated[i]:
                 self._begin_frame(i)
                 self.stage.set_body(i, poses[i, 0], places[i, 0])
-        going = rows[~terminated[rows]]
-        pictures[going] = self.stage.pictures(going)
+        # the pictures still show the previous frames
+        continuing = rows[~terminated[rows]]
+        pictures[continuing] = self.stage.pictures(continuing)
         return terminated, committed
 
     def _frames(self) -> Rows:
@@ -277,14 +289,14 @@ class TrackVectorEnv(SearchVectorEnv):
         return np.minimum(frames, self.frames - 1)
 
     def row_attribute(self, name: str, i: int) -> Any:
-        """Return an attribute that environment i has for itself."""
+        """Return an attribute of environment i."""
         if name == "instance":
             self.check_reset()
             return self._sequences[i].instance
         return super().row_attribute(name, i)
 
     def picture(self, i: int) -> Picture:
-        """Return the picture of the last proposal in environment i, or of the pose that was committed last."""
+        """Return the picture of environment i's last proposal or committed pose."""
         problems = self.problems
         label = _label(
             int(self.numbers[i]),
@@ -306,7 +318,7 @@ def _checked(frames: Any, evaluations_per_frame: Any) -> tuple[int, int]:
 def _label(
     number: int | None, frame: int, cost: float, best: float, evaluations: int
 ) -> str:
-    """Return the words below a picture."""
+    """Return the label below a picture."""
     if not evaluations:
         return f"instance {number}, frame {frame}"
     return f"frame {frame}: cost {cost:.1f}, best {best:.1f}, {evaluations} evaluations"
@@ -315,7 +327,7 @@ def _label(
 def committed_infos(
     instance: Instance, frame: int, pose: Array, place: Array, cost: float, errors: bool
 ) -> dict[str, Any]:
-    """Return the infos of the pose that is committed in a frame of an instance."""
+    """Return the infos of a pose committed in a frame of an instance."""
     infos = {
         "committed_frame": frame,
         "committed_cost": cost,

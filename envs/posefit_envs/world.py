@@ -1,4 +1,4 @@
-"""The arguments of environments, and what an instance is to them: a person, their motion and its silhouettes.
+"""The arguments of environments, and an instance's person, motion and silhouettes.
 
 See `posefit.motion.instances` for the numbers.
 """
@@ -51,14 +51,14 @@ YAWS = ("guessed", "unknown")
 FPS = 30.0
 # largest difference between the middle of the searched yaw and the truth
 YAW_DEGREES = 20.0
-# how far the root is searched where the yaw is unknown
+# how far the root is searched if the yaw is unknown
 ANY_YAW_DEGREES = (180.0, *ROOT_RANGE_DEGREES[1:])
 # largest difference between the middle of the searched translation and the truth
 MIDDLE_METRES = 0.25
-# metres from camera to person; of the camera above the ground
-DISTANCE = 3.5
+# from the camera to the person, and of the camera above the ground
+DISTANCE = 3.5  # metres
 HEIGHT = 0.9
-# the byte of a pixel's pair that shows the body
+# the byte that shows the body, of a pixel's two
 BODY = 0xFF00 if sys.byteorder == "little" else 0x00FF
 OBSERVED = 0xFFFF ^ BODY
 
@@ -67,12 +67,15 @@ Image = NDArray[np.uint8]
 
 
 class ArgumentError(error.Error, ValueError):
-    """An argument of an environment is not what it must be."""
+    """An argument of an environment is wrong."""
 
 
 @dataclass(frozen=True)
 class World:
-    """The arguments that all environments share; FitImageEnv documents them. `world_of` checks them."""
+    """The arguments of all environments, as documented by FitImageEnv.
+
+    `world_of` checks them.
+    """
 
     motion: tuple[str, ...] = ("walk",)
     held_out_people: bool = False
@@ -95,7 +98,7 @@ class World:
 
     @cached_property
     def training(self) -> tuple[str, ...]:
-        """The training motions: by default other styles of the built-in motions, else the built-in walks."""
+        """The training motions: other styles of the built-in motions, or of "walk"."""
         if self.train:
             return self.train
         if self.held_out_people:
@@ -115,11 +118,14 @@ class World:
 
     @property
     def dimensions(self) -> int:
-        """How many numbers a proposal has."""
+        """The number of coordinates of a proposal."""
         return len(self.learned.low) + (6 if self.translation == "searched" else 3)
 
     def motion_of(self, number: int) -> str:
-        """Return the motion of an instance: each of several in turn, and of held-out people each style in turn."""
+        """Return the motion of an instance.
+
+        Several motions take turns, and so do the styles of held-out people.
+        """
         turn, which = divmod(number, len(self.motion))
         motion = self.motion[which]
         if not self.held_out_people:
@@ -128,7 +134,7 @@ class World:
         return last if number in HELD_OUT else others[turn % len(others)]
 
     def next_instance(self, rng: np.random.Generator) -> int:
-        """Return the number of the next instance: the fixed one, or a random one of the split."""
+        """Return the number of the next instance: fixed, or drawn from the split."""
         if self.instance is not None:
             return self.instance
         split = SPLITS[self.split]
@@ -136,15 +142,21 @@ class World:
 
 
 def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
-    """Return the world that an environment's arguments describe; it has some of its `own` besides.
+    """Return the world that an environment's arguments describe.
 
-    Raises ArgumentError where a value is wrong, and TypeError where there is no argument of that name.
+    Args:
+        own: Names of the arguments that the environment itself takes, for the message.
+        arguments: The arguments of the world.
+
+    Raises:
+        ArgumentError: If a value is wrong.
+        TypeError: If an argument's name is unknown.
     """
     known = tuple(World.__dataclass_fields__)
     for name in arguments:
         if name not in known:
             every = *known, *own
-            # libraries that pass on arguments read these words
+            # libraries that pass on arguments look for "an unexpected keyword argument"
             raise TypeError(
                 "an unexpected keyword argument: it must be one of "
                 f"{', '.join(every)}, got {quoted(name)}{suggestion(name, every)}"
@@ -168,15 +180,18 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
         isinstance(name, str) for name in world.train or ()
     ):
         raise ArgumentError(
-            f"train must be a list of motions such as ['walk-a'], got {quoted(world.train)}"
+            "train must be a list of motions such as ['walk-a'], "
+            f"got {quoted(world.train)}"
         )
+    motion = _motions(world.motion, held_out_people)
+    number = world.instance
+    if number is not None:
+        number = checked(instance_number, number)
     return replace(
         world,
-        motion=_motions(world.motion, held_out_people),
+        motion=motion,
         held_out_people=held_out_people,
-        instance=None
-        if world.instance is None
-        else checked(instance_number, world.instance),
+        instance=number,
         view_degrees=_views(world.view_degrees),
         train=tuple(world.train or ()),
         size=(int(sides[0]), int(sides[1])),
@@ -187,7 +202,10 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
 
 
 def checked(check: Callable[..., Any], *values: Any) -> Any:
-    """Return the result of one of posefit's checks. Raises ArgumentError, which is Gymnasium's error too."""
+    """Return the result of one of posefit's checks, which raise ValueError.
+
+    Raises ArgumentError instead, which is also an error of Gymnasium.
+    """
     try:
         return check(*values)
     except (ValueError, ImportError) as mistake:
@@ -195,20 +213,23 @@ def checked(check: Callable[..., Any], *values: Any) -> Any:
 
 
 def flag(name: str, value: object) -> bool:
-    """Return a truth value as a bool. Raises ArgumentError where it is none."""
+    """Return a truth value as a bool. Raises ArgumentError for anything else."""
     if not isinstance(value, bool | np.bool_):
         raise ArgumentError(f"{name} must be true or false, got {quoted(value)}")
     return bool(value)
 
 
 def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
-    """Return the motions of an argument: one name, several built-in ones, or "all" kinds of these."""
+    """Return the motions: one name, several built-in ones, or "all" kinds of them."""
     kinds = tuple(
         dict.fromkeys(built_in.activity_of(name) for name in built_in.names())
     )
-    names = (
-        kinds if motion == "all" else (motion,) if isinstance(motion, str) else motion
-    )
+    if motion == "all":
+        names = kinds
+    elif isinstance(motion, str):
+        names = (motion,)
+    else:
+        names = motion
     if (
         not isinstance(names, Sequence)
         or not names
@@ -237,7 +258,8 @@ def _views(view_degrees: Any) -> tuple[float, ...]:
         views = ()
     if not views:
         raise ArgumentError(
-            f"view_degrees must be a finite number or several, got {quoted(view_degrees)}"
+            "view_degrees must be a finite number or several, "
+            f"got {quoted(view_degrees)}"
         )
     return views
 
@@ -251,7 +273,7 @@ def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     for name, strength in strengths.items():
         if name not in CORRUPTIONS:
             raise ArgumentError(
-                f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}"
+                f"noise must be one of {', '.join(CORRUPTIONS)}, got {quoted(name)}"
             )
         if not 0.0 <= checked(finite_number, f"noise {name}", strength) <= 1.0:
             raise ArgumentError(
@@ -288,10 +310,11 @@ def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """One numbered instance: the truth, and the observations of it."""
+    """One numbered instance: the truth, and its observations."""
 
     number: int
-    task: Task  # what a tracker knows; its body need not be the true one
+    # what a tracker knows; its body may differ from the true one
+    task: Task
     truth: Motion
     observations: Sequence[Observation] = field(repr=False)
 
@@ -302,7 +325,10 @@ class Instance:
         return SilhouetteCost(task.body, task.cameras, silhouettes, space, blank=True)
 
     def true_proposal(self, frame: int, space: SearchSpace) -> Array:
-        """Return the proposal (d,) nearest to the true pose: projected onto the prior, clipped to the box."""
+        """Return the proposal (d,) nearest to the true pose.
+
+        The pose is projected onto the prior and clipped to the box.
+        """
         pose = self.truth.poses[frame]
         place = self.truth.translations[frame]
         searched = place if space.translation == "searched" else place[:0]
@@ -317,7 +343,7 @@ class Instance:
 
 @dataclass(frozen=True, eq=False)
 class FirstFrame:
-    """The cost of proposals for an instance's first frame, which is made when it is first needed."""
+    """The cost of proposals for an instance's first frame, computed when first used."""
 
     world: World
     number: int
@@ -354,7 +380,7 @@ def first_problem(world: World, number: int) -> Problem:
 
 
 def first_space(world: World, made: Instance) -> SearchSpace:
-    """Return the box around the first frame's pose of an instance."""
+    """Return the search space around the pose of an instance's first frame."""
     task = made.task
     centre = np.array([task.yaw, 0.0, 0.0])
     guessed = world.yaw == "guessed"
@@ -366,14 +392,18 @@ def first_space(world: World, made: Instance) -> SearchSpace:
 def instance(
     world: World, number: int, frames: int = 1, evaluations: int = 1
 ) -> Instance:
-    """Return an instance: the same person, pose and silhouettes for the same number and arguments, everywhere."""
+    """Return an instance.
+
+    The same number and arguments give the same person, pose and silhouettes on every
+    machine.
+    """
     motion = world.motion_of(number)
     source = motion if motion in built_in.names() else _source(motion)
     try:
         truth = motion_of_instance(source, number, frames=frames, fps=FPS)
     except ValueError as mistake:  # a file that is too short
         raise error.Error(str(mistake)) from None
-    # of noise, yaw and build alone: motion and views are a sweep's
+    # for noise, yaw and build only: the instance's number gives motion and views
     rng = generator("scene", number)
     body = body_of(motion)
     facing = float(truth.poses[0, 0])
@@ -391,7 +421,8 @@ def instance(
     noise = dict(world.noise)
     observations = []
     for pose, place in zip(truth.poses, truth.translations, strict=True):
-        with uncounted():  # to render the truth is no evaluation
+        # rendering the truth is not an evaluation
+        with uncounted():
             shown = [project(body, camera, pose, place) for camera in cameras]
         masks = [corrupted(mask, noise, rng) for mask in shown]
         observations.append(

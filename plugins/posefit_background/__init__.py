@@ -1,7 +1,8 @@
-"""Segmenters that compare each frame with a still background: `mixture`, `median` and `mean`; and `masks`.
+"""Segmenters for a still background: `mixture`, `median` and `mean`; and `masks`.
 
-They have no model of people. A person who is in the picture all the time becomes part of a background that is learned
-from the video; `mean` gets the picture of the empty scene instead.
+`mixture`, `median` and `mean` compare each frame with the background and have no model
+of people. A person who is always in the picture becomes part of a background that is
+learned from the video. `mean` avoids this with a picture of the empty scene.
 
 >>> import numpy as np
 >>> from posefit_background.segmenters import given_masks

@@ -1,7 +1,7 @@
 """Segmenters that compare each frame with a still background."""
 
 from posefit.fitting.check import at_least, positive
-from posefit.footage.masks import span
+from posefit.footage.views import span
 from posefit.silhouette.foreground import (
     HISTORY,
     SAMPLES,
@@ -18,11 +18,14 @@ from posefit.silhouette.foreground import (
 def learned_mixture(
     film: Film, *, history: int = HISTORY, threshold: float = THRESHOLD
 ) -> Mixture:
-    """Each pixel's background is an adaptive mixture of Gaussians, learned from the whole video: OpenCV's MOG2.
+    """OpenCV's MOG2: an adaptive mixture of Gaussians for each pixel's background.
+
+    It is learned from the whole video.
 
     Settings:
         history: frames that it remembers, 1 or more.
-        threshold: squared standard deviations from the nearest Gaussian, from which on a pixel is foreground; above 0.
+        threshold: squared distance from the nearest Gaussian, in standard deviations,
+            above which a pixel is foreground; above 0.
     """
     at_least("history", history, 1)
     positive("threshold", threshold)
@@ -30,10 +33,13 @@ def learned_mixture(
 
 
 def learned_median(film: Film, *, samples: int = SAMPLES) -> Still:
-    """Each pixel's background is its median over some frames of the whole video, before which a person may walk.
+    """Each pixel's background is its median over some frames of the whole video.
+
+    The person may walk in these frames.
 
     Settings:
-        samples: frames, spread over the video, 1 or more; all are in memory at once.
+        samples: number of frames, spread over the video, 1 or more; all are in memory
+            at once.
     """
     at_least("samples", samples, 1)
     step = max(1, len(film) // samples)
@@ -46,10 +52,11 @@ def learned_median(film: Film, *, samples: int = SAMPLES) -> Still:
 
 
 def given_mean(film: Film, *, background: str) -> Still:
-    """Each pixel's background is its mean over frames without a person, or a picture of the empty scene.
+    """Each pixel's background is its mean over frames of the empty scene.
 
     Settings:
-        background: these frames as A:B, or the picture's file; `--background` sets it.
+        background: these frames as A:B, or the file of a picture of the empty scene;
+            `--background` sets it.
     """
     start, colon, stop = background.partition(":")
     if colon and (start + stop).isdigit() and stop:
@@ -60,5 +67,5 @@ def given_mean(film: Film, *, background: str) -> Still:
 
 
 def given_masks(_film: Film) -> GivenMasks:
-    """The frames are masks already: what is bright is the person."""
+    """The frames are masks already. Bright pixels are the person."""
     return GivenMasks()

@@ -1,8 +1,9 @@
-"""Optimisers of other libraries for posefit, and problems of posefit's suites for other tools.
+"""Optimisers of other libraries for posefit, and posefit's problems for other tools.
 
-`optimisers` are those of Nevergrad, Optuna, pycma, pymoo and SciPy, by ask and tell; `problems` are for
-IOHexperimenter, Nevergrad, OptunaHub and pymoo. A library is imported where it is used; `pip install posefit[NAME]`
-brings it along.
+`optimisers` has those of Nevergrad, Optuna, pycma, pymoo and SciPy, as ask and tell.
+`problems` has problems of posefit's suites for IOHexperimenter, Nevergrad, OptunaHub
+and pymoo. A library is imported when it is used; `pip install posefit[NAME]` installs
+it.
 """
 
 from posefit import hookimpl
@@ -11,7 +12,7 @@ from posefit.hooks import RegisterOptimiser
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Register the optimisers of each library: `pycma`, and those of a family such as `optuna:SAMPLER`."""
+    """Register the optimisers of each library: `pycma`, families such as `pymoo`."""
     from posefit_bridges.optimisers import (
         bridge,
         nevergrad,

@@ -1,13 +1,18 @@
-"""Optimisers of other libraries for posefit, each a generator that yields proposals and is sent their costs.
+"""Optimisers of other libraries, as generators that yield proposals and get costs.
 
 | method | library |
 |---|---|
-| `nevergrad:NAME` | J. Rapin, O. Teytaud, Nevergrad, a gradient-free optimization platform, 2018 |
-| `optuna:SAMPLER` | T. Akiba et al., Optuna: a next-generation hyperparameter optimization framework, KDD 2019 |
-| `pycma` | N. Hansen, Y. Akimoto, P. Baudis, CMA-ES/pycma on GitHub, 2019 |
-| `pymoo:NAME` | J. Blank, K. Deb, pymoo: multi-objective optimization in Python, IEEE Access 8, 2020 |
-| `scipy:differential_evolution` | R. Storn, K. Price, Differential evolution, Journal of Global Optimization 11, 1997 |
-| `scipy:dual_annealing` | Y. Xiang et al., Generalized simulated annealing, The R Journal 5(1), 2013 |
+| `nevergrad:NAME` | Nevergrad, a gradient-free optimization platform (1) |
+| `optuna:SAMPLER` | Optuna: a next-generation ... optimization framework (2) |
+| `pycma` | CMA-ES/pycma on GitHub (3) |
+| `pymoo:NAME` | pymoo: multi-objective optimization in Python (4) |
+| `scipy:differential_evolution` | Differential evolution (5) |
+| `scipy:dual_annealing` | Generalized simulated annealing (6) |
+
+(1) J. Rapin, O. Teytaud, 2018. (2) T. Akiba et al., KDD 2019. (3) N. Hansen, Y.
+Akimoto, P. Baudis, 2019. (4) J. Blank, K. Deb, IEEE Access 8, 2020. (5) R. Storn, K.
+Price, Journal of Global Optimization 11, 1997. (6) Y. Xiang et al., The R Journal 5(1),
+2013.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="scipy:differential_evolution", frames=(0, 3))
@@ -38,7 +43,7 @@ from posefit.plugin import (
 )
 from posefit.reading import quoted
 
-# how long to wait for a library to leave when its search is dropped
+# how long to wait for a library's thread when its search is dropped
 LEAVE_SECONDS = 5.0
 
 # yields proposals (n, d), and is sent their costs (n,)
@@ -59,28 +64,32 @@ Minimiser = Literal["differential_evolution", "dual_annealing"]
 
 @final
 class Bridge(Adapter):
-    """An optimiser that a library runs as a generator; it ends where the generator returns.
+    """An optimiser that a library runs as a generator; it ends when that returns.
 
-    A copy, or what comes out of a pickle, runs the library again and repeats the costs so far. So `library` has to do
-    the same every time, and has to be picklable for a pickle.
+    A copy, or an unpickled bridge, runs the library again and repeats the costs so far.
+    So `library` must do the same every time, and must be picklable if the bridge is
+    pickled.
     """
 
     def __init__(
         self, space: Space, rng: np.random.Generator, library: Library
     ) -> None:
         super().__init__(space, draw_population(space, rng, 1)[0])
-        self._library, self._seed = library, int(rng.integers(2**63))
-        self._costs: list[Array] = []  # of all populations so far
+        self._library = library
+        self._seed = int(rng.integers(2**63))
+        # of all populations so far
+        self._costs: list[Array] = []
         self._begin()
 
     def _begin(self) -> None:
-        """Start the library, which checks its settings at first."""
+        """Start the library. It checks its settings first."""
         self._proposals = self._library(self._space, np.random.default_rng(self._seed))
         self._population = next(self._proposals, np.empty((0, self._space.dimensions)))
-        self._sent = 0  # costs that the library has had
+        # number of costs that the library has received
+        self._sent = 0
 
     def propose(self) -> Array:
-        """Return the library's next population (n, d); an empty one once it has ended."""
+        """Return the library's next population (n, d), empty once it has ended."""
         try:
             while self._sent < len(self._costs):
                 self._sent += 1
@@ -90,7 +99,7 @@ class Bridge(Adapter):
         return self._population
 
     def learn(self, proposals: Array, costs: Array) -> None:
-        """Pass the costs (n,) on."""
+        """Store the costs (n,) for the library."""
         self._costs.append(costs)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -107,7 +116,7 @@ class Bridge(Adapter):
 
 
 def bridge(library: Callable[..., Proposals]) -> Callable[..., Bridge]:
-    """Return the factory of an optimiser, with the settings and the docstring of its library."""
+    """Return an optimiser's factory with the settings and docstring of its library."""
 
     @wraps(library)
     def factory(space: Space, rng: np.random.Generator, **settings: Any) -> Bridge:
@@ -124,12 +133,13 @@ def nevergrad(
     population_size: int = 40,
     evaluations: int = 2440,
 ) -> Proposals:
-    """An optimiser of Nevergrad, asked for `population_size` proposals at a time, within a budget of `evaluations`.
+    """An optimiser of Nevergrad, which proposes whole populations within a budget.
 
     Settings:
         variant: a name of `nevergrad.optimizers.registry`; `nevergrad:NAME` sets it.
-        population_size: proposals asked for at a time, its `num_workers`, 1 or more.
-        evaluations: of a frame, its `budget`, 1 or more; by default that of the search.
+        population_size: proposals at a time, its `num_workers`, 1 or more.
+        evaluations: budget of a frame, its `budget`, 1 or more; by default the
+            search's.
     """
     import nevergrad as ng
 
@@ -138,10 +148,13 @@ def nevergrad(
     known = ng.optimizers.registry
     if variant not in known:
         raise InputError(
-            f"variant must be one of {len(known)} names such as TwoPointsDE, CMA, PSO, got {quoted(variant)}"
+            f"variant must be one of {len(known)} names such as TwoPointsDE, CMA, PSO, "
+            f"got {quoted(variant)}"
         )
     numpy_random = GlobalRandom(int(rng.integers(2**31)))
-    spread = 0.5 if space.start is None else np.clip(space.start.spread, 1e-6, 0.5)
+    spread: Any = 0.5
+    if space.start is not None:
+        spread = np.clip(space.start.spread, 1e-6, 0.5)
     with numpy_random:
         box = ng.p.Array(init=draw_population(space, rng, 1)[0]).set_mutation(
             sigma=spread
@@ -163,13 +176,17 @@ def nevergrad(
 
 
 class GlobalRandom:
-    """Lends a library a global numpy generator of its own within `with`: some of Nevergrad's optimisers need one."""
+    """Gives a library a private global NumPy generator inside `with`.
+
+    Some of Nevergrad's optimisers draw from the global one.
+    """
 
     def __init__(self, seed: int) -> None:
         self._own = np.random.RandomState(seed).get_state()
 
     def __enter__(self) -> None:
-        self._outer = np.random.get_state()  # noqa: NPY002, the state to be left alone
+        # the user's state, which must stay as it is
+        self._outer = np.random.get_state()  # noqa: NPY002
         np.random.set_state(self._own)  # noqa: NPY002
 
     def __exit__(self, *_: object) -> None:
@@ -184,14 +201,15 @@ def optuna(
     variant: Sampler = "NSGAIISampler",
     population_size: int = 10,
 ) -> Proposals:
-    """A study of Optuna with that sampler, asked for `population_size` proposals at a time, at first from the start.
+    """A study of Optuna with a sampler, which proposes whole populations.
 
-    NSGAIISampler is quick enough for thousands of proposals; TPESampler and GPSampler take milliseconds each, and more
-    with every one before.
+    The first population is drawn from the start. NSGAIISampler is quick enough for
+    thousands of proposals. TPESampler and GPSampler take milliseconds each, and more
+    with every earlier one.
 
     Settings:
         variant: a sampler of `optuna.samplers`; `optuna:SAMPLER` sets it.
-        population_size: proposals asked for at a time, 1 or more.
+        population_size: proposals at a time, 1 or more.
     """
     from optuna import create_study, samplers
     from optuna.distributions import FloatDistribution
@@ -220,7 +238,7 @@ def optuna(
 
 @contextmanager
 def _quiet_optuna() -> Iterator[None]:
-    """Let Optuna log errors alone in the body, and afterwards what its user wants."""
+    """Let Optuna log only errors in the body, and restore its level afterwards."""
     from optuna import logging
 
     before = logging.get_verbosity()
@@ -238,13 +256,15 @@ def pycma(
     population_size: int = 0,
     spread: float = 0.5,
 ) -> Proposals:
-    """pycma's evolution strategy with its own handling of the box.
+    """pycma's evolution strategy with its built-in handling of the box.
 
-    It starts around the prediction with its spread, or anywhere with `spread`, and again where it has stopped.
+    It starts around the prediction with the prediction's spread, or anywhere with
+    `spread`. Where it stops, it starts again.
 
     Settings:
-        population_size (lambda): 5 or more, or 0 for the library's own choice.
-        spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
+        population_size (lambda): 5 or more, or 0 for the library's choice.
+        spread (sigma): first step size without a prediction, in half-ranges of the box,
+            above 0. Ours.
     """
     from cma import CMAEvolutionStrategy
 
@@ -253,17 +273,15 @@ def pycma(
     positive("spread", spread)
     d = space.dimensions
     spare = np.zeros(1 if d == 1 else 0)  # pycma cannot search a single dimension
-    spreads = (
-        np.full(d, spread)
-        if space.start is None
-        else np.maximum(space.start.spread, 1e-6)
-    )
+    spreads = np.full(d, spread)
+    if space.start is not None:
+        spreads = np.maximum(space.start.spread, 1e-6)
     options = {
         "bounds": [-1, 1],
         "CMA_stds": np.append(spreads, spare + spread),
         "verbose": -9,
     }
-    # without a seed, and with our generator, it leaves numpy's global one alone
+    # without a seed, and with our generator, pycma does not touch NumPy's global one
     options |= {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
     if population_size:
         options["popsize"] = population_size
@@ -299,7 +317,7 @@ def pymoo(
     at_least("population_size", population_size, 5)
     choices(pymoo, locals())
     hinted = Config.warnings["not_compiled"]
-    # a hint that is printed when functions are loaded, once
+    # pymoo would print a hint once, when functions are loaded
     Config.warnings["not_compiled"] = False
     try:
         FunctionLoader.get_instance()
@@ -327,21 +345,21 @@ def scipy(
     variant: Minimiser = "differential_evolution",
     population_size: int = 40,
 ) -> Proposals:
-    """SciPy's differential evolution, or its dual annealing, which proposes one at a time.
+    """SciPy's differential evolution, or its dual annealing, one proposal at a time.
 
-    A search that has converged starts again. Dual annealing goes without its local search, which needs gradients.
+    A search that has converged starts again. Dual annealing runs without its local
+    search, which needs gradients.
 
     Settings:
         variant: "differential_evolution" or "dual_annealing"; `scipy:NAME` sets it.
-        population_size: size of differential evolution's population, 5 or more; dual annealing has none.
+        population_size: size of differential evolution's population, 5 or more; dual
+            annealing ignores it.
     """
     at_least("population_size", population_size, 5)
     choices(scipy, locals())
-    run = (
-        partial(_evolve, population_size)
-        if variant == "differential_evolution"
-        else _anneal
-    )
+    run: Callable[[Space, np.random.Generator, Objective], None] = _anneal
+    if variant == "differential_evolution":
+        run = partial(_evolve, population_size)
     return called_back(run, space, rng)
 
 
@@ -383,7 +401,7 @@ def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> Non
 
 
 class _DroppedError(BaseException):
-    """Unwinds the library; not an Exception, which it might catch."""
+    """Unwinds the library. It is not an Exception, which the library might catch."""
 
 
 def called_back(
@@ -391,9 +409,10 @@ def called_back(
     space: Space,
     rng: np.random.Generator,
 ) -> Proposals:
-    """Yield what a library passes to an objective that it calls itself; the library runs in a thread.
+    """Yield the proposals of a library that calls its objective itself, in a thread.
 
-    The thread ends with the search: when this generator is dropped, the objective raises.
+    The thread ends with the search: when this generator is dropped, the objective
+    raises.
     """
     populations: SimpleQueue[Array | BaseException | None] = SimpleQueue()
     answers: SimpleQueue[Array | None] = SimpleQueue()
@@ -411,7 +430,7 @@ def called_back(
             populations.put(None)
         except _DroppedError:
             pass
-        except BaseException as error:  # whatever it is, `ask` raises it
+        except BaseException as error:  # raised again by the caller's `ask`
             populations.put(error)
 
     thread = Thread(target=work, daemon=True, name=__name__)
@@ -425,5 +444,5 @@ def called_back(
             answers.put((yield population))
     finally:
         answers.put(None)
-        if not sys.is_finalizing():  # else it is gone
+        if not sys.is_finalizing():  # else the thread is gone already
             thread.join(LEAVE_SECONDS)

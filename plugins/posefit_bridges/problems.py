@@ -1,4 +1,4 @@
-"""Problems of posefit's suites as those of other tools, where benchmarks are run.
+"""Problems of posefit's suites, as problems of other benchmarking tools.
 
 | tool | function | what it returns |
 |---|---|---|
@@ -7,12 +7,14 @@
 | pymoo | pymoo_problem | a problem, evaluated a population at a time |
 | Nevergrad | nevergrad_function | a function of its benchmarks |
 
-What is not feasible costs what the problem's `infeasible` says. Each has `problem`, the suite's, with the trace; the
-budget is the tool's, since that of a problem ends the tool's loop by an error.
+An infeasible proposal costs what the problem's `infeasible` says. Each result has an
+attribute `problem`, the suite's problem with its trace. Let the tool hold the budget: a
+problem's budget ends the tool's loop with an error.
 
 >>> import posefit
 >>> from posefit_bridges.problems import pymoo_problem
->>> pymoo_problem(posefit.suite("posefit-2026.3", function=1, instance=10_000, dimension=9)).n_var
+>>> problem = posefit.suite("posefit-2026.3", 1, 10_000, 9)
+>>> pymoo_problem(problem).n_var
 9
 """
 
@@ -23,30 +25,29 @@ from posefit.fitting.problem import Problem
 from posefit.suites.functions import SUITE
 from posefit.suites.problem import Infeasible, suite
 
-# function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
+# 26301 is function 1 of posefit-2026.3; IOHexperimenter's functions have other numbers
 FIRST_IOH_ID = 26_300
 
 
 def ioh_problem(problem: Problem) -> Any:
-    """Return a problem of IOHexperimenter with the number, instance, bounds and, where known, the optimum.
+    """Return a problem of IOHexperimenter.
 
-    Its name begins with that of the suite: to a log's own field for it, `unknown_suite`, ioh 0.4 lets no problem from
-    elsewhere write.
+    It has the number, the instance, the bounds and, if known, the optimum. Its name
+    begins with the suite's name, because ioh 0.4 does not let other packages write the
+    log's field for it, `unknown_suite`.
 
-    Its count is the problem's, whose budget holds here too, and its `reset` resets both. J. de Nobel et al.,
-    IOHexperimenter: benchmarking platform for iterative optimization heuristics, Evolutionary Computation 32(3), 2024.
+    Evaluations are counted by the suite's problem, whose budget holds here too; `reset`
+    resets both. J. de Nobel et al., IOHexperimenter: benchmarking platform for
+    iterative optimization heuristics, Evolutionary Computation 32(3), 2024.
     """
     from ioh import problem as problems
     from ioh.iohcpp import RealBounds, RealSolution
 
     d = problem.dimension
     name = f"{problem.suite}_{problem.function.name.replace(' ', '_')}"
-    known = problem.optimum is not None
-    optimum = (
-        RealSolution(problem.made.truth, problem.truth_cost)
-        if known
-        else RealSolution([], float("nan"))
-    )
+    optimum = RealSolution([], float("nan"))
+    if problem.optimum is not None:
+        optimum = RealSolution(problem.made.truth, problem.truth_cost)
 
     class IOHProblem(problems.RealSingleObjective):
         def __init__(self) -> None:
@@ -71,9 +72,10 @@ def ioh_problem(problem: Problem) -> Any:
 
 
 def optunahub_problem(problem: Problem) -> Any:
-    """Return a problem of OptunaHub whose parameters x0, x1, ... are floats of [-1, 1], to be minimised.
+    """Return a problem of OptunaHub, to be minimised.
 
-    A trial that is not feasible is no failure. Y. Ozaki et al., OptunaHub: a platform for black-box optimization, 2025,
+    Its parameters x0, x1, ... are floats in [-1, 1]. An infeasible trial does not count
+    as failed. Y. Ozaki et al., OptunaHub: a platform for black-box optimization, 2025,
     arXiv 2510.02798.
     """
     from optuna.distributions import FloatDistribution
@@ -84,7 +86,8 @@ def optunahub_problem(problem: Problem) -> Any:
 
     class OptunaHubProblem(BaseProblem):
         search_space = box
-        directions = [StudyDirection.MINIMIZE]  # noqa: RUF012, as OptunaHub has it
+        # a plain list, as OptunaHub declares it
+        directions = [StudyDirection.MINIMIZE]  # noqa: RUF012
 
         def __init__(self) -> None:
             self.problem = problem
@@ -96,9 +99,9 @@ def optunahub_problem(problem: Problem) -> Any:
 
 
 def pymoo_problem(problem: Problem) -> Any:
-    """Return a problem of pymoo with one objective, no constraint and the bounds -1 and 1.
+    """Return a problem of pymoo: one objective, no constraint, bounds -1 and 1.
 
-    Its Pareto front is the optimum, where that is known.
+    Its Pareto front is the optimum, if that is known.
     """
     from pymoo.core.problem import Problem as PymooProblem
 
@@ -126,9 +129,10 @@ def nevergrad_function(
     dimension: int = 9,
     infeasible: Infeasible = "repair",
 ) -> Any:
-    """Return a problem of the suite, by its numbers, as a function of Nevergrad: each copy of it counts for itself.
+    """Return a problem of the suite as a function of Nevergrad.
 
-    An experiment evaluates what the optimiser recommends once more at its end.
+    Each copy of it counts separately. At its end, an experiment evaluates the
+    optimiser's recommendation once more.
     """
     import nevergrad as ng
     from nevergrad.functions import ExperimentFunction

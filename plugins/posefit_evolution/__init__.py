@@ -1,7 +1,7 @@
-"""Evolution strategies for posefit: `cma`, covariance matrix adaptation after Hansen's tutorial (2016).
+"""Evolution strategies for posefit: `cma`, covariance matrix adaptation.
 
-The algorithm is `posefit.fitting.cma`, with which posefit fits a person's build, too; `pycma` is an adapter to another
-implementation.
+It follows Hansen's tutorial (2016). The algorithm is `posefit.fitting.cma`, with which
+posefit also fits a person's build. `pycma` is an adapter to another implementation.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="cma", frames=(0, 3))

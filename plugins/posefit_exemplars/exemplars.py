@@ -341,7 +341,8 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton) -> Exemplars:
             return exemplars
     learned = stored("exemplars", digest, lambda: learned_from(motions, average, True))
     exemplars = Exemplars.assembled(motions, average, learned, digest)
-    _latest[:] = [(tuple(motions), exemplars)]
+    # one picture is looked up in two sets: what its prior learned from, and the library
+    _latest[:] = [(tuple(motions), exemplars), *_latest[:1]]
     return exemplars
 
 

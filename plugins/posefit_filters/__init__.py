@@ -1,9 +1,12 @@
-"""Particle filters for posefit, which carry their particles from frame to frame: `particle` and `annealed`.
+"""Particle filters for posefit: `particle` and `annealed`.
 
-- `particle.Particle` is the bootstrap filter of Gordon, Salmond and Smith (1993), the SAPSO paper's opponent.
+They carry their particles from frame to frame.
+
+- `particle.Particle` is the bootstrap filter of Gordon, Salmond and Smith (1993), with
+  which the SAPSO paper compares.
 - `annealed.Annealed` is the annealed particle filter of Deutscher and Reid (2005).
 
-`weighting` weighs particles, computes how sharply, and resamples by weight.
+`weighting` finds how sharply to weigh the particles.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="annealed", frames=(0, 3))

@@ -1,7 +1,8 @@
 """The annealed particle filter of Deutscher and Reid.
 
-J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, International Journal of Computer Vision
-61(2), 2005, without its crossover of particles. Our own choices are marked `ours`.
+J. Deutscher, I. Reid, Articulated body motion capture by stochastic search,
+International Journal of Computer Vision 61(2), 2005, without its crossover of
+particles. Our own choices are marked `ours`.
 """
 
 import numpy as np
@@ -31,18 +32,22 @@ NOISE = 0.1  # ours: P0, the motion from frame to frame, in half-ranges of the b
 
 
 class Annealed:
-    """Layers of resampling with an ever sharper likelihood exp(-beta cost), in every frame.
+    """Layers of resampling with a sharper and sharper likelihood exp(-beta cost).
 
-    In each layer, beta is what lets a given share of the particles survive: the effective sample size by their number.
-    Each survivor moves by normal noise in proportion to the spread of the weighted particles, so that the search
-    narrows where they agree. What a frame commits is its best particle.
+    In each layer, beta is chosen so that a given share of the particles survives. The
+    share is the effective sample size divided by the number of particles. Each survivor
+    moves by normal noise in proportion to the spread of the weighted particles, so that
+    the search narrows where they agree. A frame commits its best particle.
 
     Settings:
-        evaluations: of a frame, shared among the layers, 1 or more. Ours: as many as SAPSO's.
-        layers (M): of resampling, 1 or more.
+        evaluations: budget of a frame, shared among the layers, 1 or more. Ours: as
+            many as SAPSO's.
+        layers (M): number of layers of resampling, 1 or more.
         survival (alpha): share of the particles that survives a layer, between 0 and 1.
-        diffusion: noise of a layer as a multiple of the particles' own standard deviations, above 0. Ours.
-        noise (P0): standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
+        diffusion: noise of a layer as a multiple of the particles' standard deviations,
+            above 0. Ours.
+        noise (P0): standard deviation of the motion from frame to frame, in half-ranges
+            of the box, above 0. Ours.
     """
 
     def __init__(
@@ -72,17 +77,15 @@ class Annealed:
         self._layer = self._waiting = 0
 
     def ask(self) -> Array:
-        """Return the particles (n, d) of the next layer; none after the last one of a frame."""
+        """Return the particles (n, d) of the next layer, none after the last one."""
         self._waiting = len(self._particles) if self._layer < self._layers else 0
         return self._particles[: self._waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Weigh the particles, and unless this was the last layer, go on with the survivors."""
+        """Weigh the particles, and move the survivors after all layers but the last."""
         check_tell(self._waiting, proposals, costs)
-        self._particles, self._costs = (
-            np.array(proposals),
-            np.array(costs, dtype=np.float64),
-        )
+        self._particles = np.array(proposals)
+        self._costs = np.array(costs, dtype=np.float64)
         self._layer = self._layer + 1
         self._waiting = 0
         if self._layer < self._layers:

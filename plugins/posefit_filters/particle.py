@@ -1,7 +1,8 @@
-"""The particle filter that the SAPSO paper compares with: sampling, importance weights, resampling.
+"""The particle filter with which the SAPSO paper compares, a bootstrap filter.
 
-N. Gordon, D. Salmond, A. Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation, IEE Proceedings F
-140(2), 1993. The paper gives no numbers for it; those here are ours.
+N. Gordon, D. Salmond, A. Smith, Novel approach to nonlinear/non-Gaussian Bayesian state
+estimation, IEE Proceedings F 140(2), 1993. The SAPSO paper gives no numbers for it;
+those here are ours.
 """
 
 import numpy as np
@@ -28,14 +29,17 @@ NOISE = 0.15
 class Particle:
     """A bootstrap filter: all evaluations of a frame are one population.
 
-    It is sampling importance resampling (SIR) with the motion as the proposal. A particle of the last frame survives by
-    systematic resampling with weight exp(-`sharpness` cost), moves, and is weighted by the new silhouette. What a frame
-    commits is its best particle.
+    This is sampling importance resampling (SIR) with the motion as the proposal.
+    Particles of the last frame are resampled systematically with weights
+    exp(-`sharpness` cost). Survivors move, and are weighted by the new silhouette. A
+    frame commits its best particle.
 
     Settings:
-        evaluations (N): particles, which are all evaluations of a frame, 1 or more. Ours: as many as SAPSO's.
+        evaluations (N): number of particles, and budget of a frame, 1 or more. Ours: as
+            many as SAPSO's.
         sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
-        noise: standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
+        noise: standard deviation of the motion from frame to frame, in half-ranges of
+            the box, above 0. Ours.
     """
 
     def __init__(
@@ -60,7 +64,7 @@ class Particle:
         self._waiting = 0
 
     def ask(self) -> Array:
-        """Return the particles (n, d) of this frame, once; then none."""
+        """Return the particles (n, d) of this frame once, then none."""
         self._waiting = len(self._particles) if self._due else 0
         return self._particles[: self._waiting].copy()
 
@@ -73,7 +77,7 @@ class Particle:
         self._waiting = 0
 
     def advance(self, space: Space) -> None:
-        """Let the particles survive by their weights, and move into the next frame."""
+        """Resample the particles by their weights, and move to the next frame."""
         # GORDON1993 (resampling)
         rows = systematic_rows(self._weights, self._rng.random(), len(self._weights))
         moved = converted(space, self._particles[rows], self._space)

@@ -3,26 +3,27 @@
 from posefit.plugin import Array, effective_sample_size, weigh
 
 EVALUATIONS = 2440  # of a frame, as many as SAPSO's N (C + 1)
-# ours: of the share that survives, and steps towards it
+# ours: tolerance of the surviving share, and limit on the iterations
 TOLERANCE = 1e-9
 MAX_STEPS = 100
-# ours: where more particles than wanted share the lowest cost, none is sharp enough
+# ours: if more particles than wanted share the lowest cost, no sharpness is enough
 MAX_SHARPNESS = 1e12
 
 
 def survival(costs: Array, beta: float) -> float:
-    """Return the share of particles, 0 to 1, that survives resampling by weights exp(-beta cost): D / n.
+    """Return the share of particles that survives resampling, D / n, 0 to 1.
 
-    D is the effective sample size; the share is the survival diagnostic of MacCormick.
+    The weights are exp(-beta cost), and D is the effective sample size. The share is
+    MacCormick's survival diagnostic.
     """
     # DEUTSCHER2005 (survival)
     return effective_sample_size(weigh(costs, beta)) / len(costs)
 
 
 def sharpness(costs: Array, wanted: float) -> float:
-    """Return the beta at which `wanted`, a share, of the particles survive; 0 where fewer do at any beta.
+    """Return the beta at which a share `wanted` of the particles survives.
 
-    The survival rate falls as beta rises.
+    The survival rate falls as beta rises. Return 0 if fewer survive at any beta.
     """
     if survival(costs, 0.0) <= wanted:
         return 0.0

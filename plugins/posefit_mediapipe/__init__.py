@@ -1,9 +1,10 @@
-"""The segmenter `mediapipe`: the person by MediaPipe's pose model in each frame, moving or not.
+"""The segmenter `mediapipe`: finds the person with MediaPipe's pose model.
 
-C. Lugaresi et al., MediaPipe: a framework for building perception pipelines, 2019; V. Bazarevsky et al., BlazePose:
-on-device real-time body pose tracking, 2020. Version 0.10.14 carries the weights, so nothing is downloaded.
-`pip install 'posefit[mediapipe]'`; the handbook shows how to install it without what posefit does not need,
-"How do I follow a video?".
+It needs no still background. C. Lugaresi et al., MediaPipe: a framework for building
+perception pipelines, 2019; V. Bazarevsky et al., BlazePose: on-device real-time body
+pose tracking, 2020. Version 0.10.14 includes the weights, so nothing is downloaded.
+Install it with `pip install 'posefit[mediapipe]'`. The handbook's page "How do I track
+a person in a video?" shows how to install it without the parts that posefit does not need.
 
 >>> from posefit.registry import registry
 >>> offer = registry().offers["segmenter"]["mediapipe"]

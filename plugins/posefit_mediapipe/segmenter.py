@@ -1,4 +1,4 @@
-"""The person by MediaPipe's pose model in each frame."""
+"""Segments the person with MediaPipe's pose model in each frame."""
 
 import math
 import os
@@ -16,11 +16,12 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Film, Image
 from posefit.silhouette.mask import Mask
 
-# shoulder and hip, in the model's numbers; x goes to the right, and z away
+# shoulder and hip in the model's numbering; x goes to the right, z away
 LEFT = (11, 23)
 RIGHT = (12, 24)
 SIDES = (1.0, 1.0, -1.0, -1.0)
-# bones whose ends are joints of the model, in its numbers: those of the left, then 1 more for the right
+# bones that end in a joint of the model, with its number on the left; on the right it
+# is 1 more
 _LEFT_POINTS = {
     "clavicle": 11,
     "humerus": 13,
@@ -38,14 +39,17 @@ POINTS = {
 
 
 class MediaPipe:
-    """One person by MediaPipe's pose model: detected in the picture, then followed from frame to frame.
+    """One person, detected by MediaPipe's pose model, then followed through the frames.
 
-    Of several people it takes the one detected most surely, and stays with them; a roi chooses another. It needs no
-    still background and no still camera.
+    Of several people it takes the one detected with the highest confidence, and stays
+    with them; a roi chooses another. It needs neither a still background nor a still
+    camera.
 
     Settings:
-        confidence: how sure it has to be that a person is there, 0 to 1; lower detects small or distant people.
-        threshold: of the soft mask, from which on a pixel is the person's, between 0 and 1.
+        confidence: minimum confidence of a detection, 0 to 1; lower values detect small
+            or distant people.
+        threshold: value of the soft mask above which a pixel is the person's, between 0
+            and 1.
     """
 
     def __init__(
@@ -54,27 +58,26 @@ class MediaPipe:
         between("confidence", confidence, 0.0, 1.0)
         between("threshold", threshold, 0.0, 1.0, ends=False)
         self._threshold = threshold
-        # in the latest picture: by the model's shoulders and hips
+        # in the latest picture; the direction is from the model's shoulders and hips
         self.facing = math.nan
-        self.landmarks = np.zeros((len(JOINTS), 3))  # in the latest picture
+        self.landmarks = np.zeros((len(JOINTS), 3))
         self._model = _model(confidence)
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Return where the soft mask of the person is above the threshold, and that nothing is a shadow."""
+        """Return the soft mask above the threshold, and an empty mask of shadows."""
         empty = np.zeros(image.shape[:2], dtype=bool)
-        with warnings.catch_warnings():  # of its own use of protobuf
+        with warnings.catch_warnings():  # about MediaPipe's use of protobuf
             warnings.simplefilter("ignore")
             result = self._model.process(np.ascontiguousarray(image[..., ::-1]))
         soft = result.segmentation_mask
         self.facing = _facing(result.pose_world_landmarks)
         self.landmarks = _landmarks(result.pose_landmarks, image.shape[:2])
-        return (
-            empty if soft is None else np.asarray(soft > self._threshold)
-        ), empty.copy()
+        person = empty if soft is None else np.asarray(soft > self._threshold)
+        return person, empty.copy()
 
 
 def _facing(landmarks: Any) -> float:
-    """Return which way the person faces, as `Segmenter.facing`, by the model's joints in metres; NaN without one."""
+    """Return the person's direction, as `Segmenter.facing`, or NaN without joints."""
     if landmarks is None:
         return math.nan
     points = [landmarks.landmark[k] for k in (*LEFT, *RIGHT)]
@@ -86,7 +89,7 @@ def _facing(landmarks: Any) -> float:
 
 
 def _landmarks(landmarks: Any, shape: tuple[int, ...]) -> Array:
-    """Return the model's joints (27, 3), as `Segmenter.landmarks`, in a picture of a shape."""
+    """Return the model's joints (27, 3), as `Segmenter.landmarks`, in pixels."""
     result = np.zeros((len(JOINTS), 3))
     if landmarks is not None:
         for joint, k in POINTS.items():
@@ -104,7 +107,7 @@ def _model(confidence: float) -> Any:
         warnings.simplefilter("ignore")
         from mediapipe.python.solutions.pose import Pose
 
-        # smoothing mixes a frame with those before it, and silhouettes would lag behind
+        # with smoothing, silhouettes would lag behind the frames
         model = Pose(
             model_complexity=1,
             enable_segmentation=True,
@@ -113,14 +116,14 @@ def _model(confidence: float) -> Any:
             min_detection_confidence=confidence,
             min_tracking_confidence=confidence,
         )
-        # its log messages come with its first picture
+        # the first picture triggers log messages
         model.process(np.zeros((64, 64, 3), dtype=np.uint8))
     return model
 
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Discard what is written to stderr: the model's libraries log for their own developers there."""
+    """Discard stderr, where the model's libraries log for their own developers."""
     sys.stderr.flush()
     stderr = os.dup(2)
     nowhere = os.open(os.devnull, os.O_WRONLY)

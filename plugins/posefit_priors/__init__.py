@@ -1,9 +1,12 @@
-"""Priors for posefit: `pca`, the paper's compact pose space; `loose`, freer limbs; `full`; scikit-learn's.
+"""Priors for posefit: `pca`, `loose`, `full`, and `sklearn:NAME`.
 
-- `pca.PCA` is section 2 of the SAPSO paper: principal components, a range (constraint 1) and clusters (constraint 2).
-- `loose.Loose` adds freedom at shoulders, elbows, hips and knees, for movements that are not in the training poses.
-- `full.Full` is all joint angles that are free, within their limits.
-- `sklearn.Transformed` is a decomposition of scikit-learn that has an inverse: `sklearn:KernelPCA`.
+- `pca.PCA` is section 2 of the SAPSO paper, the compact pose space: principal
+  components, a range (constraint 1) and clusters (constraint 2).
+- `loose.Loose` adds freedom at shoulders, elbows, hips and knees, for movements outside
+  the training poses.
+- `full.Full` has every joint angle that moves, within its limits.
+- `sklearn.Transformed` is a decomposition of scikit-learn with an inverse, such as
+  `sklearn:KernelPCA`.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="@loose", frames=(0, 3))

@@ -1,4 +1,4 @@
-"""The full space: every joint angle that is free, between its limits. No compact space, and no constraint 2."""
+"""The full space: every free joint angle between its limits, without constraint 2."""
 
 from typing import Literal, Self
 
@@ -13,19 +13,20 @@ from posefit_priors.pca import angles_of
 
 
 class Full:
-    """The joint angles themselves are the latents, those that are free, with a range for each.
+    """Every joint angle that has a range is a latent.
 
-    An angle without range stays at its training mean and is no latent. Limits are widened where training poses pass
-    them.
+    An angle without a range stays at its training mean. Limits are widened if training
+    poses exceed them.
 
     Settings:
-        limits: "asf", the joint limits that the skeleton's file states, or "training", the range of training poses.
+        limits: "asf", the joint limits that the skeleton's file states, or "training",
+            the range of training poses.
     """
 
     low: Array  # (m,) radians
     high: Array  # (m,)
-    angles: NDArray[np.intp]  # (m,) the free ones
-    rest: Array  # (63,) radians: the mean, where the others stay
+    angles: NDArray[np.intp]  # (m,) indices of the free angles
+    rest: Array  # (63,) radians, the mean; angles without a range stay there
 
     def __init__(self, *, limits: Literal["asf", "training"] = "asf") -> None:
         choices(Full.__init__, locals())
@@ -34,27 +35,26 @@ class Full:
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Take the limits from the skeleton, or the range of joint angles (T, 63).
 
-        Raises ValueError where the skeleton states no limits, or where nothing moves.
+        Raises ValueError if the skeleton states no limits, or if nothing moves.
         """
         angles = angles_of(angles, 1)
         low = angles.min(axis=0)
         high = angles.max(axis=0)
         if self._limits == "asf":
             if skeleton is None or skeleton.limits is None:
-                name = (
-                    "no skeleton"
-                    if skeleton is None
-                    else f"{skeleton.name}, whose file states none"
-                )
+                name = "no skeleton"
+                if skeleton is not None:
+                    name = f"{skeleton.name}, whose file states none"
                 raise InputError(
-                    f"limits must be training where the skeleton states no joint limits, got asf and {name}"
+                    "limits must be training if the skeleton states no joint limits, "
+                    f"got asf and {name}"
                 )
             low = np.minimum(low, skeleton.limits[:, 0])
             high = np.maximum(high, skeleton.limits[:, 1])
         self.angles = np.flatnonzero(high > low)
         if not len(self.angles):
             raise InputError(
-                f"angles must differ somewhere, got {len(angles)} equal frames"
+                f"angles must differ between frames, got {len(angles)} equal frames"
             )
         self.rest = angles.mean(axis=0)
         self.low = low[self.angles]
@@ -72,5 +72,5 @@ class Full:
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are feasible (n,): the box is the only constraint."""
+        """Return True for all latents (n, m): the box is the only constraint."""
         return np.ones(len(latents), dtype=bool)

@@ -1,4 +1,4 @@
-"""Principal components with freedom around them at the limbs: arms may swing as in no training pose."""
+"""Principal components with extra freedom at arms and legs."""
 
 from typing import Self
 
@@ -14,27 +14,32 @@ from posefit_priors.pca import PCA, distances
 COMPONENTS = 12
 ARMS_DEGREES = 45.0
 LEGS_DEGREES = 15.0
-SLACK = 1.5  # times chi: the distance of a pose from the nearest cluster, at most
-ROUNDING = 1e-9  # radians by which a joint may pass its limit
+SLACK = 1.5  # largest distance of a pose from the nearest cluster, in units of chi
+ROUNDING = 1e-9  # radians by which a joint may exceed its limit
 ARMS = ("humerus", "radius")
 LEGS = ("femur", "tibia")
 
 
 class Loose:
-    """The space of `pca`, and a latent more for each angle of shoulders, elbows, hips and knees that moves in training.
+    """The space of `pca`, with extra latents for shoulders, elbows, hips and knees.
 
-    Such a latent, in radians, is added to the angle that the components give, within the skeleton's joint limits where
-    it states some.
+    Each angle of these joints that moves in training has one extra latent, in radians.
+    It is added to the angle that the components give. The sum stays within the
+    skeleton's joint limits if the skeleton states some.
 
     Settings:
-        components (m): a whole number of them, or a share of the variance below 1 to keep at least. As `pca`.
-        arms_degrees: how far shoulders and elbows may leave the components to either side, 0 or more. Ours.
-        legs_degrees: how far hips and knees may leave them to either side, 0 or more. Ours.
-        slack: times chi, the distance of a pose from the clusters, at most; above 0. Ours.
+        components (m): a whole number of them, or the least share of the variance that
+            they must retain, below 1. As `pca`.
+        arms_degrees: how far shoulders and elbows may deviate from the components, to
+            either side, 0 or more. Ours.
+        legs_degrees: how far hips and knees may deviate from the components, to either
+            side, 0 or more. Ours.
+        slack: largest distance of a pose from the clusters, in units of chi; above 0.
+            Ours.
     """
 
-    loose: NDArray[np.intp]  # (k,) of the joint angles
-    angles_low: Array  # (k,) radians: their limits
+    loose: NDArray[np.intp]  # (k,) indices of joint angles with an extra latent
+    angles_low: Array  # (k,) radians, their limits
     angles_high: Array  # (k,)
     low: Array  # (d,)
     high: Array  # (d,)
@@ -55,7 +60,7 @@ class Loose:
         self._pca = PCA(components=components)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
+        """Learn the space from joint angles (T, 63). Raises ValueError if too few."""
         self._pca.fit(angles, skeleton)
         self._max_distance = self._slack * float(self._pca.reach)
         angles = np.asarray(angles, dtype=np.float64)
@@ -70,15 +75,14 @@ class Loose:
                 chosen += moving
                 reach += [bones_reach] * len(moving)
         self.loose = np.array(chosen, dtype=np.intp)
-        self.angles_low, self.angles_high = (
-            np.full(len(chosen), -np.pi),
-            np.full(len(chosen), np.pi),
-        )
+        self.angles_low = np.full(len(chosen), -np.pi)
+        self.angles_high = np.full(len(chosen), np.pi)
         if skeleton is not None and skeleton.limits is not None:
             self.angles_low, self.angles_high = skeleton.limits[self.loose].T.copy()
         self.angles_low = np.minimum(self.angles_low, least[self.loose])
         self.angles_high = np.maximum(self.angles_high, most[self.loose])
-        # as far as the limits leave room for a training pose, so that little of the box is infeasible
+        # only as far as every training pose has room, so that little of the box is
+        # infeasible
         down = np.minimum(reach, least[self.loose] - self.angles_low)
         up = np.minimum(reach, self.angles_high - most[self.loose])
         left = self.transform(angles)[:, len(self._pca.low) :]
@@ -91,11 +95,13 @@ class Loose:
         return self
 
     def transform(self, angles: Array) -> Array:
-        """Return the latents (n, d) of joint angles (n, 63): components, then what they leave of the loose angles."""
+        """Return the latents (n, d) of joint angles (n, 63).
+
+        They are the components, then what is left over of the loose angles.
+        """
         latents = self._pca.transform(angles)
-        left = (np.asarray(angles) - self._pca.inverse_transform(latents))[
-            :, self.loose
-        ]
+        residual = np.asarray(angles) - self._pca.inverse_transform(latents)  # (n, 63)
+        left = residual[:, self.loose]
         return np.hstack([latents, left])
 
     def inverse_transform(self, latents: Array) -> Array:
@@ -107,7 +113,7 @@ class Loose:
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return which latents (n, d) the components allow and the joint limits too (n,)."""
+        """Return which latents (n, d) satisfy clusters and joint limits (n,)."""
         m = len(self._pca.low)
         angles = self._pca.mean[self.loose] + latents[:, m:]
         add_components(
@@ -118,7 +124,5 @@ class Loose:
         within = (angles >= self.angles_low - ROUNDING) & (
             angles <= self.angles_high + ROUNDING
         )
-        return np.asarray(
-            within.all(axis=1)
-            & (distances(writeable(latents), self._pca.centres) < self._max_distance)
-        )
+        near = distances(writeable(latents), self._pca.centres) < self._max_distance
+        return np.asarray(within.all(axis=1) & near)

@@ -1,6 +1,7 @@
-"""The compact pose space: principal components, a range, and clusters that mark where poses are. SAPSO section 2."""
+"""The compact pose space: principal components, a range, clusters. SAPSO section 2."""
 
 import warnings
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -15,23 +16,32 @@ from posefit.geometry.skeleton import Skeleton
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
 QUANTILE = 0.99  # Interpretation S5: chi is this quantile of the training distances
-CLUSTERING_STARTS = 30  # of K-means, of which the best counts
+# runs of K-means; the best is used
+CLUSTERING_STARTS = 30
 CLUSTERING_SEED = 0
-CLUSTERING_ROUNDS = 100  # of Lloyd's algorithm
-DECIMALS = 7  # of what is learned, in radians and shares
+# iterations of Lloyd's algorithm
+CLUSTERING_ROUNDS = 100
+# to which the learned numbers are rounded, in radians and shares
+DECIMALS = 7
 
 
 class PCA(Components):
-    """Principal components of joint angles with constraint 1, a range, and constraint 2, nearness to a cluster.
+    """Principal components of joint angles, with the paper's two constraints.
+
+    Constraint 1 is a range of each latent, and constraint 2 a largest distance from the
+    nearest cluster.
 
     Settings:
-        components (m): a whole number of them, or a share of the variance below 1 to keep at least. Section 2.1.
-        clusters (K): centres that K-means finds among the training poses, 1 or more. Section 2.2.
-        quantile: chi is this quantile of the training distances, above 0 and at most 1. Interpretation S5.
+        components (m): a whole number of them, or the least share of the variance that
+            they must retain, below 1. Section 2.1.
+        clusters (K): number of centres that K-means finds among the training poses, 1
+            or more. Section 2.2.
+        quantile: the quantile of the training distances that gives chi, above 0 and at
+            most 1. Interpretation S5.
     """
 
-    centres: Array  # (K, m) of clusters
-    reach: Array  # () of a cluster: chi
+    centres: Array  # (K, m) of the clusters
+    reach: Array  # () chi, the largest distance of a pose from a cluster
     explained: Array  # (m,) share of the variance along each component
 
     def __init__(
@@ -45,7 +55,8 @@ class PCA(Components):
             components >= 1 and components != int(components)
         ):
             raise InputError(
-                f"components must be a whole number or a share of variance below 1, got {components}"
+                "components must be a whole number or a share of variance below 1, "
+                f"got {components}"
             )
         at_least("clusters", clusters, 1)
         if not 0.0 < quantile <= 1.0:
@@ -55,27 +66,34 @@ class PCA(Components):
         self._quantile = quantile
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
+        """Learn the space from joint angles (T, 63). Raises ValueError if too few."""
         angles = angles_of(angles, max(self._clusters, int(self._components) + 1, 2))
         self.mean = rounded(angles.mean(axis=0))  # SAPSO 2.1.1
         self.components, self.explained = principal(
             angles - self.mean, self._components
         )
         latents = rounded(self.transform(angles))
-        unit = 10.0**-DECIMALS  # by which rounding may have moved a frame inwards
+        unit = 10.0**-DECIMALS  # rounding may have moved a frame inwards by this much
         # SAPSO 2.2 constraint 1
-        self.low, self.high = latents.min(axis=0) - unit, latents.max(axis=0) + unit
+        self.low = latents.min(axis=0) - unit
+        self.high = latents.max(axis=0) + unit
         self.centres, self.reach = clusters_of(latents, self._clusters, self._quantile)
         return self
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
+        """Return which latents (n, m) are closer than chi to a cluster's centre (n,).
+
+        SAPSO 2.2, constraint 2.
+        """
         # SAPSO 2.2 constraint 2
         return np.asarray(distances(writeable(latents), self.centres) < self.reach)
 
 
 def angles_of(angles: Array, least: int) -> Array:
-    """Return joint angles (T, 63) as float64. Raises ValueError where they are not, or fewer than `least` frames."""
+    """Return joint angles (T, 63) as float64.
+
+    Raises ValueError if they are not finite, or if there are fewer than `least` frames.
+    """
     angles = np.asarray(angles, dtype=np.float64)
     if angles.ndim != 2 or angles.shape[1] != 63:
         raise InputError(f"angles must have shape (T, 63), got {angles.shape}")
@@ -83,16 +101,18 @@ def angles_of(angles: Array, least: int) -> Array:
         raise InputError(f"angles must hold at least {least} frames, got {len(angles)}")
     if not np.isfinite(angles).all():
         raise InputError(
-            f"angles must be finite, got {np.count_nonzero(~np.isfinite(angles))} that are not"
+            "angles must be finite, "
+            f"got {np.count_nonzero(~np.isfinite(angles))} that are not"
         )
     return angles
 
 
 @jit
 def distances(latents: Array, centres: Array) -> Array:
-    """Return the distance D (n,) of latents (n, m or more) from the nearest of centres (K, m): the L1 distance over m.
+    """Return the distance D (n,) of latents (n, m or more) from the nearest centre.
 
-    For a population NumPy takes a quarter of the time that the cost of its poses takes.
+    It is the mean absolute difference of the m components. The loop is compiled because
+    NumPy would take a quarter of the time that the cost of the poses takes.
     """
     nearest = np.full(len(latents), np.inf)
     for i in range(len(latents)):
@@ -105,29 +125,43 @@ def distances(latents: Array, centres: Array) -> Array:
 
 
 def clusters_of(latents: Array, clusters: int, quantile: float) -> tuple[Array, Array]:
-    """Return the centres (K, m) that K-means finds among training latents (n, m), and chi (), how far one reaches."""
-    # the same as scikit-learn's, whose import takes two seconds
+    """Return the centres (K, m) of clusters of latents (n, m), and their reach chi ().
+
+    K-means finds the centres.
+    """
+    centres = _centres_of(latents.tobytes(), latents.shape[1], clusters).copy()
+    # Interpretation S5
+    return centres, np.array(np.quantile(distances(latents, centres), quantile))
+
+
+@lru_cache(maxsize=8)
+def _centres_of(latents_bytes: bytes, m: int, clusters: int) -> Array:
+    """Return the centres (K, m) among latents (n, m), given as their bytes.
+
+    They are kept, as pictures that are fitted one by one learn from the same motions.
+    """
+    # gives the same as scikit-learn, whose import takes two seconds
     from scipy.cluster.vq import kmeans2
 
+    latents = np.frombuffer(latents_bytes).reshape(-1, m)
     count = min(clusters, len(np.unique(latents, axis=0)))
     rng = np.random.default_rng(CLUSTERING_SEED)
     with warnings.catch_warnings():
-        # a run in which a cluster has lost its poses is not the best
+        # warns of runs in which a cluster becomes empty; they are not the best
         warnings.simplefilter("ignore")
         runs = [
             kmeans2(latents, count, CLUSTERING_ROUNDS, minit="++", rng=rng)
             for _ in range(CLUSTERING_STARTS)
         ]
     best, _ = min(runs, key=lambda run: float(((latents - run[0][run[1]]) ** 2).sum()))
-    centres = rounded(best)
-    # Interpretation S5
-    return centres, np.array(np.quantile(distances(latents, centres), quantile))
+    return rounded(best)
 
 
 def principal(centred: Array, components: float) -> tuple[Array, Array]:
-    """Return the principal directions (m, 63) of centred joint angles (T, 63), and each one's share of variance (m,).
+    """Return principal directions (m, 63), and the share of variance of each (m,).
 
-    The largest number of a direction is above 0.
+    They are those of centred joint angles (T, 63). Signs are chosen such that the
+    number of largest magnitude in each direction is positive.
     """
     if components > centred.shape[1]:
         raise InputError(
@@ -135,31 +169,33 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
         )
     _, spread, directions = np.linalg.svd(centred, full_matrices=False)  # SAPSO 2.1.2
     share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
-    count = (
-        int(components)
-        if components >= 1
-        else int(np.searchsorted(share.cumsum(), components)) + 1
-    )
+    count = int(components)
+    if components < 1:
+        # the fewest directions with this share of the variance
+        count = int(np.searchsorted(share.cumsum(), components)) + 1
     directions = directions[:count]
     longest = np.take_along_axis(
         directions, np.abs(directions).argmax(axis=1)[:, None], axis=1
     )
-    return _orthonormal(
-        rounded(np.where(longest < 0.0, -directions, directions))
-    ), rounded(share[:count])
+    directions = np.where(longest < 0.0, -directions, directions)
+    return _orthonormal(rounded(directions)), rounded(share[:count])
 
 
 def rounded(numbers: Array) -> Array:
     """Return numbers with seven decimals.
 
-    Libraries of linear algebra differ in the last digits from processor to processor, and a search makes degrees of
-    them. Rounded, the same frames give the same space everywhere.
+    The last digits of linear algebra differ from processor to processor, and a search
+    turns them into degrees. Rounded, the same frames give the same space everywhere.
     """
     return np.asarray(np.round(numbers, DECIMALS) + 0.0)  # no -0.0
 
 
 def _orthonormal(directions: Array) -> Array:
-    """Return nearly orthonormal directions (m, 63), orthonormal to the last digits, without a library's sums."""
+    """Return rounded directions (m, 63), orthonormal again to the last digits.
+
+    The Gram-Schmidt process uses no linear algebra library, so its digits are the same
+    everywhere.
+    """
     basis: list[Array] = []
     for direction in directions:
         for other in basis:

@@ -1,4 +1,4 @@
-"""Decompositions of scikit-learn that have an inverse, as priors: `sklearn:KernelPCA`, `sklearn:FactorAnalysis`."""
+"""Decompositions of scikit-learn with an inverse, as priors: `sklearn:KernelPCA`."""
 
 import importlib
 import json
@@ -22,27 +22,29 @@ from posefit_priors.pca import (
     distances,
 )
 
-# of `sklearn.decomposition`, those that have an inverse or are linear
+# classes of `sklearn.decomposition` that have an inverse or are linear
 VARIANTS = (
-    "DictionaryLearning", "FactorAnalysis", "FastICA", "IncrementalPCA", "KernelPCA", "MiniBatchDictionaryLearning",
-    "MiniBatchSparsePCA", "PCA", "SparsePCA", "TruncatedSVD",
+    "DictionaryLearning", "FactorAnalysis", "FastICA", "IncrementalPCA", "KernelPCA",
+    "MiniBatchDictionaryLearning", "MiniBatchSparsePCA", "PCA", "SparsePCA",
+    "TruncatedSVD",
 )  # fmt: skip
-KERNEL_POSES = 5_000  # of a KernelPCA, whose memory is their square
+# largest number of poses for KernelPCA, which needs the square of it in memory
+KERNEL_POSES = 5_000
 DEFAULTS: dict[str, dict[str, Any]] = {
     "KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}
 }
 
 
 class Transformed:
-    """The space of a scikit-learn transformer, with the paper's constraints 1 and 2 on its latents.
+    """The space of a scikit-learn transformer, with constraints 1 and 2 on its latents.
 
-    A linear transformer is inverted by our own loop; any other row by row, about 100 us each, since the same row must
-    always give the same bits.
+    A linear transformer is inverted by our own loop. Any other is inverted row by row,
+    about 100 us each, because a row must always give the same bits.
 
     Settings:
         variant: the class, such as KernelPCA; `sklearn:NAME` sets it.
         components (m): its `n_components`, 1 or more.
-        options: its other parameters, a JSON object.
+        options: its other parameters, as a JSON object.
     """
 
     low: Array  # (m,)
@@ -62,11 +64,15 @@ class Transformed:
         _built(variant, components, options)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
+        """Learn the space from joint angles (T, 63).
+
+        Raises ValueError if the class cannot learn from them, or has no inverse.
+        """
         angles = angles_of(angles, max(CLUSTERS, self._settings[1] + 1))
         if self._settings[0] == "KernelPCA" and len(angles) > KERNEL_POSES:
             raise InputError(
-                f"KernelPCA must learn from at most {KERNEL_POSES} poses, got {len(angles)}"
+                f"KernelPCA must learn from at most {KERNEL_POSES} poses, "
+                f"got {len(angles)}"
             )
         self._model = _built(*self._settings)
         self._model.fit(angles)
@@ -74,10 +80,12 @@ class Transformed:
         if latents.ndim != 2 or latents.shape[1] < 1 or not np.isfinite(latents).all():
             name = type(self._model).__name__
             raise InputError(
-                f"variant must give finite latents (n, m), got {latents.shape} from {name}"
+                "variant must give finite latents (n, m), "
+                f"got {latents.shape} from {name}"
             )
         self._linear = _linear(self._model, latents.shape[1])
-        self.low, self.high = latents.min(axis=0), latents.max(axis=0)
+        self.low = latents.min(axis=0)
+        self.high = latents.max(axis=0)
         self.centres, self.reach = clusters_of(latents, CLUSTERS, QUANTILE)
         return self
 
@@ -101,12 +109,15 @@ class Transformed:
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). As SAPSO 2.2."""
+        """Return which latents (n, m) are closer than chi to a cluster's centre (n,).
+
+        As SAPSO 2.2.
+        """
         return np.asarray(distances(writeable(latents), self.centres) < self.reach)
 
 
 def _built(variant: str, components: int, options: str) -> Any:
-    """Return the transformer. Raises ValueError where there is none of that name, or its parameters are others."""
+    """Return the transformer. Raises ValueError if a name or parameter is unknown."""
     one_of("variant", variant, VARIANTS)
     kind = getattr(importlib.import_module("sklearn.decomposition"), variant)
     try:
@@ -125,16 +136,18 @@ def _built(variant: str, components: int, options: str) -> Any:
     }
     if unknown := sorted(set(parameters) - set(known)):
         raise InputError(
-            f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}"
+            f"options of {variant} must be among {', '.join(sorted(known))}, "
+            f"got {', '.join(unknown)}"
         )
-    return kind(
-        **{name: value for name, value in defaults.items() if name in known}
-        | parameters
-    )
+    parameters = {
+        **{name: value for name, value in defaults.items() if name in known},
+        **parameters,
+    }
+    return kind(**parameters)
 
 
 def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
-    """Return the matrix (m, 63) and the mean (63,) of a transformer whose inverse is linear; None of another."""
+    """Return the matrix (m, 63) and mean (63,) of a linear inverse, or None."""
     if type(model).__name__ == "FactorAnalysis":
         return writeable(model.components_), writeable(model.mean_)
     probe = np.vstack(
@@ -148,7 +161,8 @@ def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
         ) from None
     if images.shape != (len(probe), 63):
         raise InputError(
-            f"variant must give back 63 angles, got {images.shape[1:]} from {type(model).__name__}"
+            "variant must give back 63 angles, "
+            f"got {images.shape[1:]} from {type(model).__name__}"
         )
     matrix = images[1:-1] - images[0]
     if np.allclose(

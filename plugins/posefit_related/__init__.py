@@ -1,18 +1,25 @@
-"""The methods that the SAPSO paper compares itself with, each from its publication, on posefit's masks and budget.
+"""The methods with which the SAPSO paper compares, from their publications.
 
-- `hpso.HPSO`: a swarm that searches the body's chain part by part (John, Trucco and Ivekovic, 2010).
+They run on posefit's masks and budget.
+
+- `hpso.HPSO`: a swarm that searches the kinematic chain part by part (John, Trucco and
+  Ivekovic, 2010).
 - `haga.HAGA`: an annealed genetic search in layers of coordinates (Zhao and Liu, 2008).
-- `psopf.PSOPF`: a particle filter whose particles a swarm moves (Krzeszowski, Kwolek and Wojciechowski, 2010).
+- `psopf.PSOPF`: a particle filter whose particles are moved by a swarm (Krzeszowski,
+  Kwolek and Wojciechowski, 2010).
 - `local.Local`: best-first search, limb after limb (Gavrila and Davis, 1996).
-- `smoothing.Smoothing`: a particle filter smoothed backwards (Peursum, Venkatesh and West, 2010).
-- `gradient.Gradient`: Gauss and Newton's steps to the contours (Wachter and Nagel, 1999).
-- `regression.Regression`: poses from silhouettes by regression (Agarwal and Triggs, 2006).
-- `isomap.IsomapPrior`: an Isomap with a local linear way back (Wang, Xu and Ai, 2003).
-- `gplvm.GPLVM`: latents of a Gaussian process (Urtasun, Fleet, Hertzmann and Fua, 2005).
+- `smoothing.Smoothing`: a particle filter with backward smoothing (Peursum, Venkatesh
+  and West, 2010).
+- `gradient.Gradient`: Gauss-Newton steps to the contours (Wachter and Nagel, 1999).
+- `regression.Regression`: poses from silhouettes by regression (Agarwal and Triggs,
+  2006).
+- `isomap.IsomapPrior`: an Isomap with a local linear inverse (Wang, Xu and Ai, 2003).
+- `gplvm.GPLVM`: latents of a Gaussian process (Urtasun, Fleet, Hertzmann and Fua,
+  2005).
 
-`stages` has what the searches share, `frames` what the trackers share, `training` the poses that models learn from.
-None of these publications was at hand in full: docs/ways/related.md says what was, and docstrings name the rest
-interpretations.
+The searches share `stages`, the trackers share `frames`, and the models learn from
+poses of `training`. None of these publications was available in full.
+docs/ways/related.md lists what was; docstrings name everything else as interpretations.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="psopf", frames=(0, 3))

@@ -1,4 +1,4 @@
-"""What the trackers share: the costs of poses in a frame, first poses, and a frame from a pose."""
+"""Functions that the trackers share: costs of poses, first poses, finished frames."""
 
 import cv2
 import numpy as np
@@ -14,19 +14,32 @@ YAW_REACH = np.radians(45.0)  # ours: to either side of a known first yaw
 def costs_of(
     task: Task, observation: Observation, poses: Array, places: Array
 ) -> Array:
-    """Return the costs (n,) of poses (n, 66) with their root at places (n, 3). SAPSO (4)."""
-    return pose_costs(task.body, task.cameras, observation.silhouettes, poses, places)[
-        0
-    ]
+    """Return the costs (n,) of poses (n, 66) with their root at places (n, 3).
+
+    SAPSO (4).
+    """
+    costs, _ = pose_costs(
+        task.body, task.cameras, observation.silhouettes, poses, places
+    )
+    return costs
 
 
 def first_poses(task: Task, rng: np.random.Generator, count: int) -> Array:
-    """Return poses (count, 66) for a first frame: random training poses, or the known one, at yaws near a known yaw."""
+    """Return poses (count, 66) to begin with in a first frame.
+
+    They are random training poses, or the known first pose. Their yaws are near the
+    known yaw, or random.
+    """
     poses = training_poses(task)
     poses = poses[rng.integers(len(poses), size=count)]
     if task.first_pose is not None:
-        poses[:, 1:3], poses[:, 3:] = 0.0, task.first_pose
-    middle, reach = (0.0, np.pi) if task.yaw is None else (task.yaw, YAW_REACH)
+        poses[:, 1:3] = 0.0
+        poses[:, 3:] = task.first_pose
+    middle = 0.0
+    reach = np.pi
+    if task.yaw is not None:
+        middle = task.yaw
+        reach = YAW_REACH
     poses[:, 0] = middle + rng.uniform(-reach, reach, count)
     return poses
 
@@ -44,7 +57,7 @@ def squared_distances(first: Array, second: Array) -> Array:
 def frame_of(
     task: Task, observation: Observation, pose: Array, place: Array, evaluations: int
 ) -> Frame:
-    """Return the frame of a pose (66,) at a place (3,); its cost is one more evaluation."""
+    """Return the frame of a pose (66,) at a place (3,). Its cost is one evaluation."""
     costs, counts = pose_costs(
         task.body, task.cameras, observation.silhouettes, pose[None], place[None]
     )
@@ -54,10 +67,11 @@ def frame_of(
 def place_of(
     task: Task, observation: Observation, pose: Array, place: Array
 ) -> tuple[Array, int]:
-    """Return the place (3,) of the root, known or estimated by a mask, and how many poses were drawn for that.
+    """Return the place (3,) of the root, and the number of poses drawn to estimate it.
 
-    The mask of the first view that shows something is compared with that of the pose at `place`: the ratio of their
-    heights gives the depth, the offset of their centres the direction.
+    A known place is returned as it is. Otherwise the first view that shows something
+    compares its mask with that of the pose at `place`. The ratio of their heights gives
+    the depth, and the offset of their centres the direction.
     """
     if observation.translation is not None:
         return np.array(observation.translation, dtype=np.float64), 0
@@ -78,7 +92,12 @@ def place_of(
 
 
 def _box(mask: NDArray[np.bool_]) -> tuple[Array, Array] | None:
-    """Return the centre (2,) and the size (2,), columns and rows, of a mask's bounding box; None where it is empty."""
+    """Return centre (2,) and size (2,) of a mask's bounding box, or None if empty.
+
+    Both are in columns and rows.
+    """
     left, top, width, height = cv2.boundingRect(np.asarray(mask, dtype=np.uint8))
     size = np.array([width, height], dtype=np.float64)
-    return (np.array([left, top]) + size / 2.0, size) if width else None
+    if not width:
+        return None
+    return np.array([left, top]) + size / 2.0, size

@@ -1,13 +1,15 @@
 """A Gaussian process latent variable model of poses.
 
-R. Urtasun, D. Fleet, A. Hertzmann, P. Fua, Priors for people tracking from small training sets, ICCV 2005. Poses are
-functions of few latents, drawn from a Gaussian process that is scaled for each angle; latents and kernel are those of
-the highest likelihood for a small set of poses. The SAPSO paper objects that such a space is hardly continuous along a
-motion, so that poses between those of training come out badly.
+R. Urtasun, D. Fleet, A. Hertzmann, P. Fua, Priors for people tracking from small
+training sets, ICCV 2005. Poses are functions of a few latents. The functions are drawn
+from a Gaussian process that is scaled for each angle. Latents and kernel have the
+highest likelihood for a small set of poses. The SAPSO paper objects that such a space
+is hardly continuous along a motion, so that poses between the training poses are poor.
 
-Interpretations: angles are scaled by their deviations; L-BFGS fits the model, starting from principal components; the
-latents of a pose are the mean of those of the nearest training poses, by the inverse of their squared distance; a
-latent is feasible where the process is certain enough, instead of a cost that grows with its variance.
+Interpretations: angles are scaled by their standard deviations. L-BFGS fits the model,
+and starts from principal components. The latents of a pose are a mean over the nearest
+training poses, weighted by the inverse squared distance. A latent is feasible if the
+process is certain enough; the publication has a cost that grows with the variance.
 """
 
 from typing import Self
@@ -19,22 +21,26 @@ from posefit.plugin import Array, at_least
 from posefit_related.frames import squared_distances
 from posefit_related.training import evenly, training_angles
 
-STEPS = 150  # ours: of L-BFGS
-NEAREST = 4  # ours: training poses whose latents a pose has
-# ours: of a feasible latent, as a share of the process's own variance
+STEPS = 150  # ours: iterations of L-BFGS
+NEAREST = 4  # ours: number of training poses that determine a pose's latents
+# ours: largest variance of a feasible latent, as a share of the process's variance
 MAX_VARIANCE = 0.7
 
 
 def kernel(first: Array, second: Array, logs: Array) -> Array:
-    """Return the covariances (n, k) of latents (n, m) and (k, m): exp(logs) are variance and inverse square width."""
+    """Return the covariances (n, k) of latents (n, m) and (k, m).
+
+    exp(logs) are the variance and the inverse square width.
+    """
     squares = ((first[:, None] - second) ** 2).sum(axis=2)
     return np.asarray(np.exp(logs[0] - 0.5 * np.exp(logs[1]) * squares))
 
 
 def loss(parameters: Array, y: Array) -> tuple[float, Array]:
-    """Return the negative log posterior of latents and kernel, but for a constant, and its gradient.
+    """Return the negative log posterior of latents and kernel, and its gradient.
 
-    `parameters` are the latents (n, m), then the logarithms of variance, inverse square width and noise; `y` (n, D).
+    A constant is left out. `parameters` are the latents (n, m), then the logarithms of
+    variance, inverse square width and noise. `y` (n, D) are the scaled angles.
     """
     n = len(y)
     logs = parameters[-3:]
@@ -63,7 +69,7 @@ class GPLVM:
 
     Settings:
         components: dimensions of a latent, 1 or more.
-        poses: of the training poses, the most that are used, 20 or more.
+        poses: largest number of training poses to use, 20 or more.
     """
 
     low: Array  # (m,)
@@ -76,18 +82,18 @@ class GPLVM:
         self._poses = poses
 
     def fit(self, angles: Array, skeleton: object = None) -> Self:
-        """Learn from joint angles (T, 63). Raises ValueError where they are not, or too few."""
+        """Learn from joint angles (T, 63). Raises ValueError if they are unusable."""
         angles = training_angles(angles, max(NEAREST, self._components) + 1)
-        self.angles, self.mean = evenly(angles, self._poses), angles.mean(axis=0)
+        self.angles = evenly(angles, self._poses)
+        self.mean = angles.mean(axis=0)
         self.scale = np.maximum(angles.std(axis=0), 1e-3)  # URTASUN2005 (scales)
         y = (self.angles - self.mean) / self.scale
-        # not before it is needed: it takes a third of a second
+        # imported only when needed: it takes a third of a second
         from scipy.optimize import minimize
 
         scores, sizes, _ = np.linalg.svd(y, full_matrices=False)
-        x = (scores * np.sqrt(len(y)))[:, : self._components] * (sizes > 1e-9)[
-            : self._components
-        ]
+        nonzero = (sizes > 1e-9)[: self._components]
+        x = (scores * np.sqrt(len(y)))[:, : self._components] * nonzero
         start = np.concatenate([x.ravel(), [0.0, 0.0, np.log(0.05)]])
         end = np.asarray(
             minimize(
@@ -101,16 +107,16 @@ class GPLVM:
         )
         self.latents = end[:-3].reshape(len(y), -1)
         self.logs = end[-3:]
-        noisy = kernel(self.latents, self.latents, self.logs) + (
-            np.exp(self.logs[2]) + 1e-6
-        ) * np.eye(len(y))
+        smooth = kernel(self.latents, self.latents, self.logs)  # (n, n)
+        noisy = smooth + (np.exp(self.logs[2]) + 1e-6) * np.eye(len(y))
         self.inverse = np.linalg.inv(noisy)
         self.factors = self.inverse @ y
-        self.low, self.high = self.latents.min(axis=0), self.latents.max(axis=0)
+        self.low = self.latents.min(axis=0)
+        self.high = self.latents.max(axis=0)
         return self
 
     def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63): those of the nearest training poses."""
+        """Return the latents (n, m) of joint angles (n, 63), from similar poses."""
         squares = squared_distances(
             np.asarray(angles) / self.scale, self.angles / self.scale
         )
@@ -120,7 +126,7 @@ class GPLVM:
         return np.asarray(np.einsum("nk,nkm->nm", weights, self.latents[nearest]))
 
     def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m): the mean of the process."""
+        """Return joint angles (n, 63), the mean of the process, at latents (n, m)."""
         near = kernel(np.asarray(latents), self.latents, self.logs)
         # URTASUN2005 (mean)
         return np.asarray(
@@ -128,7 +134,7 @@ class GPLVM:
         )
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return where the process is certain enough (n,)."""
+        """Return whether the process is certain enough (n,) at latents (n, m)."""
         near = kernel(np.asarray(latents), self.latents, self.logs)
         # URTASUN2005 (variance)
         explained = np.einsum("nk,kl,nl->n", near, self.inverse, near)

@@ -1,12 +1,14 @@
-"""Gauss and Newton's steps from the predicted pose to the contours of the masks.
+"""Gauss-Newton steps from the predicted pose to the contours of the masks.
 
-S. Wachter, H.-H. Nagel, Tracking persons in monocular image sequences, Computer Vision and Image Understanding 74(3),
-1999. A body of cones is tracked by an iterated extended Kalman filter: the motion is predicted at constant velocity,
-and the pose that fits the picture's edges best is found from there by iterated linearisation.
+S. Wachter, H.-H. Nagel, Tracking persons in monocular image sequences, Computer Vision
+and Image Understanding 74(3), 1999. An iterated extended Kalman filter tracks a body of
+cones. It predicts the motion at constant velocity. From there, iterated linearisation
+finds the pose that fits the picture's edges best.
 
-Interpretations: the edges are the masks' contours, fitted as posefit smooths footage, robust against outliers; the
-covariance of the prediction is diagonal and the same in all frames; region information is not used. A step counts as
-the evaluations that take as long. The first pose is the best of some training poses.
+Interpretations: the edges are the masks' contours, fitted like posefit's smoothing of
+footage, robust against outliers. The covariance of the prediction is diagonal and the
+same in all frames. Region information is not used. A step counts as the number of
+evaluations that take the same time. The first pose is the best of some training poses.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,8 +26,8 @@ from posefit.plugin import (
 )
 from posefit_related.frames import costs_of, first_poses, frame_of, place_of
 
-FIRST_SHARE = 0.5  # ours: of a first frame's evaluations, for the pose to begin with
-# ours: metres that a known root, and a predicted one, is off
+FIRST_SHARE = 0.5  # ours: of a first frame's evaluations, to find the first pose
+# ours: standard deviations of a known and of a predicted root, in metres
 KNOWN_SHIFT = 0.003
 SHIFT = 0.05
 
@@ -35,7 +37,7 @@ class Gradient:
 
     Settings:
         turn_degrees: standard deviation of an angle from its prediction, above 0.
-        damping: share of the velocity that the prediction has, 0 or more.
+        damping: share of the velocity that the prediction retains, 0 or more.
     """
 
     def __init__(
@@ -43,11 +45,9 @@ class Gradient:
     ) -> None:
         positive("turn_degrees", turn_degrees)
         at_least("damping", damping, 0.0)
-        self.task, self.turn, self.damping = (
-            task,
-            float(np.radians(turn_degrees)),
-            damping,
-        )
+        self.task = task
+        self.turn = float(np.radians(turn_degrees))
+        self.damping = damping
 
     def track(
         self, observations: Iterable[Observation], rng: np.random.Generator
@@ -59,7 +59,8 @@ class Gradient:
             if not latest:
                 pose, place, used = self._first(observation, rng)
             else:
-                (pose, place), used = predicted(latest, self.damping), 0
+                pose, place = predicted(latest, self.damping)
+                used = 0
             if observation.translation is not None:
                 place = np.array(observation.translation, dtype=np.float64)
             if observation.usable:
@@ -101,8 +102,12 @@ class Gradient:
 
 
 def predicted(latest: list[tuple[Array, Array]], damping: float) -> tuple[Array, Array]:
-    """Return the pose and the place that the last two lead to at constant velocity; one stays where it is."""
-    (pose, place), (before, place_before) = latest[-1], latest[0]
+    """Return the pose and place predicted from the last two at constant velocity.
+
+    A single one is returned as it is.
+    """
+    pose, place = latest[-1]
+    before, place_before = latest[0]
     turns = (pose - before + np.pi) % (2.0 * np.pi) - np.pi
     # WACHTER1999 (prediction)
     return pose + damping * turns, place + damping * (place - place_before)

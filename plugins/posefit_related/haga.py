@@ -1,13 +1,16 @@
-"""Hierarchical annealed genetic algorithm: a genetic search whose selection sharpens, over ever more coordinates.
+"""Hierarchical annealed genetic algorithm: layers of more and more coordinates.
 
-X. Zhao, Y. Liu, Generative tracking of 3D human motion by hierarchical annealed genetic algorithm, Pattern Recognition
-41(8), 2008. Its abstract says: principal components of motion capture are naturally hierarchical, and the search uses
-that; an annealed genetic algorithm finds poses.
+X. Zhao, Y. Liu, Generative tracking of 3D human motion by hierarchical annealed genetic
+algorithm, Pattern Recognition 41(8), 2008. According to its abstract, principal
+components of motion capture are naturally hierarchical, and the search uses this
+hierarchy; an annealed genetic algorithm finds the poses.
 
-Interpretations: a layer opens the next share of the coordinates, the root and the leading components first, and the
-others stay at the prediction until then; chances to be a parent are exp(-cost / temperature), and the temperature falls
-geometrically in each layer, and the mutations with it; children lie between their parents, coordinate by coordinate,
-or a little beyond; the best so far survives.
+Interpretations: each layer opens the next share of the coordinates, the root and the
+leading components first. Until then a coordinate keeps its predicted value. The
+probability of becoming a parent is proportional to exp(-cost / temperature). In each
+layer the temperature falls geometrically, and the mutations shrink with it. Coordinate
+by coordinate, children lie between their parents or a little beyond. The best
+individual so far survives.
 """
 
 import math
@@ -28,21 +31,23 @@ from posefit.plugin import (
 )
 from posefit_related.stages import EVALUATIONS, middle, opened
 
-# ours: of the first and the last generation of a layer, in units of the cost
+# ours: temperatures of a layer's first and last generation, in units of the cost
 TEMPERATURES = 5.0, 0.2
-# ours: how far beyond its parents a child may lie, as a share of their distance
+# ours: how far beyond its parents a child may lie, in units of their distance
 BEYOND = 0.25
 
 
 class HAGA:
-    """Generations in layers: each layer searches more coordinates, and anneals from a high temperature to a low one.
+    """A genetic search in layers of more and more coordinates, each annealed.
 
     Settings:
         population_size: 2 or more.
-        layers: of coordinates, 1 or more.
-        evaluations: of a frame, shared among the layers, 1 or more. Ours: as many as SAPSO's.
-        mutation: chance that a coordinate of a child is changed, 0 to 1.
-        spread: standard deviation of a first mutation, in half-ranges of the box, where nothing is predicted; above 0.
+        layers: number of layers of coordinates, 1 or more.
+        evaluations: budget of a frame, shared among the layers, 1 or more. Ours: as
+            many as SAPSO's.
+        mutation: probability that a child's coordinate is mutated, 0 to 1.
+        spread: standard deviation of the first mutations without a prediction, in
+            half-ranges of the box, above 0.
     """
 
     def __init__(
@@ -61,38 +66,35 @@ class HAGA:
         at_least("evaluations", evaluations, 1)
         between("mutation", mutation, 0.0, 1.0)
         positive("spread", spread)
-        self._space, self._rng, self._size = (
-            space,
-            rng,
-            min(population_size, evaluations),
-        )
+        self._space = space
+        self._rng = rng
+        self._size = min(population_size, evaluations)
         self._layers = layers
         self._mutation = mutation
         self._generations = max(evaluations // (self._size * layers), 1)
-        self._spread = (
-            np.full(space.dimensions, spread)
-            if space.start is None
-            else space.start.spread
-        )
+        self._spread = np.full(space.dimensions, spread)
+        if space.start is not None:
+            self._spread = space.start.spread
         self._layer = self._generation = self._waiting = 0
         self._best = middle(space, rng)
         self._best_cost = np.inf
         self._x = self._grown(np.tile(self._best, (self._size, 1)), 0)
 
     def ask(self) -> Array:
-        """Return the individuals (n, d) of this generation; none after the last layer."""
+        """Return this generation's individuals (n, d), none after the last layer."""
         self._waiting = self._size if self._layer < self._layers else 0
         return self._x[: self._waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Let the next generation descend from this one by its costs (n,), and in a new layer open coordinates."""
+        """Breed the next generation from the costs (n,) of this one.
+
+        A new layer also opens coordinates.
+        """
         check_tell(self._waiting, proposals, costs)
         costs = np.where(np.isnan(costs), np.inf, costs)
         if costs.min() < self._best_cost:
-            self._best, self._best_cost = (
-                proposals[costs.argmin()].copy(),
-                float(costs.min()),
-            )
+            self._best = proposals[costs.argmin()].copy()
+            self._best_cost = float(costs.min())
         children = self._children(np.array(proposals), costs)
         self._generation = self._generation + 1
         self._waiting = 0
@@ -100,11 +102,8 @@ class HAGA:
             before = self._opened_count()
             self._generation = 0
             self._layer = self._layer + 1
-            children = (
-                self._grown(children, before)
-                if self._layer < self._layers
-                else children
-            )
+            if self._layer < self._layers:
+                children = self._grown(children, before)
         children[0] = self._best  # ZHAO2008 (elite)
         self._x = children
 
@@ -112,7 +111,7 @@ class HAGA:
         return opened(self._space.dimensions, self._layer, self._layers)
 
     def _grown(self, x: Array, before: int) -> Array:
-        """Return individuals (n, d) whose coordinates that a layer opens are drawn."""
+        """Return individuals (n, d) with random values in newly opened coordinates."""
         now = self._opened_count()
         drawn = draw_population(self._space, self._rng, self._size)
         grown = x.copy()
@@ -120,13 +119,14 @@ class HAGA:
         return repair(self._space, grown, self._best)
 
     def temperature(self) -> float:
-        """Return the temperature of this generation: it falls geometrically in each layer."""
+        """Return the temperature of this generation, which falls geometrically."""
         first, last = TEMPERATURES
         share = self._generation / max(self._generations - 1, 1)
         return first * math.exp(share * math.log(last / first))  # ZHAO2008 (annealing)
 
     def _children(self, x: Array, costs: Array) -> Array:
-        n, d, count = *x.shape, self._opened_count()
+        n, d = x.shape
+        count = self._opened_count()
         fitness = weigh(costs, 1.0 / self.temperature())  # ZHAO2008 (selection)
         mothers = x[self._rng.choice(n, n, p=fitness)]
         fathers = x[self._rng.choice(n, n, p=fitness)]

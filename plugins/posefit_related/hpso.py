@@ -1,12 +1,16 @@
-"""Hierarchical particle swarm optimisation: a swarm that searches the kinematic chain part by part.
+"""Hierarchical particle swarm optimisation: searches the kinematic chain by parts.
 
-V. John, E. Trucco, S. Ivekovic, Markerless human articulated tracking using hierarchical particle swarm optimisation,
-Image and Vision Computing 28(11), 2010. The pose is searched in a fixed order along the chain, the whole body's place
-and orientation first; each stage is a swarm over a few coordinates, with all others held.
+V. John, E. Trucco, S. Ivekovic, Markerless human articulated tracking using
+hierarchical particle swarm optimisation, Image and Vision Computing 28(11), 2010. The
+pose is searched in a fixed order along the chain. The place and orientation of the
+whole body come first. Each stage is a swarm over a few coordinates, while all others
+are fixed.
 
-Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut a limb; among the components of
-a prior, stages go from coarse to fine. Where nothing is predicted, the best of some random poses is the start. The
-inertia is that of SAPSO's paper. What leaves the box or becomes infeasible goes towards the best of the stage before.
+Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut
+a limb. Over the components of a prior, stages go from coarse to fine. Without a
+prediction, the search starts from the best of some random poses. The inertia is that of
+the SAPSO paper. A particle that leaves the box or becomes infeasible moves towards the
+best of the previous stage.
 """
 
 import math
@@ -28,15 +32,20 @@ from posefit_related.stages import EVALUATIONS, first_population, runs
 
 
 class HPSO:
-    """A swarm for each run of coordinates, one after another; what a stage found is held in those that follow.
+    """A swarm for each run of coordinates, one after another.
+
+    The coordinates found by a stage are fixed in the stages that follow.
 
     Settings:
-        population_size: of a swarm, 1 or more.
-        run_length: coordinates of a stage after the root's, 1 or more.
-        evaluations: of a frame, shared among the stages, 1 or more. Ours: as many as SAPSO's.
-        inertia (A): factor on the old velocity at first, above 0.1; falls towards 0.1 in each stage.
-        acceleration: of the pulls towards the personal and the swarm's best, 0 or more.
-        alpha: velocities stay within it, in half-ranges of the box, above 0. Ours.
+        population_size: size of each swarm, 1 or more.
+        run_length: number of coordinates of a stage after the root's, 1 or more.
+        evaluations: budget of a frame, shared among the stages, 1 or more. Ours: as
+            many as SAPSO's.
+        inertia (A): first factor on the old velocity, above 0.1; it falls towards 0.1
+            in each stage.
+        acceleration: factor on the pulls towards the personal best and the swarm's
+            best, 0 or more.
+        alpha: velocity limit, in half-ranges of the box, above 0. Ours.
     """
 
     def __init__(
@@ -57,12 +66,10 @@ class HPSO:
         between("inertia", inertia, 0.1, math.inf, ends=False)
         at_least("acceleration", acceleration, 0.0)
         positive("alpha", alpha)
-        self._space, self._rng, self._size = (
-            space,
-            rng,
-            min(population_size, evaluations),
-        )
-        # -1: the first poses
+        self._space = space
+        self._rng = rng
+        self._size = min(population_size, evaluations)
+        # stage -1 evaluates the first poses
         self._runs = runs(space.dimensions, run_length)
         self._stage = -1
         self._waiting = 0
@@ -76,28 +83,25 @@ class HPSO:
         self._v = np.zeros_like(self._x)
         self._generation = 0
         self._estimate = self._x[0]
-        self._pbest, self._pbest_cost = self._x, np.full(len(self._x), np.inf)
+        self._pbest = self._x
+        self._pbest_cost = np.full(len(self._x), np.inf)
 
     def ask(self) -> Array:
-        """Return the particles (n, d) of this stage; none after the last stage."""
+        """Return the particles (n, d) of this stage, none after the last stage."""
         self._waiting = len(self._x) if self._stage < len(self._runs) else 0
         return self._x[: self._waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Remember the bests and move on, after the last move of a stage to the next one."""
+        """Update the bests and move; after a stage's last move begin the next stage."""
         check_tell(self._waiting, proposals, costs)
         self._waiting = 0
         if self._stage < 0:
-            self._pbest, self._pbest_cost = (
-                np.array(proposals),
-                np.where(np.isnan(costs), np.inf, costs),
-            )
+            self._pbest = np.array(proposals)
+            self._pbest_cost = np.where(np.isnan(costs), np.inf, costs)
         else:
             better = costs < self._pbest_cost
-            self._pbest[better], self._pbest_cost[better] = (
-                proposals[better],
-                costs[better],
-            )
+            self._pbest[better] = proposals[better]
+            self._pbest_cost[better] = costs[better]
             self._generation += 1
             if self._generation < self._generations:
                 self._move()
@@ -109,17 +113,16 @@ class HPSO:
             self._begin()
 
     def _begin(self) -> None:
-        """Spread the swarm over the coordinates of its stage, around the estimate of those before."""
+        """Spread the swarm over the stage's coordinates, around the estimate so far."""
         run = self._runs[self._stage]
         x = np.tile(self._estimate, (self._size, 1))
         # JOHN2010 (stage)
         x[1:, run] = draw_population(self._space, self._rng, self._size)[1:, run]
-        self._x, self._v, self._generation = (
-            repair(self._space, x, self._estimate),
-            np.zeros_like(x),
-            0,
-        )
-        self._pbest, self._pbest_cost = self._x.copy(), np.full(self._size, np.inf)
+        self._x = repair(self._space, x, self._estimate)
+        self._v = np.zeros_like(x)
+        self._generation = 0
+        self._pbest = self._x.copy()
+        self._pbest_cost = np.full(self._size, np.inf)
 
     def _move(self) -> None:
         run = self._runs[self._stage]

@@ -1,13 +1,15 @@
-"""An Isomap of poses with a local linear way back.
+"""An Isomap of poses with a local linear inverse.
 
-Q. Wang, G. Xu, H. Ai, Learning object intrinsic structure for robust visual tracking, CVPR 2003. Isomap gives poses of
-training coordinates that keep their geodesic distances; the way back from such coordinates to a pose, which Isomap does
-not have, is a linear model of the nearest training poses. The SAPSO paper calls the lack of a closed-form inverse the
-largest obstacle of manifolds.
+Q. Wang, G. Xu, H. Ai, Learning object intrinsic structure for robust visual tracking,
+CVPR 2003. Isomap gives training poses coordinates that preserve their geodesic
+distances. It has no way back from coordinates to a pose; a linear model of the nearest
+training poses is used instead. The SAPSO paper calls the lack of a closed-form inverse
+the largest obstacle of manifolds.
 
-Interpretations: the linear model has the weights that rebuild the coordinates best from those of the nearest poses
-(Roweis and Saul, 2000), damped; a latent is feasible if a training pose is near enough; poses have as few neighbours in
-the graph as connect all of them; at most `poses` training poses are used, evenly spaced.
+Interpretations: the weights of the linear model rebuild the coordinates best from those
+of the nearest poses (Roweis and Saul, 2000), damped. A latent is feasible if a training
+pose is near enough. Poses have the smallest number of neighbours in the graph that
+connects all of them. At most `poses` training poses are used, evenly spaced.
 """
 
 import warnings
@@ -19,24 +21,28 @@ from numpy.typing import NDArray
 from posefit.plugin import Array, at_least
 from posefit_related.training import evenly, training_angles
 
-NEIGHBOURS = 8  # ours: of a pose in the graph; more where they do not connect all poses
-NEAREST = 6  # ours: training poses of the way back
-# ours: of its weights, as a share of the neighbours' mean squared distance
+# ours: neighbours of a pose in the graph; more if they do not connect all poses
+NEIGHBOURS = 8
+NEAREST = 6  # ours: training poses that the inverse combines
+# ours: damping of its weights, as a share of the neighbours' mean squared distance
 DAMPING = 1e-2
-# ours: of a feasible latent from a training pose, as a share of the range's half
-# diagonal
+# ours: largest distance of a feasible latent from a training pose, as a share of the
+# range's half diagonal
 REACH = 0.5
 
 
 def rebuilt(latents: Array, centres: Array, angles: Array) -> Array:
-    """Return angles (n, 63) of latents (n, m), by a linear model of the nearest centres (T, m) with angles (T, 63)."""
+    """Return angles (n, 63) of latents (n, m) by a linear model of nearby poses.
+
+    `centres` (T, m) are the latents of the training poses, `angles` (T, 63) their
+    angles.
+    """
     squares = ((latents[:, None] - centres) ** 2).sum(axis=2)
     nearest = np.argsort(squares, axis=1, kind="stable")[:, :NEAREST]
     away = centres[nearest] - latents[:, None]
     gram = np.einsum("nkm,nlm->nkl", away, away)
-    gram += (DAMPING * np.einsum("nkk->n", gram) / gram.shape[1] + 1e-12)[
-        :, None, None
-    ] * np.eye(gram.shape[1])
+    damping = DAMPING * np.einsum("nkk->n", gram) / gram.shape[1] + 1e-12  # (n,)
+    gram += damping[:, None, None] * np.eye(gram.shape[1])
     weights = np.linalg.solve(gram, np.ones((*gram.shape[:2], 1)))[..., 0]
     weights /= weights.sum(axis=1, keepdims=True)
     # WANG2003 (way back)
@@ -44,11 +50,11 @@ def rebuilt(latents: Array, centres: Array, angles: Array) -> Array:
 
 
 class IsomapPrior:
-    """Geodesic coordinates of poses, and a local linear way back.
+    """Geodesic coordinates of poses, with a local linear inverse.
 
     Settings:
         components: dimensions of a latent, 1 or more.
-        poses: of the training poses, the most that are used, 20 or more.
+        poses: largest number of training poses to use, 20 or more.
     """
 
     low: Array  # (m,)
@@ -61,14 +67,14 @@ class IsomapPrior:
         self._poses = poses
 
     def fit(self, angles: Array, skeleton: object = None) -> Self:
-        """Learn from joint angles (T, 63). Raises ValueError where they are not, or too few."""
+        """Learn from joint angles (T, 63). Raises ValueError if they are unusable."""
         from sklearn.manifold import Isomap
 
         angles = training_angles(angles, max(NEIGHBOURS, self._components) + 1)
         self.angles = evenly(angles, self._poses)
         for neighbours in range(NEIGHBOURS, len(self.angles)):
             with warnings.catch_warnings():
-                warnings.simplefilter("error")  # a graph in several pieces
+                warnings.simplefilter("error")  # the graph has several pieces
                 try:
                     model = Isomap(
                         n_neighbors=neighbours, n_components=self._components
@@ -78,13 +84,15 @@ class IsomapPrior:
                     continue
         else:
             raise ValueError(
-                f"angles must be of poses near each other, got {len(angles)} that no graph connects"
+                "angles must be of similar poses, "
+                f"got {len(angles)} that no graph of neighbours connects"
             )
         self._model: Any = model
         # WANG2003 (Isomap)
         self.centres = np.asarray(model.embedding_, dtype=np.float64)
         latents = np.concatenate([self.centres, self.transform(angles)])
-        self.low, self.high = latents.min(axis=0), latents.max(axis=0)
+        self.low = latents.min(axis=0)
+        self.high = latents.max(axis=0)
         self.reach = REACH * 0.5 * float(np.linalg.norm(self.high - self.low))
         return self
 
@@ -97,6 +105,6 @@ class IsomapPrior:
         return rebuilt(np.asarray(latents, dtype=np.float64), self.centres, self.angles)
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return which latents (n, m) have a training pose near them (n,)."""
+        """Return which latents (n, m) are near a training pose (n,)."""
         squares = ((np.asarray(latents)[:, None] - self.centres) ** 2).sum(axis=2)
         return np.asarray(squares.min(axis=1) <= self.reach**2)

@@ -1,12 +1,15 @@
-"""Local search by parts: the root first, then limb after limb, each by best-first search.
+"""Local search by parts: the root, then limb after limb, each by best-first search.
 
-D. Gavrila, L. Davis, 3-D model-based tracking of humans in action: a multi-view approach, CVPR 1996. Its abstract says
-that pose recovery is a search for the pose whose synthesised appearance is most similar to the picture's, by a
-decomposition of the space and a best-first technique.
+D. Gavrila, L. Davis, 3-D model-based tracking of humans in action: a multi-view
+approach, CVPR 1996. According to its abstract, pose recovery is a search for the pose
+with the synthesised appearance most similar to the picture's. It decomposes the space
+and uses a best-first technique.
 
-Interpretations: parts are runs of neighbouring coordinates, see `stages`; the neighbours of a pose are a step to either
-side in each coordinate of the part; a part ends after some expansions without a better pose; when all parts were
-searched without one, the step is halved. Where nothing is predicted, the best of some random poses is the start.
+Interpretations: parts are runs of neighbouring coordinates, see `stages`. The
+neighbours of a pose are one step to either side in each coordinate of the part. A part
+ends after some expansions without a better pose. If a round over all parts finds none,
+the step is halved. Without a prediction, the search starts from the best of some random
+poses.
 """
 
 from heapq import heappop, heappush
@@ -25,17 +28,18 @@ from posefit.plugin import (
 from posefit_related.stages import EVALUATIONS, first_population, runs
 
 MIN_STEP = 1e-3  # ours: half-ranges of the box
-SAME_POSE = 1e-9  # poses whose coordinates all differ by less are one
+# poses are equal if all their coordinates differ by less
+SAME_POSE = 1e-9
 
 
 class Local:
-    """Best-first search in one part after another, over and over with smaller steps.
+    """Best-first search in one part after another, in rounds with smaller steps.
 
     Settings:
-        run_length: coordinates of a part after the root's, 1 or more.
-        step: between neighbours at first, in half-ranges of the box, above 0.
+        run_length: number of coordinates of a part after the root's, 1 or more.
+        step: first distance between neighbours, in half-ranges of the box, above 0.
         patience: expansions without a better pose that end a part, 1 or more.
-        evaluations: of a frame, 1 or more. Ours: as many as SAPSO's.
+        evaluations: budget of a frame, 1 or more. Ours: as many as SAPSO's.
     """
 
     def __init__(
@@ -55,12 +59,10 @@ class Local:
         self._space = space
         self._rng = rng
         self._patience = patience
-        self._step, self._runs, self._part, self._waiting = (
-            step,
-            runs(space.dimensions, run_length),
-            0,
-            0,
-        )
+        self._step = step
+        self._runs = runs(space.dimensions, run_length)
+        self._part = 0
+        self._waiting = 0
         self._next = first_population(space, rng, evaluations)
         self._best = self._next[0]
         self._best_cost = np.inf
@@ -77,16 +79,15 @@ class Local:
         return self._next.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """File the poses by their costs, and expand the best that was not expanded."""
+        """File the poses by their costs, and expand the best one not yet expanded."""
         check_tell(self._waiting, proposals, costs)
-        self._waiting, costs = 0, np.where(np.isnan(costs), np.inf, costs)
+        self._waiting = 0
+        costs = np.where(np.isnan(costs), np.inf, costs)
         better = bool(costs.min() < self._best_cost)
         if better:
-            self._best, self._best_cost = (
-                proposals[costs.argmin()].copy(),
-                float(costs.min()),
-            )
-        if not len(self._closed):  # the first poses are of no part
+            self._best = proposals[costs.argmin()].copy()
+            self._best_cost = float(costs.min())
+        if not len(self._closed):  # the first poses belong to no part
             self._restart()
         else:
             self._improved |= better
@@ -99,7 +100,11 @@ class Local:
         self._next = self._expanded()
 
     def _expanded(self) -> Array:
-        """Return the new neighbours (n, d) of the best pose that was not expanded; later parts where it has none."""
+        """Return the new neighbours (n, d) of the best pose not yet expanded.
+
+        If the part has none, later parts are tried, and then random poses near the
+        best.
+        """
         for _ in range(2 * len(self._runs)):
             while self._open:
                 pose = heappop(self._open)[2]  # GAVRILA1996 (best first)
@@ -107,11 +112,8 @@ class Local:
                     np.eye(self._space.dimensions)[self._runs[self._part]] * self._step
                 )
                 near = repair(self._space, pose + np.concatenate([moves, -moves]), pose)
-                new: Array = near[
-                    (np.abs(near[:, None] - self._closed).max(axis=2) > SAME_POSE).all(
-                        axis=1
-                    )
-                ]
+                away = np.abs(near[:, None] - self._closed).max(axis=2)  # (n, closed)
+                new: Array = near[(away > SAME_POSE).all(axis=1)]
                 if len(new):
                     return new
             self._next_part()
@@ -125,9 +127,8 @@ class Local:
     def _next_part(self) -> None:
         self._part = (self._part + 1) % len(self._runs)  # GAVRILA1996 (decomposition)
         if self._part == 0:
-            self._step = (
-                self._step if self._improved else max(0.5 * self._step, MIN_STEP)
-            )
+            if not self._improved:
+                self._step = max(0.5 * self._step, MIN_STEP)
             self._improved = False
         self._restart()
 

@@ -1,12 +1,13 @@
-"""A particle filter with a swarm in it: the particles of each frame fly to where the silhouette fits better.
+"""A particle filter with a swarm, which moves the particles to better fits.
 
-T. Krzeszowski, B. Kwolek, K. Wojciechowski, Articulated body motion tracking by combined particle swarm optimization
-and particle filtering, ICCVG 2010, LNCS 6374. Particles that survived a frame move as the person may have; then they
-are the swarm of a particle swarm optimisation, which shifts them; from there they are weighted and resampled.
+T. Krzeszowski, B. Kwolek, K. Wojciechowski, Articulated body motion tracking by
+combined particle swarm optimization and particle filtering, ICCVG 2010, LNCS 6374.
+Particles that survive a frame move as the person may have moved. A particle swarm
+optimisation then shifts them. The shifted particles are weighted and resampled.
 
-Interpretations: the swarm is Clerc and Kennedy's with its usual constants; the particles that are weighted are the
-personal bests; their weights are exp(-sharpness cost), without a factor for the shift, so they are no fair sample of
-the posterior.
+Interpretations: the swarm is Clerc and Kennedy's with its usual constants. The personal
+bests are the particles that are weighted. Their weights are exp(-sharpness cost),
+without a factor for the shift, so they are not a fair sample of the posterior.
 """
 
 import numpy as np
@@ -27,20 +28,23 @@ from posefit.plugin import (
 )
 from posefit_related.stages import EVALUATIONS
 
-# Clerc and Kennedy 2002: the constriction, and the acceleration of either pull
+# Clerc and Kennedy 2002: the constriction, and the acceleration of each pull
 CHI = 0.7298
 PHI = 2.05
 
 
 class PSOPF:
-    """Particles that are resampled, moved by noise, and then by a swarm, in every frame.
+    """Particles that are resampled, moved by noise, then by a swarm, in every frame.
 
     Settings:
-        evaluations: of a frame, shared among the moves, 1 or more. Ours: as many as SAPSO's.
-        iterations: moves of the swarm in a frame, 0 or more; at 0 it is a plain particle filter.
+        evaluations: budget of a frame, shared among the moves, 1 or more. Ours: as many
+            as SAPSO's.
+        iterations: moves of the swarm in a frame, 0 or more; 0 gives a plain particle
+            filter.
         sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
-        noise: standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
-        alpha: velocities stay within it, in half-ranges of the box, above 0. Ours.
+        noise: standard deviation of the motion from frame to frame, in half-ranges of
+            the box, above 0. Ours.
+        alpha: velocity limit, in half-ranges of the box, above 0. Ours.
     """
 
     def __init__(
@@ -69,19 +73,23 @@ class PSOPF:
         self._begin(draw_population(space, rng, evaluations // (self._iterations + 1)))
 
     def _begin(self, x: Array) -> None:
-        self._x, self._v, self._moves = x, np.zeros_like(x), 0
-        self._pbest, self._pbest_cost = x.copy(), np.full(len(x), np.inf)
+        self._x = x
+        self._v = np.zeros_like(x)
+        self._moves = 0
+        self._pbest = x.copy()
+        self._pbest_cost = np.full(len(x), np.inf)
 
     def ask(self) -> Array:
-        """Return the particles (n, d) after their move; none after the last one of a frame."""
+        """Return the particles (n, d) after their move, none after the last move."""
         self._waiting = len(self._x) if self._moves <= self._iterations else 0
         return self._x[: self._waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Remember the bests, and unless this was the last move, let the swarm move on."""
+        """Update the bests, and move the swarm unless the frame is finished."""
         check_tell(self._waiting, proposals, costs)
         better = costs < self._pbest_cost
-        self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
+        self._pbest[better] = proposals[better]
+        self._pbest_cost[better] = costs[better]
         self._moves = self._moves + 1
         self._waiting = 0
         if self._moves > self._iterations:
@@ -97,7 +105,7 @@ class PSOPF:
         self._x = repair(self._space, self._x + self._v, self._pbest)
 
     def advance(self, space: Space) -> None:
-        """Let the particles survive by the weights of where the swarm brought them, and move into the next frame."""
+        """Resample the particles by their bests' weights, and enter the next frame."""
         weights = weigh(self._pbest_cost, self._sharpness)  # KRZESZOWSKI2010 (weights)
         rows = systematic_rows(weights, self._rng.random(), len(weights))
         moved = converted(space, self._pbest[rows], self._space)

@@ -1,13 +1,15 @@
-"""Poses from silhouettes by regression: no body is drawn to fit a frame.
+"""Poses from silhouettes by regression. No body is drawn to fit a frame.
 
-A. Agarwal, B. Triggs, Recovering 3D human pose from monocular images, IEEE Trans. Pattern Analysis and Machine
-Intelligence 28(1), 2006. A silhouette becomes a histogram: the shape contexts of its border's points vote for the words
-of a codebook. Kernel regression on rendered training poses gives the pose; in a sequence the predicted pose is a second
-input, since one silhouette may be of several poses.
+A. Agarwal, B. Triggs, Recovering 3D human pose from monocular images, IEEE Trans.
+Pattern Analysis and Machine Intelligence 28(1), 2006. A silhouette becomes a histogram:
+the shape contexts of its border points vote for the words of a codebook. Kernel
+regression on rendered training poses gives the pose. In a sequence the predicted pose
+is a second input, since several poses may have the same silhouette.
 
-Interpretations: damped least squares over a kernel at every training pose, where the publication prefers a relevance
-vector machine for its sparseness; a product of kernels of silhouette and predicted pose; several views side by side.
-Rendering the training poses is in no frame's budget.
+Interpretations: damped least squares with a kernel at every training pose, where the
+publication prefers the sparse relevance vector machine; a product of kernels of
+silhouette and predicted pose; the histograms of several views side by side. Rendering
+the training poses counts in no frame's budget.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,27 +21,28 @@ from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, 
 from posefit_related.frames import frame_of, place_of, squared_distances
 from posefit_related.training import training_poses
 
-POINTS = 80  # ours: of a border, at most
+POINTS = 80  # ours: largest number of border points
 # ours: the bins of a shape context
 SECTORS = 12
 RINGS = 5
-# ours: of training poses to either side of a known first yaw
+# ours: range of training poses to either side of a known first yaw
 YAW_REACH = np.radians(90.0)
-# ours: of a vote for a word, as a share of the root mean square distance from the words
+# ours: width of a vote, as a share of the root mean square distance from the words
 VOTE_WIDTH = 0.25
-# ours: that training's predicted poses are off, in standard deviations of each number
+# ours: noise of the predicted poses in training, in standard deviations of each number
 PREDICTION_NOISE = 0.5
-DAMPING = 0.5  # ours: share of the velocity that the prediction has
-# ours: of the factors of the kernel
+DAMPING = 0.5  # ours: share of the velocity that the prediction retains
+# ours: sharpnesses of the factors of the kernel
 SILHOUETTE_SHARPNESS = 3.0
 YAW_SHARPNESS = 0.3
 ANGLES_SHARPNESS = 0.5
 
 
 def contexts(mask: NDArray[np.bool_]) -> Array:
-    """Return the shape contexts (n, 60) of points on a mask's border: the shares of the other points in each bin.
+    """Return the shape contexts (n, 60) of points on a mask's border.
 
-    The bins lie around the point, `SECTORS` in each of `RINGS` whose radii double.
+    A shape context is the share of the other points in each bin around a point. There
+    are `SECTORS` bins in each of `RINGS` rings, whose radii double.
     """
     padded = np.pad(np.asarray(mask, dtype=bool), 1)
     inner = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
@@ -66,23 +69,25 @@ def contexts(mask: NDArray[np.bool_]) -> Array:
 
 
 def histogram(shapes: Array, words: Array) -> Array:
-    """Return the votes (k,) of contexts (n, 60) for the words (k, 60) of a codebook; they sum to 1."""
+    """Return the votes (k,) of contexts (n, 60) for a codebook's words (k, 60).
+
+    They sum to 1.
+    """
     squares = squared_distances(shapes, words)
     squares -= squares.min(axis=1, keepdims=True)
-    votes = np.exp(
-        -squares / (2.0 * (VOTE_WIDTH * np.sqrt(squares.mean()) + 1e-9) ** 2)
-    )
+    width = VOTE_WIDTH * np.sqrt(squares.mean()) + 1e-9
+    votes = np.exp(-squares / (2.0 * width**2))
     # AGARWAL2006 (histogram)
     return np.asarray((votes / votes.sum(axis=1, keepdims=True)).mean(axis=0))
 
 
 class Regression:
-    """Kernel regression from silhouettes, and in a sequence also from the predicted pose.
+    """Kernel regression from silhouettes, and in a sequence from predicted poses too.
 
     Settings:
-        samples: training poses, each at a random yaw, 10 or more.
-        words: of the codebook, 2 or more.
-        ridge: of the regression, above 0.
+        samples: number of training poses, each at a random yaw, 10 or more.
+        words: size of the codebook, 2 or more.
+        ridge: damping of the regression, above 0.
     """
 
     def __init__(
@@ -93,12 +98,12 @@ class Regression:
         at_least("samples", samples, 10)
         at_least("words", words, 2)
         positive("ridge", ridge)
-        self.task, rng = task, np.random.default_rng(0)
+        self.task = task
+        rng = np.random.default_rng(0)
         poses = training_poses(task)
         poses = poses[rng.integers(len(poses), size=samples)]
-        poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * (
-            np.pi if task.yaw is None else YAW_REACH
-        ) + (task.yaw or 0.0)
+        reach = np.pi if task.yaw is None else YAW_REACH
+        poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * reach + (task.yaw or 0.0)
         shapes = [
             [contexts(project(task.body, view, pose, task.anchor)) for pose in poses]
             for view in task.cameras
@@ -119,16 +124,14 @@ class Regression:
             ((self.histograms - self.histograms.mean(axis=0)) ** 2).sum(axis=1).mean()
         )
         values = regressed(poses)
-        self.mean, self.scale = (
-            values.mean(axis=0),
-            np.maximum(values.std(axis=0), 1e-3),
-        )
+        self.mean = values.mean(axis=0)
+        self.scale = np.maximum(values.std(axis=0), 1e-3)
         self.targets = (values - self.mean) / self.scale
         self.predictions = self.targets + PREDICTION_NOISE * rng.standard_normal(
             values.shape
         )
-        # by how many numbers of the predicted pose are known: none, two of the yaw, or
-        # all
+        # a set of factors for each number of known values of the predicted pose: none,
+        # the yaw's two, or all
         self.factors = {}
         for known in (0, 2, values.shape[1]):
             gram = self._kernel(self.histograms, self.predictions, known)
@@ -171,11 +174,18 @@ class Regression:
         pose = np.concatenate(
             [[yaw or 0.0, 0.0, 0.0], np.zeros(63) if angles is None else angles]
         )
-        known = 0 if yaw is None else 2 if angles is None else len(self.mean)
+        known = len(self.mean)
+        if yaw is None:
+            known = 0
+        elif angles is None:
+            known = 2
         return (regressed(pose[None])[0] - self.mean) / self.scale, known
 
     def _kernel(self, histograms: Array, predictions: Array, known: int) -> Array:
-        """Return the kernels (n, samples) of silhouettes, and of the first `known` numbers of predicted poses."""
+        """Return the kernels (n, samples) of silhouettes and predicted poses.
+
+        Only the first `known` numbers of a predicted pose are compared.
+        """
         scales = np.sqrt(
             np.repeat([YAW_SHARPNESS / 2, ANGLES_SHARPNESS / 65], [2, 65])
         )[:known]
@@ -191,5 +201,5 @@ class Regression:
 
 
 def regressed(poses: Array) -> Array:
-    """Return the numbers (n, 67) that are regressed: cosine and sine of the yaw, and the other angles of poses."""
+    """Return the regressed numbers (n, 67): yaw's cosine and sine, the other angles."""
     return np.column_stack([np.cos(poses[:, 0]), np.sin(poses[:, 0]), poses[:, 1:]])

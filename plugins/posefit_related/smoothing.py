@@ -1,14 +1,16 @@
-"""A particle filter whose weights are smoothed backwards: later frames correct earlier ones.
+"""A particle filter with backward smoothing: later frames correct earlier ones.
 
-P. Peursum, S. Venkatesh, G. West, A study on smoothing for particle-filtered 3D human body tracking, International
-Journal of Computer Vision 87, 2010. Of its three smoothed inferences this is the first, particle-filtered backwards
-smoothing: a filter goes forwards, and then particles are weighted again from the last frame to the first. Its abstract
-says that smoothing hardly improves the filtered estimate.
+P. Peursum, S. Venkatesh, G. West, A study on smoothing for particle-filtered 3D human
+body tracking, International Journal of Computer Vision 87, 2010. This is the first of
+its three smoothed inferences, particle-filtered backwards smoothing. A filter runs
+forwards; then particles are weighted again from the last frame to the first. According
+to its abstract, smoothing hardly improves the filtered estimate.
 
-Interpretations: the backward weights are those of Doucet, Godsill and Andrieu (2000). The motion is a random walk of
-the pose's principal components, as wide as training moves from frame to frame, and not the publication's
-model. The heaviest particles of a frame stand for all. A frame's pose is the weighted mean, of filtered weights
-where `backwards` is off.
+Interpretations: the backward weights are those of Doucet, Godsill and Andrieu (2000).
+The publication's motion model is replaced by a random walk of the pose's principal
+components, as wide as training poses change from frame to frame. Only a frame's
+heaviest particles are smoothed. A frame's pose is the weighted mean, with the filter's
+weights if `backwards` is off.
 """
 
 from collections.abc import Iterable, Iterator
@@ -28,8 +30,8 @@ from posefit.plugin import (
 from posefit_related.frames import costs_of, first_poses, frame_of
 from posefit_related.training import training_poses
 
-HEAVIEST = 600  # ours: particles of a frame that are smoothed
-# ours: least deviations a frame of yaw and place
+HEAVIEST = 600  # ours: number of particles of a frame that are smoothed
+# ours: smallest standard deviations per frame, of yaw and place
 MIN_STEPS = np.array([np.radians(2.0), 0.005, 0.005, 0.005])
 
 
@@ -37,10 +39,12 @@ class Smoothing:
     """A bootstrap filter over all frames, and a backward pass over its weights.
 
     Settings:
-        components: of the pose, 1 or more. Ours.
-        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
-        spread: of the motion, as a multiple of how training moves from frame to frame, above 0. Ours.
-        backwards: whether weights are smoothed; else they are the filter's.
+        components: number of principal components of the pose, 1 or more. Ours.
+        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0.
+            Ours.
+        spread: width of the motion, as a multiple of the change of training poses
+            from frame to frame, above 0. Ours.
+        backwards: whether weights are smoothed; if not, the filter's are used.
     """
 
     def __init__(
@@ -68,7 +72,7 @@ class Smoothing:
     def track(
         self, observations: Iterable[Observation], rng: np.random.Generator
     ) -> Iterator[Frame]:
-        """Yield a frame for each observation, once all were filtered."""
+        """Yield a frame for each observation, after all of them are filtered."""
         sequence = list(observations)
         states = list[Array]()
         weights = list[Array]()
@@ -117,7 +121,7 @@ class Smoothing:
         return np.column_stack([states[:, 0], self.mean + states[:, 4:] @ self.axes])
 
     def _training_steps(self) -> Array:
-        """Return the root mean squares (4 + m,) of how states of training change in a frame of the task."""
+        """Return the root mean square change (4 + m,) of training states in a frame."""
         squares = []
         for motion in self.task.training:
             moved = np.column_stack(
@@ -136,14 +140,17 @@ class Smoothing:
 
 
 def differences(states: Array, origin: Array) -> Array:
-    """Return states (..., 4 + m) less an origin, the short way round in the yaw."""
+    """Return states (..., 4 + m) minus an origin, the short way round in yaw."""
     away = states - origin
     away[..., 0] = (away[..., 0] + np.pi) % (2.0 * np.pi) - np.pi
     return np.asarray(away)
 
 
 def smoothed(states: list[Array], weights: list[Array], steps: Array) -> list[Array]:
-    """Return the weights (n,) of each frame's states (n, D) given all frames, for normal steps (D,) between frames."""
+    """Return the weights (n,) of each frame's states (n, D), given all frames.
+
+    Steps between frames are normal, with standard deviations `steps` (D,).
+    """
     after = weights[-1:]
     for now, later, weight in reversed(
         list(zip(states, states[1:], weights, strict=False))

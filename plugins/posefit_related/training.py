@@ -1,4 +1,4 @@
-"""What is learned from: the poses of the training motions, checked, and as many of them as a model takes."""
+"""Training poses: collected from the motions, checked, and thinned out."""
 
 import numpy as np
 
@@ -6,14 +6,18 @@ from posefit.plugin import Array, Task
 
 
 def training_poses(task: Task) -> Array:
-    """Return the poses (T, 66) of all training motions. Raises ValueError where there is none."""
+    """Return the poses (T, 66) of all training motions. Raises ValueError if none."""
     if not task.training:
         raise ValueError("training must hold a motion to learn from, got none")
     return np.concatenate([motion.poses for motion in task.training])
 
 
 def training_angles(angles: Array, least: int) -> Array:
-    """Return joint angles as an array (T, 63). Raises ValueError for another shape, or for less than `least` frames."""
+    """Return joint angles (T, 63) as an array.
+
+    Raises ValueError if the shape is wrong, a number is not finite, or there are fewer
+    than `least` frames.
+    """
     angles = np.asarray(angles, dtype=np.float64)
     if angles.ndim != 2 or angles.shape[1] != 63 or not np.isfinite(angles).all():
         raise ValueError(f"angles must be finite and (T, 63), got {angles.shape}")

@@ -1,16 +1,20 @@
-"""The experiments of the two publications, and the benchmark: `posefit reproduce` and `posefit bench`.
+"""The experiments of the two publications, and the benchmark.
 
-    posefit reproduce sapso  Acta Automatica Sinica 38(5): its tables, figures and claims, and what each part is worth
-    posefit reproduce vsmm   CN101894278: four activities, by default and to the letter, against an IMM over all models
-    posefit bench            how fast the loop is
+    posefit reproduce sapso  Acta Automatica Sinica 38(5): tables, figures, claims,
+                             and the effect of each part of the method
+    posefit reproduce vsmm   CN101894278: four activities, by default and to the
+                             letter, compared with an IMM over all models
+    posefit bench            the speed of the loop
 
 Other measurements are scripts in the repository's folder `docs/studies`.
 
     commands.py     the command lines
-    experiment.py   the shape of both: runs that are stored, and tables, claims and figures made of them
-    sapso/, vsmm/   the experiments; `sapso/letter.py` is an optimiser, `sapso-letter`
-    bench/          the benchmark
-    jobs.py         runs jobs in processes, by the pool of `posefit sweep`
+        experiment.py   what both share: stored runs; tables, claims and figures from
+        them
+        sapso/, vsmm/   the experiments; `sapso/letter.py` is an optimiser,
+        `sapso-letter`
+        bench/          the benchmark
+        jobs.py         runs jobs in the worker processes of `posefit sweep`
 """
 
 from posefit import hookimpl
@@ -28,7 +32,7 @@ def posefit_register_commands(register: RegisterCommand) -> None:
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Offer `sapso-letter`, which the reproduction of the SAPSO paper compares with `sapso`."""
+    """Register `sapso-letter`, which the SAPSO reproduction compares with `sapso`."""
     from posefit_reproduce.sapso.letter import LetterSAPSO
 
     register("sapso-letter", LetterSAPSO)

@@ -1,7 +1,7 @@
 """`posefit reproduce` and `posefit bench`.
 
-`posefit --help` imports this module, so it imports click and posefit's own output only; a command imports the rest when
-it runs.
+`posefit --help` imports this module. It therefore imports only click and posefit's
+output; a command imports the rest when it runs.
 """
 
 from collections.abc import Iterator, Mapping
@@ -23,7 +23,7 @@ def reproduce_group() -> None:
     """Repeat the experiments of the two publications."""
 
 
-# of a `Scale`
+# settings of a quick `Scale`
 QUICK: dict[str, Any] = {
     "seeds": 2,
     "frames": 15,
@@ -34,16 +34,21 @@ QUICK: dict[str, Any] = {
 OUT = click.option(
     "--out",
     metavar="DIR",
-    help="Folder of runs, tables and figures; continues an earlier one there.",
+    help="Folder for runs, tables and figures. An earlier run there is continued.",
 )
 WORKERS = click.option(
-    "--workers", type=int, default=2, show_default=True, metavar="N", help="Processes."
+    "--workers",
+    type=int,
+    default=2,
+    show_default=True,
+    metavar="N",
+    help="Number of processes.",
 )
 CLIPS = click.option(
     "--clips",
     envvar="POSEFIT_CMU",
     metavar="CMU_DIR",
-    help="Folder of CMU clips; by default POSEFIT_CMU, else the library.",
+    help="Folder of CMU clips; by default POSEFIT_CMU, or else the library.",
 )
 
 
@@ -53,12 +58,15 @@ CLIPS = click.option(
     type=int,
     default=10,
     show_default=True,
-    help="Films, of those that no default was chosen on.",
+    help="Number of films, all different from those on which defaults were chosen.",
 )
 @OUT
 @WORKERS
 def vsmm_command(films: int, out: str | None, workers: int) -> None:
-    """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, by its letter and by default."""
+    """Stepping, waving, jumping jacks and squats, by default and to the letter.
+
+    The experiment of CN101894278.
+    """
     from posefit_reproduce.vsmm.experiment import Scale
 
     _run(patent_experiment(Scale(films)), out, workers)
@@ -71,24 +79,29 @@ def vsmm_command(films: int, out: str | None, workers: int) -> None:
     type=int,
     default=10,
     show_default=True,
-    help="Tracks of each method, motion and view.",
+    help="Number of tracks of each method, motion and view.",
 )
 @click.option(
     "--quick",
     is_flag=True,
-    help=f"{QUICK['frames']} frames, {len(QUICK['views'])} views and {QUICK['seeds']} seeds.",
+    help=(
+        f"Only {QUICK['frames']} frames, {len(QUICK['views'])} views "
+        f"and {QUICK['seeds']} seeds."
+    ),
 )
 @OUT
 @WORKERS
 def sapso_command(
     clips: str | None, seeds: int, quick: bool, out: str | None, workers: int
 ) -> None:
-    """A walk, a walk with a turn and a run: Acta Automatica Sinica 38(5), and what each part of its method is worth."""
+    """A walk, a walk with a turn and a run, and the effect of each part of the method.
+
+    The experiments of Acta Automatica Sinica 38(5).
+    """
     from posefit_reproduce.sapso.experiment import Scale
 
-    _run(
-        paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers
-    )
+    scale = Scale(**QUICK) if quick else Scale(seeds)
+    _run(paper_experiment(clips, scale), out, workers)
 
 
 def _run(experiment: "Experiment", out: str | None, workers: int) -> None:
@@ -102,14 +115,15 @@ def _run(experiment: "Experiment", out: str | None, workers: int) -> None:
 @click.option(
     "--threads",
     type=click.IntRange(1),
-    help="Threads of the multi-threaded figures; by default every core.",
+    help="Threads of the multi-threaded figures; by default all cores.",
 )
 @JSON
 def bench_command(threads: int | None, as_json: bool) -> None:
-    """Time the kernel, the OpenCV way, and every optimiser's ask and tell, all in one run.
+    """Time the kernel, OpenCV, and ask and tell of every optimiser, all in one run.
 
-    `cpu` names the processor that the loops are compiled for: this machine's, or the one that the environment variable
-    NUMBA_CPU_NAME names, such as x86-64-v3, which has AVX2 and no AVX-512, or x86-64-v2, which has SSE4.
+    `cpu` is the processor for which the loops are compiled: this machine's, or the one
+    in the environment variable NUMBA_CPU_NAME. Examples are x86-64-v3, which has AVX2
+    and no AVX-512, and x86-64-v2, which has SSE4.
     """
     from posefit_reproduce.bench.loop import loop_figures
 
@@ -119,18 +133,20 @@ def bench_command(threads: int | None, as_json: bool) -> None:
 
 
 def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:
-    """Yield every figure with its name, those of a group as `group.name`."""
+    """Yield every figure with its name; figures of a group are named `group.name`."""
     for name, value in figures.items():
         if isinstance(value, Mapping):
             yield from _named_lines(value, f"{group}{name}.")
         else:
-            yield f"{group + name:50} " + (
-                f"{value:.4g}" if isinstance(value, float) else str(value)
-            )
+            text = f"{value:.4g}" if isinstance(value, float) else str(value)
+            yield f"{group + name:50} {text}"
 
 
 def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
-    """Return the paper's experiment on CMU clips of a folder, or of the library. Raises InputError where clips lack."""
+    """Return the paper's experiment on CMU clips, from a folder or the library.
+
+    Raises InputError if clips are missing.
+    """
     from posefit_reproduce.experiment import Experiment
     from posefit_reproduce.sapso.experiment import loaded, perform
     from posefit_reproduce.sapso.motions import digests
@@ -153,7 +169,7 @@ def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
 
 
 def patent_experiment(scale: Any) -> "Experiment":
-    """Return the patent's experiment. Raises InputError where there are no films."""
+    """Return the patent's experiment. Raises InputError if there are no films."""
     from posefit_reproduce.experiment import Experiment
     from posefit_reproduce.vsmm.experiment import perform
     from posefit_reproduce.vsmm.tables import patent_tables

@@ -1,7 +1,8 @@
-"""The one shape of an experiment: runs that are stored as they end, and tables, claims and figures made of them.
+"""An experiment: stored runs, and the tables, claims and figures made from them.
 
-A run gives named arrays. With a folder each is a file in `runs/`, so that the same command continues where an earlier
-one ended; every table is a Markdown file beside them, from which pages are made.
+A run gives named arrays. Each run is a file in `runs/` of the folder, so that the same
+command continues where it was interrupted. Every table is a Markdown file, from which
+pages are made.
 """
 
 import json
@@ -30,30 +31,28 @@ from posefit_reproduce.jobs import Progress, each
 
 RECORD = "runs.json"
 MAX_RECORD_BYTES = 100_000
-LEVEL = 0.95  # of an interval, or of all the intervals of a table of claims together
+# confidence of an interval; in a table of claims, of all intervals together
+LEVEL = 0.95
 Arrays = Mapping[str, Any]
 Verdict = Literal["holds", "fails", "not decided"]
 
 
 class Run(NamedTuple):
-    """Names what is run."""
+    """Identifies a run."""
 
-    kind: str  # what is done
-    subject: str  # the motion or film that it is done with
+    kind: str  # of the experiment
+    subject: str  # the motion or film
     method: str
     view: float = 0.0  # degrees
     seed: int = 0
 
     @property
     def file(self) -> str:
-        """The name of its file."""
-        return re.sub(
-            r"[^\w.+-]+",
-            "_",
-            "-".join(
-                f"{part:g}" if isinstance(part, float) else str(part) for part in self
-            ),
-        )
+        """The name of the run's file."""
+        parts = []
+        for part in self:
+            parts.append(f"{part:g}" if isinstance(part, float) else str(part))
+        return re.sub(r"[^\w.+-]+", "_", "-".join(parts))
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ class Results:
     runs: Mapping[Run, Arrays]
 
     def of(self, name: str, kind: str, subject: str, method: str) -> Array:
-        """Return a named array of all runs of a method, (views, seeds, ...)."""
+        """Return a named array of all runs of a method: (views, seeds, ...)."""
         rows = {
             run[3:]: arrays[name]
             for run, arrays in self.runs.items()
@@ -74,12 +73,12 @@ class Results:
         return np.array([[rows[view, seed] for seed in seeds] for view in views])
 
     def has(self, kind: str, subject: str, method: str) -> bool:
-        """Return whether there is such a run."""
+        """Return whether a run of this kind, subject and method exists."""
         return any(run[:3] == (kind, subject, method) for run in self.runs)
 
 
 class Table(NamedTuple):
-    """A table of text, whose first columns are words."""
+    """A table of text. Its first columns, `words` of them, are left-aligned."""
 
     name: str
     heads: Sequence[str]
@@ -99,10 +98,12 @@ class Table(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """That a mean is below a bound, or above it.
+    """The statement that a mean is below a bound, or above it.
 
-    `subject` is what it is tried on: the claims of one text are one row of a table, with a column a subject.
-    `values` (strata, seeds) are paired differences or figures of runs; a single number is a fact without chance in it.
+    `subject` is the motion or method on which it is tested. Claims with the same text
+    form one row of a table, with a column for each subject. `values` (strata, seeds)
+    are paired differences, or figures of runs; a single number is a fact without
+    chance.
     """
 
     text: str
@@ -114,7 +115,10 @@ class Claim(NamedTuple):
     above: bool = False
 
     def verdict(self, level: float) -> tuple[Verdict, Mean]:
-        """Return the verdict by an interval of a level, and that interval. Nothing is decided without one."""
+        """Return the verdict and the interval at a confidence level.
+
+        Without an interval the verdict is "not decided".
+        """
         mean = interval(self.values, level)
         lower = mean.high < self.bound
         higher = mean.low > self.bound
@@ -124,7 +128,10 @@ class Claim(NamedTuple):
 
 
 def interval(values: Array, level: float = LEVEL) -> Mean:
-    """Return the mean of values (strata, seeds) with the interval that other seeds would give; a number is its own."""
+    """Return the mean of values (strata, seeds) with an interval over seeds.
+
+    The interval of a single number is the number itself.
+    """
     if values.ndim == 0:
         return Mean(float(values), float(values), float(values))
     strata, seeds = np.indices(values.shape)
@@ -134,9 +141,10 @@ def interval(values: Array, level: float = LEVEL) -> Mean:
 
 
 def claims_table(name: str, claims: Sequence[Claim]) -> Table:
-    """Return claims with their verdicts, a column a subject in the order of the claim that has most of them.
+    """Return claims with their verdicts, with a column for each subject.
 
-    All intervals hold together at the level: Bonferroni's correction.
+    The claim with the most subjects gives their order. All intervals hold together at
+    the level: Bonferroni's correction.
     """
     level = 1.0 - (1.0 - LEVEL) / max(sum(claim.values.ndim > 0 for claim in claims), 1)
     texts: dict[str, dict[str, Claim]] = {}
@@ -149,7 +157,7 @@ def claims_table(name: str, claims: Sequence[Claim]) -> Table:
         for subject, claim in by_subject.items():
             verdict, mean = claim.verdict(level)
             cells[subject] = f"**{verdict}** {bounded(mean)}"
-        # source, unit, direction and number of runs are the same in all
+        # claims with the same text share source, unit, direction and number of runs
         *_, last = by_subject.values()
         count = str(last.values.size) if last.values.ndim else "-"
         bounds = " / ".join(
@@ -169,14 +177,14 @@ def bounded(mean: Mean, digits: int = 2) -> str:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is run, and what is made of it."""
+    """The runs of an experiment, and how to make tables and figures from them."""
 
     runs: Sequence[Run]
     perform: Callable[[Run], Arrays]
     tables: Callable[[Results], Iterable[Table]]
-    # by names of files: matplotlib's figures, or images
+    # file names with matplotlib's figures or images
     figures: Callable[[Results], Iterable[tuple[str, Any]]]
-    # what all runs depend on, beside their names
+    # what all runs depend on, besides their names
     shared: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -186,14 +194,26 @@ def reproduce(
     workers: int,
     progress: Progress | None,
 ) -> list[Table]:
-    """Return the tables of an experiment; with a folder, write them and the figures there, too.
+    """Return the tables of an experiment.
 
-    Runs that the folder holds are not run again. Raises InputError where it holds something else, or runs that depend
-    on something else, or cannot be written; and ImportError where the library that draws figures is not installed.
+    With a folder, tables and figures are also written there, and runs that it already
+    holds are not repeated.
+
+    Args:
+        experiment: The experiment.
+        out: The folder, or None.
+        workers: Number of processes.
+        progress: Shows the progress of the runs, or None.
+
+    Raises:
+        InputError: If the folder cannot be written, holds something else, or holds runs
+            made under other conditions.
+        ImportError: If the library that draws figures is not installed.
     """
     if out is not None:
         from posefit.report.figures import library
 
+        # fails now rather than after hours of runs
         library("")
     with nullcontext(out) if out is not None else TemporaryDirectory() as place:
         folder = Path(place)
@@ -223,23 +243,27 @@ def reproduce(
 
 
 def _make_runs_folder(folder: Path) -> None:
-    """Make the folder of runs where there is none. Raises InputError where the folder holds something else."""
+    """Make the folder of runs. Raises InputError if the folder holds something else."""
     try:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / "runs").is_dir():
             raise InputError(
-                f"{folder}: expected a new folder or one of an earlier reproduction, got another one"
+                f"{folder}: the folder holds something else: choose a new folder, "
+                "or one of an earlier reproduction"
             )
         (folder / "runs").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{folder}: expected a folder to write to, got {error.strerror}"
+            f"{folder}: cannot write to this folder: {error.strerror}"
         ) from error
 
 
 def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None:
-    """Raise InputError where a folder's record of what its runs depend on is another; write it where there is no run.
+    """Check the record of the conditions under which a folder's runs were made.
 
-    The build of posefit counts only where runs are added to others.
+    Write the record if there are no runs yet.
+
+    The build of posefit counts only if runs are added to others. Raises InputError if
+    the record differs.
     """
     file = folder / RECORD
     now = {
@@ -249,7 +273,8 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
     if not file.exists():
         if any((folder / "runs").iterdir()):
             say(
-                f"warning: {file}: there is none, so that what the runs depend on is not checked"
+                f"warning: {file} is missing: "
+                "cannot check that the earlier runs were made under the same conditions"
             )
         else:
             file.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
@@ -262,7 +287,7 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
         isinstance(value, dict) for value in before.values()
     ):
         raise InputError(
-            f"{file}: expected what all runs have in common, got something else"
+            f"{file}: not a record of the conditions of runs: choose another folder"
         )
     if not adding:
         before, now = (
@@ -274,7 +299,7 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
 
 
 def _store(perform: Callable[[Run], Arrays], run: Run, file: Path) -> Path:
-    """Write what a run gives, and return its file."""
+    """Write the arrays of a run, and return their file."""
     arrays = perform(run)
     with new_file(file) as building:
         np.savez_compressed(building, build=posefit_build(), **arrays)

@@ -1,4 +1,4 @@
-"""Jobs in processes of the sweep's pool, for the experiments and for studies."""
+"""Runs jobs in the worker processes of a sweep, for experiments and studies."""
 
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -20,9 +20,10 @@ def each(
     progress: Progress | None = None,
     limits: Limits | None = None,
 ) -> dict[K, T]:
-    """Return what every job gives, under its key, from so many processes; by default one a core.
+    """Return the result of every job under its key, computed in several processes.
 
-    Jobs and results travel between processes. Raises ValueError where a job fails, and ends the others.
+    By default there is one process for each core. Jobs and results are pickled. If a
+    job fails, raises InputError and ends the others.
     """
     wanted = cores() if workers is None else workers
     engine = Pool(min(wanted, len(jobs)), limits or Limits(), _called)

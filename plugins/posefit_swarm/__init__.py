@@ -1,8 +1,10 @@
-"""Particle swarms for posefit: `sapso`, `pso`, and `random`, the baseline every optimiser has to beat.
+"""Particle swarms for posefit: `sapso`, `pso`, and the baseline `random`.
 
-- `sapso.SAPSO` is Algorithm 1 of the paper that posefit is built after, simulated-annealed particle swarm optimisation.
-- `pso.PSO` is the swarm of Kennedy and Eberhart (1995), constricted as by Clerc and Kennedy (2002).
-- `random.Random` draws uniformly.
+- `sapso.SAPSO` is Algorithm 1 of the paper on which posefit is based:
+  simulated-annealed particle swarm optimisation.
+- `pso.PSO` is the swarm of Kennedy and Eberhart (1995), with the constriction of Clerc
+  and Kennedy (2002).
+- `random.Random` draws uniformly. Every optimiser should beat it.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="sapso", frames=(0, 3))

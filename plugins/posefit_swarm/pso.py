@@ -1,7 +1,10 @@
-"""Particle swarm optimisation: Kennedy and Eberhart's, with Clerc and Kennedy's constriction.
+"""Particle swarm optimisation of Kennedy and Eberhart, with constriction.
 
-J. Kennedy, R. Eberhart, Particle swarm optimization, ICNN 1995; M. Clerc, J. Kennedy, The particle swarm: explosion,
-stability, and convergence in a multidimensional complex space, IEEE Trans. Evolutionary Computation 6(1), 2002.
+J. Kennedy, R. Eberhart, Particle swarm optimization, ICNN 1995.
+
+M. Clerc, J. Kennedy, The particle swarm: explosion, stability, and convergence in a
+multidimensional complex space, IEEE Trans. Evolutionary Computation 6(1), 2002: the
+constriction.
 """
 
 import math
@@ -22,14 +25,16 @@ from posefit_swarm.sapso import REDRAWS, Rows, first_velocities, fly, limited, r
 
 
 class PSO:
-    """A particle swarm with the whole swarm as everybody's neighbourhood; every move is accepted.
+    """A particle swarm in which every particle sees the best of the whole swarm.
 
-    Velocities are limited, and a particle that breaks a constraint is drawn again, as in the SAPSO paper.
+    Every move is accepted. Velocities are limited, and a particle that breaks a
+    constraint is drawn again, as in the SAPSO paper.
 
     Settings:
-        population_size: of the swarm, 1 or more.
-        phi (phi): sum of the accelerations of both pulls, above 4. Clerc and Kennedy 2002.
-        alpha (alpha): velocities stay within it times the half-range of a coordinate, above 0. As SAPSO.
+        population_size: size of the swarm, 1 or more.
+        phi (phi): sum of the two accelerations, above 4. Clerc and Kennedy 2002.
+        alpha (alpha): velocity limit as a share of each coordinate's half-range, above
+            0. As SAPSO.
     """
 
     def __init__(
@@ -47,10 +52,13 @@ class PSO:
         self.space = space
         self.rng = rng
         self.waiting = 0
-        self.phi, self.chi, self.alpha = phi, constriction(phi), alpha
+        self.phi = phi
+        self.chi = constriction(phi)
+        self.alpha = alpha
         self.x = draw_population(space, rng, population_size)
         self.v = first_velocities(space, rng, population_size, alpha)
-        self.pbest, self.pbest_cost = self.x.copy(), np.full(population_size, np.inf)
+        self.pbest = self.x.copy()
+        self.pbest_cost = np.full(population_size, np.inf)
 
     def ask(self) -> Array:
         """Return the particles (n, d)."""
@@ -58,17 +66,18 @@ class PSO:
         return self.x.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Remember the bests and move on."""
+        """Update the bests and move."""
         check_tell(self.waiting, proposals, costs)
         self.waiting = 0
         better = costs < self.pbest_cost  # KENNEDY1995 (pbest, gbest)
-        self.pbest[better], self.pbest_cost[better] = self.x[better], costs[better]
+        self.pbest[better] = self.x[better]
+        self.pbest_cost[better] = costs[better]
         self.v, self.x = redrawn(
             self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS
         )
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
-        """Return velocities and positions (k, d) of some particles (k,) after a move."""
+        """Return velocities and positions (k, d) of particles (k,) after a move."""
         x = self.x[rows]
         gbest = self.pbest[self.pbest_cost.argmin()]
         phi1, phi2 = self.phi / 2.0 * self.rng.random((2, *x.shape))
@@ -80,6 +89,9 @@ class PSO:
 
 
 def constriction(phi: float) -> float:
-    """Return chi of two accelerations that sum up to phi > 4: the swarm neither explodes nor stands still."""
+    """Return the factor chi for accelerations with the sum phi > 4.
+
+    With it the swarm neither explodes nor stagnates.
+    """
     # CLERC2002 (constriction)
     return 2.0 / abs(2.0 - phi - math.sqrt(phi * phi - 4.0 * phi))

@@ -6,13 +6,14 @@ from posefit.plugin import Array, Space, at_least, check_tell, draw_population
 
 
 class Random:
-    """Draws every population uniformly from the feasible part of the box, whatever was proposed before.
+    """Draws every population uniformly from the feasible part of the box.
 
     Settings:
         population_size: size of a population, 1 or more.
     """
 
-    baseline = True  # the chance that other optimisers are held against
+    # other optimisers are compared with it
+    baseline = True
 
     def __init__(
         self, space: Space, rng: np.random.Generator, *, population_size: int = 40
@@ -29,6 +30,6 @@ class Random:
         return draw_population(self._space, self._rng, self._population_size)
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Learn nothing."""
+        """Check the call, and learn nothing."""
         check_tell(self._waiting, proposals, costs)
         self._waiting = 0

@@ -1,7 +1,9 @@
-"""Simulated-annealed particle swarm optimisation: Algorithm 1 of Li, Sun, Chen and Li (2012), as ask and tell.
+"""Simulated-annealed particle swarm optimisation, Algorithm 1, as ask and tell.
 
-Attributes have the paper's letters; comments such as SAPSO (1) mark its equations. Where it is silent, an
-Interpretation is named, see docs/background/interpretations.md; `posefit_reproduce.sapso.letter` is the paper's letter.
+Li, Sun, Chen and Li (2012). Attributes have the paper's letters. Comments such as
+SAPSO (1) mark its equations. Where the paper is silent, an Interpretation is named: see
+docs/background/interpretations.md. `posefit_reproduce.sapso.letter` follows the paper's
+letter.
 """
 
 import math
@@ -23,8 +25,8 @@ from posefit.plugin import (
     wrap,
 )
 
-# ours: how often a step that the prior refuses is drawn again; after that the particle
-# stays where it is. Interpretation S7
+# ours: how many further steps are drawn if the prior refuses one; after these the
+# particle stays at rest. Interpretation S7
 REDRAWS = 10
 
 Rows = NDArray[np.int64]
@@ -34,14 +36,21 @@ class SAPSO:
     """Algorithm 1. Positions are in the box [-1, 1]^d, in which every half-range is 1.
 
     Settings:
-        population_size (N): of the swarm, 1 or more. Section 5.2.
-        iterations (C): moves of the swarm, 1 or more; it is evaluated once more (Interpretation S10). Section 5.2.
-        temperature (T): of the annealing at first, above 0, in units of the cost. Section 5.2.
-        cooling (gamma): factor on the temperature after each iteration (Interpretation S6), 0 to 1. Section 5.2.
-        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Interpretation S5.
-        inertia (A): factor on the old velocity at first, above 0.1; falls towards 0.1. Section 3.1, Interpretation S5.
-        acceleration (c1, c2): of the pulls towards the personal and the swarm's best, 0 or more. Section 3.1.
-        alpha (alpha): velocities stay within it times the half-range of a coordinate, above 0. Section 2.2.
+        population_size (N): size of the swarm, 1 or more. Section 5.2.
+        iterations (C): number of moves, 1 or more; they follow one evaluation of
+            the first positions (Interpretation S10). Section 5.2.
+        temperature (T): first temperature of the annealing, above 0, in units of
+            the cost. Section 5.2.
+        cooling (gamma): factor on the temperature after each iteration
+            (Interpretation S6), 0 to 1. Section 5.2.
+        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never
+            ends it. Interpretation S5.
+        inertia (A): first factor on the old velocity, above 0.1; it falls towards
+            0.1. Section 3.1, Interpretation S5.
+        acceleration (c1, c2): factor on the pulls towards the personal best and the
+            swarm's best, 0 or more. Section 3.1.
+        alpha (alpha): velocity limit as a share of each coordinate's half-range,
+            above 0. Section 2.2.
     """
 
     def __init__(
@@ -77,7 +86,8 @@ class SAPSO:
         self.A = inertia
         self.acceleration = acceleration
         self.alpha = alpha
-        # the positions to be evaluated next; c counts iterations, and the paper's own c is c ln(10 A) / C
+        # the positions to be evaluated next; c counts iterations, while the paper's own
+        # c is c ln(10 A) / C
         self.moved = draw_population(space, rng, population_size)  # SAPSO A1.1
         self.x = self.moved.copy()
         self.cost = np.full(population_size, np.inf)
@@ -86,16 +96,19 @@ class SAPSO:
         self.v = first_velocities(space, rng, population_size, alpha)
 
     def ask(self) -> Array:
-        """Return the particles (N, d) after their move; none once the iterations or the temperature are used up."""
-        goes_on = self.c <= self.C and self.T > self.T0  # SAPSO A1.2
-        self.waiting = len(self.moved) if goes_on else 0
+        """Return the particles (N, d) after their move.
+
+        The array is empty once the iterations or the temperature are used up.
+        """
+        continues = self.c <= self.C and self.T > self.T0  # SAPSO A1.2
+        self.waiting = len(self.moved) if continues else 0
         return self.moved[: self.waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Accept or refuse the moves by their costs (N,), remember the bests, cool, and move on."""
+        """Accept or refuse moves by their costs (N,), update the bests, cool, move."""
         check_tell(self.waiting, proposals, costs)
         self.accept(costs)
-        if self.c > 0:  # the first evaluation is no move
+        if self.c > 0:  # the first evaluation is not a move
             self.T *= self.gamma  # SAPSO A1.2e
         if self.c < self.C:
             self.v, self.moved = redrawn(
@@ -105,8 +118,11 @@ class SAPSO:
         self.waiting = 0
 
     def accept(self, costs: Array) -> int:
-        """Accept or refuse the moves by their costs (N,), remember the bests, and return how many are accepted."""
-        # infinity less infinity; nan is never accepted
+        """Accept or refuse the moves by their costs (N,), and update the bests.
+
+        Return the number of accepted moves.
+        """
+        # infinity minus infinity is nan, which is never accepted
         with np.errstate(invalid="ignore", over="ignore"):
             # Metropolis' criterion
             chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))
@@ -124,7 +140,7 @@ class SAPSO:
         return inertia_at(self.c, self.C, self.A)
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
-        """Return velocities and positions (k, d) of some particles (k,) after a move."""
+        """Return velocities and positions (k, d) of particles (k,) after a move."""
         x = self.x[rows]
         gbest = self.pbest[self.pbest_cost.argmin()]
         omega = self.inertia()
@@ -142,16 +158,22 @@ def inertia_at(c: int, C: int, A: float) -> float:
 
 
 def limited(v: Array, alpha: float) -> Array:
-    """Return velocities (n, d) clamped to their limits. Constraint 1, Interpretation S9."""
+    """Return velocities (n, d) clamped to their limit.
+
+    Constraint 1, Interpretation S9.
+    """
     return np.minimum(np.maximum(v, -alpha), alpha)  # SAPSO 2.2 velocity
 
 
 def first_velocities(
     space: Space, rng: np.random.Generator, count: int, alpha: float
 ) -> Array:
-    """Return the velocities (count, d) of first particles, towards the prediction where there is one."""
+    """Return the velocities (count, d) of first particles.
+
+    They point towards the prediction if the space has one.
+    """
     if space.start is None:
-        # ours: the paper does not say
+        # ours: the paper does not give first velocities
         return rng.uniform(-alpha, alpha, (count, space.dimensions))
     v_pred = space.start.velocity
     # Interpretation S12
@@ -162,7 +184,10 @@ def first_velocities(
 
 
 def fly(space: Space, x: Array, v: Array) -> tuple[Array, Array]:
-    """Return velocities and positions (n, d) of particles at x (n, d): the box's walls stop them. Constraint 1."""
+    """Return velocities and positions (n, d) of particles after a step from x (n, d).
+
+    The walls of the box stop them. Constraint 1.
+    """
     there = wrap(space, x + v)  # SAPSO (2)
     inside = np.minimum(np.maximum(there, -1.0), 1.0)
     return np.where(inside == there, v, 0.0), inside
@@ -174,11 +199,17 @@ def redrawn(
     allowed: Callable[[Array, Array], NDArray[np.bool_]],
     redraws: int,
 ) -> tuple[Array, Array]:
-    """Return velocities and positions (n, d) after a step from x (n, d) that is allowed. Interpretation S7.
+    """Return velocities and positions (n, d) after an allowed step from x (n, d).
 
-    For a particle whose step is not allowed, `redraws` further steps are drawn in one call, and the first allowed one
-    is taken; without one the particle stays, at rest. `step` returns the velocities and positions (k, d) of some
-    particles (k,), and `allowed` says which of them are allowed (k,). The paper's letter limits velocities as well.
+    If a particle's step is not allowed, `redraws` further steps are drawn in one call,
+    and the first allowed one is taken. If none is allowed, the particle stays, at rest.
+    Interpretation S7. The paper's letter limits velocities as well.
+
+    Args:
+        x: Positions (n, d).
+        step: Returns the velocities and positions (k, d) of some particles (k,).
+        allowed: Returns which velocities and positions (k, d) are allowed (k,).
+        redraws: Number of further steps of a particle.
     """
     v, moved = step(np.arange(len(x)))
     broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c

@@ -79,9 +79,12 @@ def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
         raise InputError(
             f"{name} must be numbers of shape {sides}, got {quoted(values)}"
         ) from None
-    fits = array.ndim == len(shape) and all(
-        isinstance(side, str) or side == length
-        for side, length in zip(shape, array.shape, strict=True)
+    fits = array.shape == shape or (
+        array.ndim == len(shape)
+        and all(
+            isinstance(side, str) or side == length
+            for side, length in zip(shape, array.shape, strict=True)
+        )
     )
     if not fits:
         raise InputError(f"{name} must have shape {sides}, got {array.shape}")

@@ -1,7 +1,9 @@
-"""The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2.
+"""The command line.
 
-The commands stand in `tracking`, `sweeping`, `motions`, `suite` and `plugins`; plugins add others, see
-`posefit.hooks`. What each does is imported when it runs.
+Messages and progress go to stderr, results to stdout. A user's mistake is one line and
+exit status 2. The commands are in `tracking`, `sweeping`, `motions`, `suite` and
+`plugins`; plugins add others, see `posefit.hooks`. A command imports what it needs only
+when it runs.
 """
 
 import errno
@@ -21,7 +23,7 @@ from posefit.reading import cut
 from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
 
-THREAD_SECONDS = 1.0  # that threads have to end after a command
+THREAD_SECONDS = 1.0  # how long threads may go on after a command
 GROUPS: dict[str, tuple[click.Command, ...]] = {
     "Follow a person": (tracking.track, tracking.fit, tracking.extract),
     "Compare methods": (sweeping.sweep, sweeping.report, sweeping.rerun, suite.suite),
@@ -30,33 +32,30 @@ GROUPS: dict[str, tuple[click.Command, ...]] = {
 
 
 class _Commands(Command, Group):
-    """Has plugins' commands, too."""
+    """The commands of posefit and of plugins."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
-        """Return the names of all commands: those of plugins come last."""
+        """Return the names of all commands, those of plugins last."""
         return [*self.commands, *_added()]
 
     def format_commands(
         self, _context: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the commands by what they are for, each with its whole first sentence; those of plugins last."""
-        for heading, commands in (
-            GROUPS | {"From plugins": tuple(_added().values())}
-        ).items():
+        """Write the commands by purpose, each with its whole first sentence.
+
+        The commands of plugins come last.
+        """
+        groups = GROUPS | {"From plugins": tuple(_added().values())}
+        for heading, commands in groups.items():
+            rows = []
+            for command in commands:
+                first = (command.help or "").split("\n\n")[0]
+                rows.append((command.name or "", " ".join(first.split())))
             with formatter.section(heading):
-                first = [
-                    " ".join((command.help or "").split("\n\n")[0].split())
-                    for command in commands
-                ]
-                formatter.write_dl(
-                    [
-                        (command.name or "", text)
-                        for command, text in zip(commands, first, strict=True)
-                    ]
-                )
+                formatter.write_dl(rows)
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
-        """Return a command; plugins are looked at for those alone that posefit does not have itself."""
+        """Return a command, or None. Plugins are loaded only if posefit has none."""
         return self.commands.get(name) or _added().get(name)
 
 
@@ -64,18 +63,15 @@ def _added() -> dict[str, click.Command]:
     from posefit.registry import COMMAND, plugins_of
 
     added = plugins_of((COMMAND,), tuple(main.commands))
-    return {
-        command.name or "": command for plugin in added for command in plugin.commands
-    }
+    commands = [command for plugin in added for command in plugin.commands]
+    return {command.name or "": command for command in commands}
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="posefit")
-@click.option(
-    "--debug", is_flag=True, help="Show the traceback of a mistake instead of one line."
-)
+@click.option("--debug", is_flag=True, help="Show the traceback of a mistake.")
 def main(debug: bool) -> None:
-    """Recover a person's 3D motion from masks, by searching.
+    """Recover a person's 3D motion from masks, by search.
 
     \b
     posefit track walk --out walk           a first track: open walk/track.html
@@ -89,7 +85,7 @@ for _command in chain.from_iterable(GROUPS.values()):
 
 
 def run() -> None:
-    """Run the command that was asked for, and end the process even where a plugin left a thread running."""
+    """Run the command, and end the process even if a plugin left a thread running."""
     open_streams()
     warn_in_one_line()
     try:
@@ -99,29 +95,24 @@ def run() -> None:
             raise
         drop(1)
         say(
-            f"posefit: standard output: expected room to write results to, got {error.strerror}"
+            "posefit: standard output: expected room to write results to, "
+            f"got {error.strerror}"
         )
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
-        others = [
-            thread
-            for thread in threading.enumerate()
-            if thread is not threading.main_thread()
-        ]
-        running = [
-            thread
-            for thread in others
-            if not thread.daemon and not thread.name.startswith(f"{POOL}_")
-        ]
+        running = []
+        for thread in threading.enumerate():
+            own = thread.name.startswith(f"{POOL}_")
+            if not (thread is threading.main_thread() or thread.daemon or own):
+                running.append(thread)
         for thread in running:
             thread.join(THREAD_SECONDS / len(running))
-        names = ", ".join(
-            sorted({thread.name for thread in running if thread.is_alive()})
-        )
-        if names:
-            say(f"posefit: not waiting for what a plugin left running: {cut(names)}")
+        alive = {thread.name for thread in running if thread.is_alive()}
+        if alive:
+            names = cut(", ".join(sorted(alive)))
+            say(f"posefit: not waiting for what a plugin left running: {names}")
             sys.stdout.flush()
-            os._exit(
-                end.code if isinstance(end.code, int) else 0 if end.code is None else 1
-            )
+            if isinstance(end.code, int):
+                os._exit(end.code)
+            os._exit(0 if end.code is None else 1)
         raise

@@ -11,13 +11,17 @@ from posefit.registry import KINDS
 
 
 class Group(click.Group):
-    """For a name that is no command of it, it names the nearest of all commands of posefit, wherever that is.
+    """A group that suggests the nearest of all posefit commands for an unknown name.
 
-    For what plugins offer, such as `optimisers`, that is the command that lists them.
+    For a kind of plugin, such as `optimisers`, it suggests the command that lists them.
     """
 
     def resolve_command(self, context: click.Context, args: list[str]) -> Any:
-        """Return the command that the first word names. Raises click.UsageError where it names none."""
+        """Return the command that the first word names.
+
+        Raises:
+            click.UsageError: there is no such command.
+        """
         if args[0][:1].isalnum() and self.get_command(context, args[0]) is None:
             root = context.find_root()
             listed = dict.fromkeys(
@@ -33,7 +37,10 @@ class Group(click.Group):
 def _paths(
     command: click.Command, context: click.Context, path: str
 ) -> Iterator[tuple[str, str]]:
-    """Yield the name of each command below one, and what to type for it; of two of a name the outer one comes last."""
+    """Yield name and full path of all commands below one, outer commands last.
+
+    In a dictionary of these pairs, an outer command so wins over an inner one.
+    """
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
             if below := command.get_command(context, name):

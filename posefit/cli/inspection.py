@@ -1,4 +1,4 @@
-"""What is installed, and what is wrong with it."""
+"""Texts of `posefit plugins`: what is installed, and what is wrong with it."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ from posefit.settings import Setting, settings_in, without_settings
 
 
 def described(offer: Offer) -> dict[str, Any]:
-    """Return an offer as `posefit plugins --json` prints it."""
+    """Return an offer in the form of `posefit plugins --json`."""
     settings = [
         {
             "name": setting.name,
@@ -49,13 +49,18 @@ def listing(registry: Registry) -> Iterator[str]:
 
 
 def explanation(registry: Registry, name: str) -> Iterator[str]:
-    """Yield the lines of `posefit plugins show`: whatever has the name. Raises ValueError listing the known names."""
+    """Yield the lines of `posefit plugins show`, for every plugin with the name.
+
+    Raises:
+        InputError: there is none; the message lists the known names.
+    """
     offers = [offer for kind in KINDS for offer in registry.offers[kind].values()]
     named = [offer for offer in offers if offer.name == name]
     if not named:
         known = sorted({offer.name for offer in offers})
         raise InputError(
-            f"plugin must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+            f"plugin must be one of {', '.join(known)}, "
+            f"got {quoted(name)}{suggestion(name, known)}"
         )
     for offer in named:
         text = getdoc(offer.factory) or ""
@@ -75,16 +80,14 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
 
 
 def _head(offer: Offer) -> str:
-    missing = (
-        f" [not installed: python -m pip install '{offer.missing}']"
-        if offer.missing
-        else ""
-    )
+    missing = ""
+    if offer.missing:
+        missing = f" [not installed: python -m pip install '{offer.missing}']"
     return f"{offer.kind} {offer.name} ({offer.distribution} {offer.version}){missing}"
 
 
 def _typed(setting: Setting) -> str:
-    """Return a setting with its type, or what it may be, and its default."""
+    """Return a setting with its type or choices, and its default."""
     default = "" if setting.default is Parameter.empty else f" = {setting.default}"
     return f"{setting.name}: {setting.type}{default}"
 
@@ -99,47 +102,46 @@ def diagnosis(
 ) -> tuple[list[str], bool]:
     """Return the lines of `posefit plugins doctor`, and whether all is well.
 
-    Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
+    Args:
+        plugins: the plugins.
+        verbose: whether to add the traceback of a broken plugin.
     """
     lines = [f"{BLOCK}={os.environ[BLOCK]!r}"] if BLOCK in os.environ else []
     states = set[str]()
     for plugin in plugins:
-        offers = ", ".join(
-            [f"{offer.kind} {offer.name}" for offer in plugin.offers]
-            + [f"{COMMAND} {command.name}" for command in plugin.commands]
-        )
-        state: str = (
-            "empty" if plugin.state == "loaded" and not offers else plugin.state
-        )
+        offered = [f"{offer.kind} {offer.name}" for offer in plugin.offers]
+        offered += [f"{COMMAND} {command.name}" for command in plugin.commands]
+        state: str = plugin.state
+        if state == "loaded" and not offered:
+            state = "empty"
         states.add(state)
-        # on one line, whatever the error says
-        cause = " ".join(plugin.cause.split()) or f"offers {offers}"
+        # an error's message may have several lines
+        cause = " ".join(plugin.cause.split()) or f"offers {', '.join(offered)}"
         if state == "empty":
-            cause = "registers nothing: a hook such as posefit_register_optimisers must have the mark @hookimpl"
-        lines.append(
-            f"{state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}"
-        )
+            cause = (
+                "registers nothing: a hook such as posefit_register_optimisers "
+                "must have the mark @hookimpl"
+            )
+        release = f"{plugin.distribution} {plugin.version}"
+        lines.append(f"{state:8}  {plugin.name} ({release}): {cause}")
         lines += [
             f"          {traced}" for traced in plugin.traceback.splitlines() if verbose
         ]
         for offer in plugin.offers:
             if offer.missing:
                 lines.append(
-                    f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'"
+                    f"          {offer.name} is not usable yet: "
+                    f"python -m pip install '{offer.missing}'"
                 )
             if not offer.summary:
-                lines.append(
-                    f"          {offer.name} has no docstring to be listed with"
-                )
+                lines.append(f"          {offer.name} has no docstring for the list")
             if not offer.missing and plugin.distribution != PROJECT:
                 lines.append(f"          next: posefit check {offer.kind} {offer.name}")
     hint = "" if verbose else "; -v shows where they fail"
     if "broken" in states:
         lines.append(f"broken plugins are left out; the others are loaded{hint}")
+    elif "empty" in states:
+        lines.append("all plugins are loaded, but not all offer something")
     else:
-        lines.append(
-            "all plugins are loaded, but not all offer something"
-            if "empty" in states
-            else "all plugins work"
-        )
+        lines.append("all plugins work")
     return lines, not states & {"broken", "empty"}

@@ -1,4 +1,4 @@
-"""The options that commands share: those of a track are made of their one declaration, `TrackOptions`."""
+"""Options that commands share. Those of a track are built from `TrackOptions`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -18,7 +18,10 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 def parsed_by(
     parse: Callable[[str], Any],
 ) -> Callable[[click.Context, click.Parameter, Any], Any]:
-    """Return a click callback that parses an option's text, or each of several, and shows what is wrong with it."""
+    """Return a click callback that parses an option's text, or each of its texts.
+
+    A ValueError becomes a message about the option.
+    """
 
     def callback(
         _context: click.Context, _parameter: click.Parameter, value: Any
@@ -36,23 +39,21 @@ def parsed_by(
 def methods_from(
     _context: click.Context, _parameter: click.Parameter, begun: str
 ) -> list[str]:
-    """Return the methods that begin so, for a shell to complete."""
+    """Return the methods with a given beginning, for a shell to complete."""
     from posefit.registry import registry
 
     offers = registry().offers
     optimiser, at, _ = begun.partition("@")
-    names = (
-        [f"{optimiser}@{prior}" for prior in offers["prior"]]
-        if at
-        else [*offers["tracker"], *offers["optimiser"]]
-    )
+    names = [*offers["tracker"], *offers["optimiser"]]
+    if at:
+        names = [f"{optimiser}@{prior}" for prior in offers["prior"]]
     return [name for name in names if name.startswith(begun)]
 
 
 def sources_from(
     _context: click.Context, _parameter: click.Parameter, begun: str
 ) -> list[CompletionItem]:
-    """Return the built-in motions that begin so, and have the shell add files."""
+    """Return the motions with a given beginning, and have the shell add files."""
     from posefit.motion import built_in
 
     names = [
@@ -66,22 +67,25 @@ COMPLETED = {"method": methods_from, "train": sources_from}
 
 
 def number_by(parse: Callable[[str], float]) -> Callable[[str], float]:
-    """Return a function that reads a number, a whole one where `parse` is int, and says what it expected."""
+    """Return a function that parses a number and says what it expected.
+
+    With `int` for `parse` the number must be whole.
+    """
 
     def read(text: str) -> float:
         try:
             return parse(text)
         except ValueError:
-            expected = (
-                "a whole number such as 30" if parse is int else "a number such as 1.75"
-            )
+            expected = "a number such as 1.75"
+            if parse is int:
+                expected = "a whole number such as 30"
             raise InputError(f"expected {expected}, got {quoted(str(text))}") from None
 
     return read
 
 
 class Flag(click.Option):
-    """An option that the help of its command lists under a heading."""
+    """An option that is listed under a heading in the help."""
 
     def __init__(self, *words: Any, heading: str = "Others", **more: Any) -> None:
         super().__init__(*words, **more)
@@ -89,25 +93,24 @@ class Flag(click.Option):
 
 
 def under(heading: str) -> Callable[..., Decorator]:
-    """Return what makes options that are listed under a heading."""
+    """Return a decorator for options that are listed under a heading."""
     return partial(click.option, cls=Flag, heading=heading)
 
 
 class TrackCommand(click.Command):
-    """A command with the options of a track, whose help lists them under headings."""
+    """A command with the options of a track, listed under headings in the help."""
 
     def format_options(
         self, context: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the options: those of no heading last."""
+        """Write the options, those without a heading last."""
         sections: dict[str, list[tuple[str, str]]] = {}
         for flag in self.get_params(context):
-            if isinstance(flag, click.Option) and (
-                record := flag.get_help_record(context)
-            ):
-                sections.setdefault(getattr(flag, "heading", "Others"), []).append(
-                    record
-                )
+            if not isinstance(flag, click.Option):
+                continue
+            if record := flag.get_help_record(context):
+                heading = getattr(flag, "heading", "Others")
+                sections.setdefault(heading, []).append(record)
         sections["Others"] = sections.pop("Others", [])
         for heading, rows in sections.items():
             with formatter.section(heading):
@@ -115,14 +118,19 @@ class TrackCommand(click.Command):
 
 
 def track_flags(*names: str) -> list[Decorator]:
-    """Return the click options of some options of a track; without names, of all that the command line has."""
+    """Return the click options of some options of a track.
+
+    Args:
+        names: the options, by default all that the command line has.
+    """
     flags: list[Decorator] = []
     heading = ""
     for field in fields(TrackOptions):
         option = declared(field)
         default = field.default
         heading = option.heading or heading
-        if (field.name not in names) if names else option.flag == "":
+        unwanted = field.name not in names if names else option.flag == ""
+        if unwanted:
             continue
         flag = (option.flag or field.name).replace("_", "-")
         make = under(heading)
@@ -137,9 +145,8 @@ def track_flags(*names: str) -> list[Decorator]:
             continue
         words |= {"metavar": option.unit or None, "multiple": option.repeated}
         if option.parse in (int, float):
-            words["metavar"] = option.unit or (
-                "INTEGER" if option.parse is int else "FLOAT"
-            )
+            kind = "INTEGER" if option.parse is int else "FLOAT"
+            words["metavar"] = option.unit or kind
             words |= {"type": str, "callback": parsed_by(number_by(option.parse))}
         else:
             words["callback"] = parsed_by(option.parse)
@@ -150,23 +157,24 @@ def track_flags(*names: str) -> list[Decorator]:
 
 
 def box(text: str) -> tuple[int, ...]:
-    """Return the left, the top, the width and the height of a text X,Y,WIDTH,HEIGHT."""
+    """Return left, top, width and height from a text X,Y,WIDTH,HEIGHT."""
     parts = text.split(",")
     if len(parts) != 4 or not all(part.strip().isdigit() for part in parts):
         raise InputError(
-            f"expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, got {quoted(text)}"
+            "expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, "
+            f"got {quoted(text)}"
         )
     return tuple(map(int, parts))
 
 
-_video = under("How the person is taken out of video")
+_video = under("How the person is segmented in video")
 _result = under("Results")
 FRAMES = under("What is seen")(
     "--frames",
     default=":",
     callback=parsed_by(text_range),
     metavar="A:B",
-    help="Only these frames: of footage as filmed, of a motion after resampling.",
+    help="Use only these frames: of footage as filmed, of a motion after resampling.",
 )
 JSON = _result(
     "--json",
@@ -174,13 +182,14 @@ JSON = _result(
     is_flag=True,
     help="Print one JSON object and nothing else on stdout.",
 )
-QUIET = _result(
-    "--quiet", is_flag=True, help="No messages and no bars, only the result."
-)
+QUIET = _result("--quiet", is_flag=True, help="Print only the result.")
 EXTRACTION = (
     _video(
         "--extraction",
-        help="Of video: mixture, or mean with --background; else median, masks, or another of `posefit plugins`.",
+        help=(
+            "How to segment video: mixture by default, mean with --background; or "
+            "median, masks, or another segmenter of `posefit plugins`."
+        ),
     ),
     _video(
         "--background",
@@ -191,24 +200,24 @@ EXTRACTION = (
         "--roi",
         callback=parsed_by(box),
         metavar="X,Y,W,H",
-        help="Where the person is, in the video's pixels.",
+        help="Region of the video that holds the person, in pixels.",
     ),
     _video(
         "--ignore",
         metavar="IMAGE",
-        help="Bright pixels are never known, such as a tree in front.",
+        help="Bright pixels are ignored, such as a tree in front.",
     ),
     _video(
         "--width",
         type=int,
-        help="Larger videos are scaled down to this; by default 640.",
+        help="Larger videos are scaled down to this width; default 640.",
     ),
 )
 WITHOUT = under("Method and budget")(
     "--without-subject",
     multiple=True,
     metavar="N",
-    help="Leave a person of the library out; may be repeated.",
+    help="Leave a person out of the library; repeatable.",
 )
 TRACK: tuple[Any, ...] = (
     click.argument("source", nargs=-1, shell_complete=sources_from),
@@ -221,14 +230,18 @@ TRACK: tuple[Any, ...] = (
         help="Write poses, table, video and picture to this new folder.",
     ),
     _result(
-        "--force", is_flag=True, help="Replace DIR where it holds earlier results."
+        "--write",
+        default="",
+        metavar="KIND,...",
+        help="Write only these files, such as bvh,trc,html, and summary.json. Default: all.",
     ),
+    _result("--force", is_flag=True, help="Replace earlier results in DIR."),
     _result(
         "--resume",
         is_flag=True,
-        help="Go on with the track to DIR that ended too early.",
+        help="Continue the interrupted track to DIR.",
     ),
-    _result("--verbose", is_flag=True, help="Print all figures, not three lines."),
+    _result("--verbose", is_flag=True, help="Print all figures instead of a summary."),
     QUIET,
     JSON,
 )
@@ -237,32 +250,32 @@ ENGINE = (
         "--workers",
         type=int,
         metavar="N",
-        help="Processes of this machine; by default one a core.",
+        help="Processes on this machine; by default one per core.",
     ),
     click.option(
         "--scheduler",
         metavar="ADDRESS",
-        help="A Dask scheduler instead, such as tcp://host:8786.",
+        help="Run on a Dask scheduler instead, such as tcp://host:8786.",
     ),
     click.option(
         "--cell-seconds",
         type=float,
         default=3600.0,
         show_default=True,
-        help="How long a cell may take.",
+        help="Time limit of a cell.",
     ),
     click.option(
         "--cell-gigabytes",
         type=float,
         default=4.0,
         show_default=True,
-        help="How much memory a cell may have.",
+        help="Memory limit of a cell.",
     ),
 )
 
 
 def options(chosen: Sequence[Decorator]) -> Decorator:
-    """Return a decorator that gives a command some options."""
+    """Return a decorator that adds options to a command."""
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         for option in reversed(chosen):

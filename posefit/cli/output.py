@@ -1,4 +1,4 @@
-"""Where commands say what they do: messages and progress go to stderr, results alone to stdout."""
+"""Output of commands: messages and progress go to stderr, only results to stdout."""
 
 import json
 import os
@@ -9,26 +9,27 @@ from typing import Any
 
 import click
 
-from posefit.errors import InputError, printable
+from posefit.errors import STOPPED, InputError, printable
 from posefit.limits import allowed_bytes
 
-MISTAKE = 2  # the exit status of a mistake, which is shown in one line
+MISTAKE = 2  # exit status of a user's mistake, which is shown in one line
 
 
 def open_streams() -> None:
-    """Open the standard streams that are closed, on nothing."""
+    """Open standard streams that are closed, on the null device."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115, as long as the process lives
+            # open as long as the process lives
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
 
 
 def drop(stream: int) -> None:
-    """Send to nowhere what a standard stream holds and still gets: there is no room for it."""
+    """Discard what a standard stream holds and still gets, because its disk is full."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
 
 def say(message: str) -> None:
-    """Print a message on stderr. Where that is full, it is lost, and the work goes on."""
+    """Print a message on stderr. If that is full, the message is lost."""
     try:
         click.echo("\n".join(map(printable, message.split("\n"))), err=True)
     except OSError:
@@ -36,13 +37,16 @@ def say(message: str) -> None:
 
 
 def print_result(lines: Iterable[str], value: Any, as_json: bool) -> None:
-    """Print lines, or else a value, as one line of JSON."""
+    """Print lines, or with `as_json` a value as one line of JSON."""
     for line in [json.dumps(value)] if as_json else map(printable, lines):
         click.echo(line)
 
 
 class Command(click.Command):
-    """Shows a user's mistakes in one line on stderr; other errors have a traceback."""
+    """A command that shows a user's mistakes in one line on stderr.
+
+    Other errors show a traceback.
+    """
 
     def invoke(self, context: click.Context) -> Any:
         """Run a command."""
@@ -55,27 +59,33 @@ class Command(click.Command):
             ImportError,
             MemoryError,
         ) as error:
-            # a fault, no file that a user named
+            # an OSError without a file name is a fault of the program
             unnamed = isinstance(error, OSError) and error.filename is None
             if unnamed or context.params.get("debug"):
                 raise
             say(f"posefit: {' '.join(_mistake(error).split())}")
             context.exit(MISTAKE)
+        except KeyboardInterrupt:
+            # click would end with 1, as after an error
+            say("Aborted!")
+            context.exit(STOPPED)
 
 
 def _mistake(error: BaseException) -> str:
-    """Return what a user reads of an error."""
+    """Return the message of an error for the user."""
     if isinstance(error, click.UsageError):
         return error.format_message()
     if isinstance(error, OSError) and isinstance(error.filename, str):
-        return f"{error.filename}: expected a file or folder that can be used, got {error.strerror}"
+        expected = "expected a file or folder that can be used"
+        return f"{error.filename}: {expected}, got {error.strerror}"
     if isinstance(error, MemoryError):
-        return f"expected work that fits {allowed_bytes() / 1e9:.3g} GB of memory, got {str(error) or 'more'}"
+        most = f"{allowed_bytes() / 1e9:.3g} GB of memory"
+        return f"expected work that fits {most}, got {str(error) or 'more'}"
     return str(error)
 
 
 def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[Any]:
-    """Yield steps, of which there are `count`, with a bar on stderr where that is a terminal."""
+    """Yield `count` steps, with a progress bar if stderr is a terminal."""
     from tqdm import tqdm
 
     return iter(
@@ -92,7 +102,10 @@ def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[
 
 @contextmanager
 def results_alone() -> Iterator[None]:
-    """Send to stderr what anything prints in the body, compiled code and other processes too: stdout is for results."""
+    """Send to stderr whatever the body prints, because stdout is for results.
+
+    That includes compiled code and other processes.
+    """
     sys.stdout.flush()
     with redirect_stdout(sys.stderr):
         stdout_copy = os.dup(1)

@@ -12,9 +12,9 @@ from posefit.cli.output import print_result, results_alone
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def plugins(context: click.Context, as_json: bool) -> None:
-    """List the optimisers, priors, trackers, starts and segmenters that are installed, with their settings.
+    """List the installed optimisers, priors, trackers, starts and segmenters.
 
-    `show NAME` says what the settings of one mean.
+    The list has their settings; `show NAME` explains the settings of one.
     """
     if context.invoked_subcommand is not None:
         return
@@ -33,7 +33,7 @@ def plugins(context: click.Context, as_json: bool) -> None:
 @plugins.command()
 @click.argument("name")
 def show(name: str) -> None:
-    """Say what one of them does, and what each of its settings means, may be and is by default."""
+    """Explain a plugin and its settings, with their types and defaults."""
     from posefit.cli.inspection import explanation
     from posefit.registry import registry
 
@@ -47,18 +47,22 @@ def show(name: str) -> None:
     "-v",
     "--verbose",
     is_flag=True,
-    help="Show where a plugin fails, too: its traceback.",
+    help="Show the traceback of a broken plugin, too.",
 )
 @click.pass_context
 def doctor(context: click.Context, verbose: bool) -> None:
-    """Say of every plugin what it offers, or why nothing; exit status 1 where one is broken or offers nothing."""
+    """Report what every plugin offers, or why it offers nothing.
+
+    The exit status is 1 if a plugin is broken or offers nothing.
+    """
     import warnings
 
     from posefit.cli.inspection import diagnosis
     from posefit.registry import COMMAND, KINDS, plugins_of
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the report below says the same
+        # the report below says the same
+        warnings.simplefilter("ignore")
         lines, well = diagnosis(plugins_of((*KINDS, COMMAND), _own(context)), verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
@@ -72,15 +76,16 @@ def doctor(context: click.Context, verbose: bool) -> None:
     show_default=True,
     help="optimiser, prior, tracker, start, segmenter or command.",
 )
-@click.option("--out", metavar="DIR", help="The new folder; by default posefit-NAME.")
+@click.option("--out", metavar="DIR", help="The new folder; default posefit-NAME.")
 @click.pass_context
 def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> None:
-    """Write a small plugin to start from: it installs, works and has a test that passes."""
+    """Write a small plugin to start from: it installs, works and has a passing test."""
     from posefit.cli.template import write_plugin
 
     folder = write_plugin(name, kind, out, _own(context))
     click.echo(
-        f"written to {folder}; next: cd {folder} && python -m pip install -e '.[test]' && python -m pytest"
+        f"written to {folder}; next: cd {folder} "
+        "&& python -m pip install -e '.[test]' && python -m pytest"
     )
 
 
@@ -92,10 +97,10 @@ def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> Non
     "settings",
     multiple=True,
     metavar="SETTING=VALUE",
-    help="Check it with this setting.",
+    help="Check it with this setting; repeatable.",
 )
 @click.option(
-    "--only", multiple=True, metavar="RULE", help="Check this rule alone; repeatable."
+    "--only", multiple=True, metavar="RULE", help="Check only this rule; repeatable."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
@@ -107,11 +112,12 @@ def check(
     only: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Check that an installed plugin keeps the rules of its kind; exit status 1 where it breaks one.
+    """Check that an installed plugin keeps the rules of its kind.
 
     KIND is optimiser, prior, tracker, start or segmenter.
-    The rules are checked in a process of their own; what the plugin prints goes to stderr. Once two rules fail for the
-    same cause, the others are not checked.
+    The rules are checked in a separate process; what the plugin prints goes to stderr.
+    Once two rules fail for the same cause, the others are not checked.
+    The exit status is 1 if a rule is broken.
     """
     from posefit.fitting.check import one_of
     from posefit.registry import KINDS

@@ -17,25 +17,33 @@ if TYPE_CHECKING:
 
 
 @click.group(cls=Group, invoke_without_command=True)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print the suite as JSON, in the form of IOHexperimenter's registry.",
+)
 @click.pass_context
 def suite(context: click.Context, as_json: bool) -> None:
-    """List the functions of the numbered benchmark, and their dimensions."""
+    """List the functions of the numbered benchmark and their dimensions."""
     if context.invoked_subcommand is not None:
         return
     from posefit.motion.instances import HELD_OUT, TRAINING
     from posefit.suites.functions import FUNCTIONS, SUITE
+    from posefit.suites.registry import suite_registry
 
-    lines = [f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100"]
-    lines += [
-        f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out",
+    training = f"{TRAINING[0]} to {TRAINING[-1]} for training"
+    held_out = f"{HELD_OUT[0]} to {HELD_OUT[-1]} held out"
+    lines = [
+        f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100",
+        f"instances {training}, {held_out}",
         "",
     ]
     lines += [
         f"  {f.number}  {f.name:20} d = {listed(f.dimensions):14} {f.summary}"
         for f in FUNCTIONS
     ]
-    print_result(lines, [asdict(function) for function in FUNCTIONS], as_json)
+    print_result(lines, suite_registry(), as_json)
 
 
 @suite.command("run")
@@ -45,14 +53,14 @@ def suite(context: click.Context, as_json: bool) -> None:
     "functions",
     type=int,
     multiple=True,
-    help="Its number; repeatable, by default each.",
+    help="Number of a function; repeatable, by default all.",
 )
 @click.option(
     "--dimension",
     "dimensions",
     type=int,
     multiple=True,
-    help="Repeatable, by default 9.",
+    help="Dimension of the problems; repeatable, default 9.",
 )
 @click.option(
     "--instances",
@@ -60,28 +68,30 @@ def suite(context: click.Context, as_json: bool) -> None:
     default="10000:10005",
     show_default=True,
     metavar="A:B",
-    help="A to B - 1.",
+    help="Numbers of the instances, A to B - 1.",
 )
 @click.option(
     "--budget",
     type=int,
     default=100,
     show_default=True,
-    help="Evaluations for each dimension, as in plans.",
+    help="Evaluations per dimension, as in plans.",
 )
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option(
+    "--seed", type=int, default=0, show_default=True, help="Seed of the optimiser."
+)
 @click.option(
     "--set",
     "texts",
     multiple=True,
     metavar="SETTING=VALUE",
-    help="Of the optimiser; repeatable.",
+    help="Setting of the optimiser; repeatable.",
 )
 @click.option(
     "--infeasible",
     default="repair",
     show_default=True,
-    help="repair, reject or penalise.",
+    help="What happens to infeasible proposals: repair, reject or penalise.",
 )
 @click.option(
     "--json",
@@ -101,7 +111,7 @@ def suite_run(
     infeasible: Any,
     as_json: bool,
 ) -> None:
-    """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
+    """Run OPTIMISER on problems of the numbered benchmark, and print the results."""
     from posefit import settings
     from posefit.fitting.check import whole
     from posefit.registry import registry
@@ -122,7 +132,8 @@ def suite_run(
         )
         for function in problems.passed_over:
             say(
-                f"function {function.number} is left out: it has dimensions {listed(function.dimensions)}"
+                f"function {function.number} is left out: "
+                f"it has dimensions {listed(function.dimensions)}"
             )
         chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
         asked = (
@@ -141,44 +152,47 @@ def suite_run(
 
 
 def listed(dimensions: Sequence[int]) -> str:
-    """Return dimensions as a list."""
+    """Return dimensions separated by commas."""
     return ", ".join(map(str, dimensions))
 
 
 def _numbers(start: int | None, stop: int | None) -> range:
-    """Return the instances of a range A:B. Raises InputError where there are none."""
+    """Return the instances of a range A:B.
+
+    Raises:
+        InputError: there are none.
+    """
     from posefit.motion.instances import INSTANCES
 
     first = start or 0
     last = INSTANCES.stop if stop is None else stop
     if not 0 <= first < last <= INSTANCES.stop:
         raise InputError(
-            f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}"
+            f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, "
+            f"got {first}:{last}"
         )
     return range(first, last)
 
 
 def _score_lines(scores: "Sequence[SuiteScore]") -> list[str]:
-    """Return the lines of a table of scores, for a terminal: where runs end, and how soon they reach targets."""
+    """Return the lines of a table of scores: costs at the end, times to targets."""
     from posefit.suites.running import ALL, SHOWN
 
     heads = [f"ERT +{above:g}" for above in SHOWN]
-    lines = [
-        f"{'d':>3} {'function':22} {'method':24} {'runs':>5} {'above':>7} {'targets':>8}"
-        + _cells(heads)
-    ]
+    head = f"{'d':>3} {'function':22} {'method':24}"
+    head = f"{head} {'runs':>5} {'above':>7} {'targets':>8}"
+    lines = [head + _cells(heads)]
     for score in scores:
-        function = (
-            score.name if score.function == ALL else f"{score.function} {score.name}"
-        )
+        function = score.name
+        if score.function != ALL:
+            function = f"{score.function} {score.name}"
         times = [
             "-" if time is None else f"{time:.0f}"
             for time in score.running_times.values()
         ]
-        start = f"{score.dimension:>3} {function:22} {score.method:24}"
-        lines.append(
-            f"{start} {score.runs:>5} {score.above:>7.2f} {score.reached:>8.1%}{_cells(times)}".rstrip()
-        )
+        line = f"{score.dimension:>3} {function:22} {score.method:24}"
+        line = f"{line} {score.runs:>5} {score.above:>7.2f} {score.reached:>8.1%}"
+        lines.append((line + _cells(times)).rstrip())
     return lines
 
 

@@ -15,22 +15,20 @@ from posefit.cli.output import print_result, results_alone, say
 @click.option(
     "--out",
     metavar="DIR",
-    help="The ledger's folder: a new one, or one that a sweep goes on in.",
+    help="The ledger's folder: a new one, or that of a sweep to continue.",
 )
 @click.option(
     "--shard",
     metavar="I/N",
-    help="Run the Ith of N shards of the cells, into a file of its own in DIR.",
+    help="Run only the Ith of N shards of the cells, into a separate file in DIR.",
 )
 @options(ENGINE)
 @click.option(
     "--dry-run",
     is_flag=True,
-    help="Print what cells there are, and run none; with --json each cell.",
+    help="Print the cells and a time estimate from a few frames of each method.",
 )
-@click.option(
-    "--retry-quarantined", is_flag=True, help="Try cells again that were quarantined."
-)
+@click.option("--retry-quarantined", is_flag=True, help="Run quarantined cells again.")
 @QUIET
 @JSON
 def sweep(
@@ -43,32 +41,31 @@ def sweep(
     as_json: bool,
     **places: Any,
 ) -> None:
-    """Run the cells of PLAN: methods, motions, views, corruptions and seeds; or single searches of a suite.
+    """Run the cells of PLAN: methods on motions with views, corruptions and seeds.
 
-    PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment: the same command goes
-    on where it was. Several may share a plan and a DIR as shards.
-    Exit status 1 where cells were quarantined after three attempts, 130 where it was stopped.
+    A cell may also be a single search of a suite.
+    PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at
+    any moment: the same command continues it. Several processes may share a plan and a
+    DIR as shards.
+    The exit status is 1 if cells were quarantined after three attempts, 130 if the
+    sweep was stopped.
     """
     from posefit.sweep import command
+    from posefit.sweep import preview as previewing
     from posefit.sweep.engine import Limits
     from posefit.sweep.plan import Plan
+    from posefit.sweep.pool import cores
 
     seconds = places.pop("cell_seconds")
     gigabytes = places.pop("cell_gigabytes")
     start = command.engine(Limits(seconds, gigabytes), **places)
     if dry_run:
-        with results_alone() if as_json else nullcontext():  # a plugin may print, too
-            previewed = command.previewed(plan, out, shard)
-            listed = (
-                [
-                    {"key": cell.key, "done": done, **cell.spec}
-                    for cell, done in previewed
-                ]
-                if as_json
-                else []
-            )
-            lines = command.preview_lines(previewed)
-        return print_result(lines, {"cells": listed}, as_json)
+        # a plugin may print, too
+        with results_alone() if as_json else nullcontext():
+            preview = previewing.preview(plan, out, shard)
+        line = previewing.time_line(preview.seconds, places["workers"] or cores())
+        value = {"cells": preview.cells, "seconds": preview.seconds}
+        return print_result([*preview.lines, line], value, as_json)
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
@@ -76,34 +73,35 @@ def sweep(
         command.file_of(shard)
         cells = Plan.read(plan)
         tell = (lambda _: None) if quiet else say
-        # without an engine there is no folder
+        # the engine starts before the folder is made: if it fails, there is no folder
         tally = command.swept(cells, out, start(), tell, shard=shard, **how)
     print_result(command.tally_lines(tally, out), {"out": out, **vars(tally)}, as_json)
-    click.get_current_context().exit(
-        130 if tally.stopped else 1 if tally.quarantined else 0
-    )
+    context = click.get_current_context()
+    if tally.stopped:
+        context.exit(130)
+    context.exit(1 if tally.quarantined else 0)
 
 
 @click.command()
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page.")
-@click.option("--csv", metavar="FILE", help="A file of all rows.")
+@click.option("--csv", metavar="FILE", help="Write all rows to this file.")
 @click.option(
     "--figures",
     metavar="DIR",
-    help="A folder for figures of a paper; needs posefit[figures].",
+    help="Write figures for a paper to this folder; needs posefit[figures].",
 )
-@click.option("--latex", metavar="FILE", help="The leaderboard as a LaTeX table.")
+@click.option("--latex", metavar="FILE", help="Write the leaderboard as a LaTeX table.")
 @click.option(
     "--methods",
     metavar="NAMES",
     multiple=True,
-    help="Compare these methods alone, such as sapso@pca,cma@pca.",
+    help="Compare only these methods, such as sapso@pca,cma@pca.",
 )
 @click.option(
     "--latest",
     is_flag=True,
-    help="Of methods that differ only in version, compare the latest alone.",
+    help="Of methods that differ only in version, compare only the latest.",
 )
 @JSON
 def report(
@@ -113,14 +111,14 @@ def report(
     as_json: bool,
     **others: Any,
 ) -> None:
-    """Write the results of sweeps to DIR as one page that any browser opens, offline.
+    """Write the results of sweeps in DIR as one page that any browser opens, offline.
 
-    Each DIR is a folder of ledgers (.sqlite), or one of them.
+    Each DIR is a folder of ledgers (.sqlite), or one ledger.
 
-    Without --out it prints the leaderboard and what it shows, and writes no page. What an earlier report wrote is
-    replaced, nothing else is.
+    Without --out the leaderboard is printed and no page is written. The files of an
+    earlier report are replaced; other files are never replaced.
 
-    It may be written while the sweep goes on, of the cells that are done.
+    A report may be written during a sweep. It then covers the finished cells.
     """
     from posefit.report.write import leaderboard_lines, write_report
 
@@ -129,7 +127,10 @@ def report(
 
 
 def _names(texts: tuple[str, ...]) -> list[str]:
-    """Return the names of methods in the texts of an option: commas separate them, but not in brackets."""
+    """Return the names of methods in an option's texts.
+
+    Commas separate them, except in brackets.
+    """
     parts = [part for text in texts for part in re.split(r",(?![^(]*\))", text)]
     return [part.strip() for part in parts if part.strip()]
 
@@ -142,8 +143,8 @@ def _names(texts: tuple[str, ...]) -> list[str]:
 def rerun(ledger: str, key: str, out: str | None, as_json: bool) -> None:
     """Run one row of the results in DIR again, and print which figures differ.
 
-    KEY is the row's key as the report shows it, or as many of its first digits as no other row has.
-    Exit status 1 if a figure other than a time differs.
+    KEY is the row's key in the report, or enough of its first digits.
+    The exit status is 1 if a figure other than a time differs.
     """
     from posefit.report import repeat
 

@@ -1,4 +1,4 @@
-"""A new plugin to start from: a small package that installs, works and has a test that passes."""
+"""Writes a new plugin to start from: a package that installs, works and has a test."""
 
 import re
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from posefit.hooks import PROJECT
 from posefit.reading import quoted
 from posefit.registry import COMMAND, KINDS, Registrable, plugins_of, registry
 
-TAKEN = {"Frame"}  # names that a template's module has already
+TAKEN = {"Frame"}  # names that a template's module uses itself
 
 
 def write_plugin(
@@ -24,24 +24,33 @@ def write_plugin(
     folder: str | Path | None = None,
     commands: Sequence[str] = (),
 ) -> Path:
-    """Return the new folder with a small installable plugin, `posefit-NAME` unless another is given.
+    """Write a small installable plugin, and return its folder.
 
-    `commands` are the names of posefit's own, which a new one cannot have. Raises ValueError where the name cannot
-    be a plugin's, or the folder is there already.
+    Args:
+        name: the plugin's name.
+        kind: optimiser, prior, tracker, start, segmenter or command.
+        folder: the new folder, by default `posefit-NAME`.
+        commands: names of posefit's own commands, which a new one cannot have.
+
+    Raises:
+        InputError: the name cannot be a plugin's, or the folder exists.
     """
     one_of("kind", kind, (*KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(
-            f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}"
+            "name must be small letters, digits, - and _, and begin with a letter, "
+            f"got {quoted(name)}"
         )
     if name in (known := _taken(kind, commands)):
         raise InputError(
-            f"name must be a new one, got {name!r}, which {known[name]} registers already"
+            f"name must be a new one, got {name!r}, "
+            f"which {known[name]} registers already"
         )
     module = name.replace("-", "_")
     if (there := find_spec(f"{PROJECT}_{module}")) is not None:
         raise InputError(
-            f"name must make a new module, got {name!r}: its module {there.name} would hide the one of that name in "
+            f"name must make a new module, got {name!r}: "
+            f"its module {there.name} would hide the one of that name in "
             f"{there.origin or 'sys.path'}"
         )
     class_name = "".join(part.capitalize() for part in module.split("_"))
@@ -52,35 +61,36 @@ def write_plugin(
         "segmenter": f"extract VIDEO --out masks --extraction {name}",
         "start": f"fit MASK.png --height 1.75 --set tracker.start={name}",
     }.get(kind, f"track walk --method {'@' if kind == 'prior' else ''}{name}")
+    usage = f"posefit {used}"
+    if kind != COMMAND:
+        usage = f"posefit check {kind} {name}\n{usage}"
     words = {
         "name": name,
         "kind": kind,
         "module": module,
         "dashed": name.replace("_", "-"),
         "class_name": class_name,
-        "usage": f"posefit check {kind} {name}\n" * (kind != COMMAND)
-        + f"posefit {used}",
+        "usage": usage,
     }
     target = Path(folder or f"posefit-{words['dashed']}")
     target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
-        for template, written in (
-            ("pyproject.toml", "pyproject.toml"),
-            ("README.md", "README.md"),
-            (f"{kind}.py", f"posefit_{module}.py"),
-            (f"{COMMAND if kind == COMMAND else 'kit'}_test.py", f"test_{module}.py"),
-        ):
-            text = (files("posefit") / "templates" / f"{template}.txt").read_text(
-                encoding="utf-8"
-            )
-            (building / written).write_text(
-                Template(text).substitute(words), encoding="utf-8"
-            )
+        test = COMMAND if kind == COMMAND else "kit"
+        written = {
+            "pyproject.toml": "pyproject.toml",
+            "README.md": "README.md",
+            f"{kind}.py": f"posefit_{module}.py",
+            f"{test}_test.py": f"test_{module}.py",
+        }
+        for template, file_name in written.items():
+            source = files("posefit") / "templates" / f"{template}.txt"
+            text = Template(source.read_text(encoding="utf-8")).substitute(words)
+            (building / file_name).write_text(text, encoding="utf-8")
     return target
 
 
 def _taken(kind: Registrable, commands: Sequence[str]) -> dict[str, str]:
-    """Return the names that a new plugin cannot have, each with the distribution that has it."""
+    """Return the names that are taken, each with its distribution."""
     if kind != COMMAND:
         return {
             offer.name: offer.distribution for offer in registry().offers[kind].values()

@@ -25,11 +25,17 @@ from posefit.errors import InputError
 from posefit.progress import Progress
 
 if TYPE_CHECKING:
-    from posefit.footage.source import Kind
+    from posefit.footage.source import Medium
     from posefit.output.content import Content
 
-_OF_FILES = ("source", "out", "force", "resume")
-COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
+_OF_FILES = ("source", "out", "force", "resume", "write")
+# what a user looks at first
+HINTS = {
+    "html": "open track.html",
+    "mp4": "watch overlay.mp4",
+    "png": "look at summary.png",
+}
+COLOURS = {"good": "green", "doubtful": "yellow", "do not use": "red"}
 
 
 @click.command(cls=TrackCommand)
@@ -66,8 +72,7 @@ def track(
         "took "
         + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items())
     )
-    hint = "open track.html, watch overlay.mp4, look at summary.png"
-    _print(result.content, as_json, {}, options["out"], verbose, hint)
+    _print(result.content, as_json, {}, options, verbose, HINTS)
 
 
 @click.command(cls=TrackCommand)
@@ -75,10 +80,8 @@ def track(
 @under("What is seen")(
     "--frame",
     type=int,
-    default=0,
-    show_default=True,
     metavar="K",
-    help="The frame, after resampling.",
+    help="The frame: its number as filmed, of a motion after resampling; by default the first.",
 )
 def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.
@@ -99,9 +102,9 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
         result.track.content,
         as_json,
         more,
-        options["out"],
+        options,
         verbose,
-        "open track.html, look at summary.png",
+        {kind: HINTS[kind] for kind in ("html", "png")},
     )
 
 
@@ -115,7 +118,9 @@ def _track_live(
             f"SOURCE must be left out with --live, got {' '.join(options['source'])}"
         )
     if useless := [
-        name for name in ("force", "resume", "without_subject") if options[name]
+        name
+        for name in ("force", "resume", "write", "without_subject")
+        if options[name]
     ]:
         raise InputError(
             f"--{useless[0].replace('_', '-')} must be left out with --live"
@@ -143,11 +148,12 @@ def _print(
     content: "Content",
     as_json: bool,
     more: Mapping[str, Any],
-    out: str | None,
+    options: Mapping[str, Any],
     verbose: bool,
-    hint: str,
+    hints: Mapping[str, str],
 ) -> None:
-    """Print what a track is: as JSON with something more, in three lines, or whole."""
+    """Print what a track is: as JSON with something more, in three lines, or whole; then which file to look at."""
+    from posefit.output.files import WRITERS, chosen_kinds
     from posefit.output.text import brief, table
 
     if as_json:
@@ -160,16 +166,19 @@ def _print(
         grade = "good" if content.trust is None else content.trust.grade
         click.secho(worth, bold=True, fg=COLOURS[grade])
         click.echo("\n".join(work))
+    out = options["out"]
+    kinds = chosen_kinds(options["write"])
+    shown = [hint for kind, hint in hints.items() if kind in kinds]
     if out or not verbose:
         click.echo(
-            f"written to {out}: {hint}"
+            f"written to {out}: {', '.join(shown or [WRITERS[kind][0] for kind in kinds])}"
             if out
             else "--verbose prints all figures; --out DIR writes files"
         )
 
 
 @click.command()
-@click.argument("video")
+@click.argument("source")
 @click.option(
     "--out",
     required=True,
@@ -188,7 +197,7 @@ def _print(
 @options(track_flags("person"))
 @JSON
 def extract(
-    video: str,
+    source: str,
     out: str,
     as_json: bool,
     frames: Any,
@@ -196,15 +205,18 @@ def extract(
     person: Any,
     **options: Any,
 ) -> None:
-    """Take the masks of one person out of a VIDEO, or a folder of pictures, before a still background."""
+    """Write the masks of one person as a file, of whatever SOURCE one camera took.
+
+    They are taken out of a video, or of pictures, before a still background; masks are cleaned, and motions drawn.
+    """
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
-    from posefit.footage.source import kind_of
+    from posefit.footage.source import resolve
 
-    how = replace(
-        extraction_of(options, kind_of(video), settings) or Extraction(), person=person
-    )
-    result = run(video, out, how, frames=frames, progress=progress)
+    resolved = resolve(source)
+    how = extraction_of(options, resolved.medium, settings) or Extraction()
+    how = replace(how, person=person)
+    result = run(resolved, out, how, frames=frames, progress=progress)
     if result["guesses"]:
         say(f"guessed: {'; '.join(result['guesses'])}")
     for warning in result["warnings"]:
@@ -212,33 +224,39 @@ def extract(
     if as_json:
         click.echo(json.dumps(result))
         return
+    pieces = ""
+    if result["in_pieces"] is not None:
+        pieces = f", {result['in_pieces']} in pieces"
     click.echo(
-        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border, "
-        f"{result['in_pieces']} in pieces; written to {out}: watch preview.mp4"
+        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border{pieces}; "
+        f"written to {out}: watch preview.mp4"
     )
 
 
-def _arguments(options: dict[str, Any], kind: "Kind | None" = None) -> dict[str, Any]:
-    """Return the keywords of `posefit.track` that the command's options stand for, for a source of a kind."""
-    from posefit.footage.source import kind_of
+def _arguments(
+    options: dict[str, Any], medium: "Medium | None" = None
+) -> dict[str, Any]:
+    """Return the keywords of `posefit.track` that the command's options stand for; of a stream with its medium."""
+    from posefit.footage.source import resolve
     from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
 
-    source = options["source"] or ("walk",)
-    options = {**options, "source": source}
-    kind = kind or kind_of(source[0])
-    options["extraction"] = extraction_of(options, kind)
+    options = {**options}
+    if medium is None:
+        options["source"] = resolve(options["source"] or "walk")
+        medium = options["source"].medium
+    options["extraction"] = extraction_of(options, medium)
     if left_out := options.pop("without_subject"):
         chosen = TrackOptions(
             **{name: options[name] for name in ("method", "settings", "train")}
         )
-        motion = source[0] if kind == "motion" else None
+        motion = options["source"].named[0] if medium == "motion" else None
         options["train"] = without_subjects(completed(chosen, motion).train, left_out)
     return options
 
 
 def extraction_of(
-    options: dict[str, Any], kind: "Kind", settings: Sequence[str] | None = None
+    options: dict[str, Any], medium: "Medium", settings: Sequence[str] | None = None
 ) -> Any:
     """Return how the person is taken out of a video, by options that are taken out of them; None by default.
 
@@ -255,9 +273,9 @@ def extraction_of(
         for name in ("extraction", "background", "roi", "ignore", "width")
     }
     values = {name: value for name, value in values.items() if value is not None}
-    if kind not in ("video", "pictures"):
+    if medium not in ("video", "pictures"):
         for name, value in values.items():
-            raise useless_for(kind, name, value, "video")
+            raise useless_for(medium, name, value, "video")
         return None
     if "extraction" in values:
         values["method"] = values.pop("extraction")

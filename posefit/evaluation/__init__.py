@@ -1,8 +1,8 @@
-"""What a track is worth: errors where the truth is known, signs of trust where it is not.
+"""The quality of a track: errors if the truth is known, signs of trust if it is not.
 
 | looking for | file |
 |---|---|
-| the figures of a whole track: names, labels, units, digits and meanings | measures.py |
+| the figures of a track: names, labels, units, digits and meanings | measures.py |
 | the columns of frames.csv; errors, baselines, certainty and steadiness | errors.py |
 | whether a track can be trusted, and why | trust.py |
 """

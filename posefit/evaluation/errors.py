@@ -1,16 +1,16 @@
-"""What a track is worth: its errors beside those of trivial baselines, frame by frame and as a whole.
+"""The figures of a track and of each frame: errors, baselines, certainty, steadiness.
 
-`FRAME` are the columns of frames.csv: a column is a line there, and its values in `evaluated`.
+`FRAME` defines the columns of frames.csv, and `evaluated` computes them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evaluation.measures import MEASURES, Measure, Measures, Spread
+from posefit.evaluation.measures import MEASURES, Effort, Measure, Measures, Spread
 from posefit.fitting import metrics
 from posefit.fitting.prior import Latents
 from posefit.fitting.tracker import Frame, Observation
@@ -23,15 +23,16 @@ from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, reliability
 from posefit.uncertainty.intervals import joint_intervals
 from posefit.uncertainty.modes import likeliest_is_right, nearer_mirrored, unknown_sides
 
-# `nearest` draws more training poses than these in two rounds: every fourth in a small picture, then the best and
-# their neighbours in the clip at full size
+# If there are more training poses than this, `nearest` has two rounds. In the first,
+# every fourth pose is rendered in a small picture. In the second, the best of these and
+# their neighbours in the clip are rendered at full size.
 MAX_FULL_SIZE_POSES = 8_000
 SMALL_STRIDE = 4
 FULL_SIZE_CANDIDATES = 200
-# pixels of a small picture's side, and by how much it is smaller
+# the smallest side of a small picture in pixels, and its largest reduction
 MIN_SMALL_SIDE = 60
 MAX_SMALL_FACTOR = 4
-LOST = 0.5  # a frame is called lost from this probability on
+LOST = 0.5  # frames with at least this probability are called lost
 MAX_TRACE_POINTS = 64
 
 FRAME = {
@@ -88,7 +89,7 @@ FRAME = {
             "time",
             "ms",
             1,
-            "that the estimate took, since that of the frame before",
+            "wall time of the estimate, from the end of the previous frame's",
             1e3,
         ),
         Measure(
@@ -96,19 +97,21 @@ FRAME = {
             "activity",
             "",
             0,
-            "what the person does, a word; blank where not estimated",
+            "the person's activity in a word; blank where not estimated",
         ),
     )
 }
-# (T,) a column, by the names of `FRAME`; NaN where a value is unknown
+# columns (T,) by the names of `FRAME`, NaN where a value is unknown
 Table = dict[str, Array]
 
 
 def unseen(table: Table) -> set[int]:
-    """Return the numbers, as filmed, of frames that were held or are called lost; files leave their places blank."""
-    return set(
-        table["frame"][(table["usable"] == 0.0) | (table["lost"] >= LOST)].tolist()
-    )
+    """Return the numbers in the footage of frames that were held or are called lost.
+
+    Files leave the values of these frames blank.
+    """
+    is_unseen = (table["usable"] == 0.0) | (table["lost"] >= LOST)
+    return set(table["frame"][is_unseen].tolist())
 
 
 def evaluated(
@@ -117,27 +120,40 @@ def evaluated(
     prior: Latents | None,
     training: Array | None,
     beta: float,
-    clock: Array,
-    effort: Mapping[str, int] | None = None,
+    effort: Effort,
 ) -> tuple[Table, Measures]:
-    """Return a column for each figure of a frame, and what the whole track is worth.
+    """Return the figures of each frame, and of the whole track.
 
-    Baselines have the true root and translation, which a tracker has not: `mean_pose`, the mean of the training poses
-    (n, 63), which only the errors against a truth need; `persistence`, the true pose of the first frame; `nearest`, the
-    training pose of least cost in each frame. `prior_floor_degrees` is the error of the truth projected into the prior,
-    which is no floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took, and
-    `effort` the evaluations of each stage; without it all are of the frames.
+    Baselines have the true root and translation, which a tracker does not have:
+
+    - `mean_pose` is the mean of the training poses.
+    - `persistence` is the true pose of the first frame.
+    - `nearest` is the training pose of least cost in each frame.
+
+    `prior_floor_degrees` is the error of the truth projected into the prior. It is a
+    lower limit only for a linear prior.
+
+    Args:
+        scene: The observations, and the truth if it is known.
+        frames: The tracked frames.
+        prior: The prior of the method, or None.
+        training: The training poses (n, 63). Only errors against a truth need them.
+        beta: The weight in the cost of a pose.
+        effort: The seconds and the evaluations that the track took.
+
+    Returns:
+        The columns of frames.csv, and the figures of the track.
     """
     cost = np.array([frame.cost for frame in frames])
     held = np.zeros(len(frames), dtype=bool)
     iou = np.empty(len(frames))  # the mean over the cameras that saw something
-    # once: those of a known motion are rendered
+    # iterate once, as observations of a known motion are rendered
     for k, observation in enumerate(scene.observations):
         known = [silhouette.known for silhouette in observation.silhouettes]
-        iou[k] = metrics.iou(frames[k].areas)[
-            known if any(known) else slice(None)
-        ].mean()
+        by_view = metrics.iou(frames[k].areas)
+        iou[k] = by_view[known if any(known) else slice(None)].mean()
         held[k] = not observation.usable
+    # if no frame is usable, the figures are of all frames
     usable = np.ones(len(frames), dtype=bool) if held.all() else ~held
     errors, error_measures = _errors(scene, frames, prior, training, beta)
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))
@@ -153,9 +169,8 @@ def evaluated(
         "evaluations": evaluations,
         "wall_seconds": np.array([frame.seconds for frame in frames]),
     }
-    seconds, cpu_seconds = clock.tolist()
-    effort = effort or {"frames": int(evaluations.sum())}
-    total = sum(effort.values())
+    stages = effort.evaluations or {"frames": int(evaluations.sum())}
+    total = sum(stages.values())
     measures = Measures(
         **error_measures,
         **certainty_measures,
@@ -163,11 +178,11 @@ def evaluated(
         iou=float(iou[usable].mean()),
         cost=float(cost[usable].mean()),
         held_frames=int(held.sum()),
-        seconds_per_frame=seconds / len(frames),
-        cpu_seconds_per_frame=cpu_seconds / len(frames),
+        seconds_per_frame=effort.seconds / len(frames),
+        cpu_seconds_per_frame=effort.cpu_seconds / len(frames),
         evaluations=total,
-        effort=effort,
-        evaluations_per_second=total / seconds,
+        effort=stages,
+        evaluations_per_second=total / effort.seconds,
     )
     return table, measures
 
@@ -179,14 +194,15 @@ def _errors(
     training: Array | None,
     beta: float,
 ) -> tuple[Table, dict[str, Any]]:
+    """Return the columns and the figures that need the truth, none without it."""
     if scene.truth is None:
         return {}, {}
     assert training is not None
     truth = scene.truth.poses
     places = scene.truth.translations
     skeleton = scene.body.skeleton
+    # the estimate has the given body, which may differ from the true one
     estimate = scene.motion(frames)
-    # the given body may be another
     poses = estimate.poses
     joints = estimate.joints
     true_joints = scene.truth.joints
@@ -201,55 +217,49 @@ def _errors(
     errors = columns["error_degrees"]
 
     def with_root(angles: Array) -> Array:
-        return np.column_stack(
-            [truth[:, :3], np.broadcast_to(angles, (len(truth), truth.shape[1] - 3))]
-        )
+        """Return poses (T, 66) of joint angles (63,) or (T, 63) with the true root."""
+        shape = (len(truth), truth.shape[1] - 3)
+        return np.column_stack([truth[:, :3], np.broadcast_to(angles, shape)])
 
     def error_of(poses: Array) -> float:
         return float(metrics.pose_error_degrees(truth, poses).mean())
 
+    nearest_poses = [
+        nearest(scene, training, k, observation, beta)
+        for k, observation in enumerate(scene.observations)
+    ]
     trivial = {
         "mean_pose": with_root(training.mean(axis=0)),
         "persistence": np.tile(truth[0], (len(truth), 1)),
-        "nearest": np.array(
-            [
-                nearest(scene, training, k, each, beta)
-                for k, each in enumerate(scene.observations)
-            ]
-        ),
+        "nearest": np.array(nearest_poses),
     }
-    baselines = {name: error_of(poses) for name, poses in trivial.items()}
-    floor = (
-        None
-        if prior is None
-        else error_of(with_root(prior.inverse_transform(prior.transform(truth[:, 3:]))))
+    baselines = {}
+    baselines_mm = {}
+    skills = {}
+    for name, trivial_poses in trivial.items():
+        baselines[name] = error_of(trivial_poses)
+        trivial_joints = skeleton.joints(trivial_poses, places)
+        baselines_mm[name] = float(metrics.mpjpe_mm(true_joints, trivial_joints).mean())
+        skills[name] = metrics.skill(means["error_degrees"], baselines[name])
+    floor = None
+    if prior is not None:
+        projected = prior.inverse_transform(prior.transform(truth[:, 3:]))
+        floor = error_of(with_root(projected))
+    free_errors = metrics.pose_error_degrees(truth, poses, skeleton.free)
+    spread = Spread(
+        metrics.mean_error(errors), metrics.error_spread(errors), float(errors.max())
     )
     return columns, {
-        **{
-            name: means[name]
-            for name in ("geodesic_degrees", "mpjpe_mm", "pa_mpjpe_mm")
-        },
-        "error_degrees": Spread(
-            metrics.mean_error(errors),
-            metrics.error_spread(errors),
-            float(errors.max()),
-        ),
-        "free_error_degrees": float(
-            metrics.pose_error_degrees(truth, poses, skeleton.free).mean()
-        ),
+        "geodesic_degrees": means["geodesic_degrees"],
+        "mpjpe_mm": means["mpjpe_mm"],
+        "pa_mpjpe_mm": means["pa_mpjpe_mm"],
+        "error_degrees": spread,
+        "free_error_degrees": float(free_errors.mean()),
         "swap_rate": means["swapped"],
         "lost_rate": float(metrics.lost_rate(columns["mpjpe_mm"])),
-        "skill": {
-            name: metrics.skill(means["error_degrees"], error)
-            for name, error in baselines.items()
-        },
+        "skill": skills,
         "baselines_degrees": baselines,
-        "baselines_mm": {
-            name: float(
-                metrics.mpjpe_mm(true_joints, skeleton.joints(each, places)).mean()
-            )
-            for name, each in trivial.items()
-        },
+        "baselines_mm": baselines_mm,
         "prior_floor_degrees": floor,
     }
 
@@ -257,10 +267,14 @@ def _errors(
 def _certainty(
     scene: Scene, frames: Sequence[Frame], swapped: Array | None
 ) -> tuple[Table, dict[str, Any]]:
-    """Return the columns and the measures of how certain the method is; NaN in frames where that is unknown."""
+    """Return the columns and the figures of the method's certainty.
+
+    Columns are NaN in frames whose certainty is unknown.
+    """
     skeleton = scene.body.skeleton
     truth = scene.truth
-    sides, radius_mm = np.full((2, len(frames)), np.nan)
+    sides = np.full(len(frames), np.nan)
+    radius_mm = np.full(len(frames), np.nan)
     lost = np.array([np.nan if frame.lost is None else frame.lost for frame in frames])
     inside: list[NDArray[np.bool_]] = []
     radii_mm: list[Array] = []
@@ -268,54 +282,58 @@ def _certainty(
         if frame.posterior is None:
             continue
         sides[k] = unknown_sides(skeleton, frame.posterior, frame.pose)
+        # (levels, 26): joints are relative to the root, so it is left out
         radii = joint_intervals(skeleton, frame.posterior, frame.pose)[:, 1:]
         radii_mm.append(1e3 * radii)
         radius_mm[k] = radii_mm[-1][MAIN_LEVEL].mean()
         if truth is not None:
             off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
             inside.append(np.linalg.norm(off, axis=1)[1:] <= radii)
+    swapped_known = None if swapped is None else mean_known(swapped[sides == 0.0])
+    is_lost = lost[np.isfinite(lost)] >= LOST
     measures = {
         "coverage": _by_level(inside),
         "interval_mm": _by_level(radii_mm),
         "unknown_rate": mean_known(sides),
-        "swapped_known_rate": None
-        if swapped is None
-        else mean_known(swapped[sides == 0.0]),
-        "lost_flagged_rate": mean_known(
-            (lost[np.isfinite(lost)] >= LOST).astype(np.float64)
-        ),
+        "swapped_known_rate": swapped_known,
+        "lost_flagged_rate": mean_known(is_lost.astype(np.float64)),
     }
     return {"unknown_sides": sides, "lost": lost, "interval_mm": radius_mm}, measures
 
 
 def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
-    """Return the mean at each level of values (levels, joints) of frames, by the level's name; None where none has."""
-    means = np.mean(frames, axis=(0, 2)) if frames else np.empty(0)
-    return {
-        f"{100 * LEVELS[k]:.0f}": float(mean) for k, mean in enumerate(means)
-    } or None
+    """Return the mean at each level of the values (levels, joints) of frames.
+
+    The keys are the levels in percent. The result is None without frames.
+    """
+    if not frames:
+        return None
+    means = np.mean(frames, axis=(0, 2))  # (levels,)
+    return {f"{100 * LEVELS[k]:.0f}": float(mean) for k, mean in enumerate(means)}
 
 
 def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
+    """Return the figures of acceleration and of sliding feet."""
     joints = scene.motion(frames).joints
     fps = scene.fps
     mean = mean_known(acceleration(joints, fps))
-    true_joints = None if scene.truth is None else scene.truth.joints
-    true_mean = (
-        None if true_joints is None else mean_known(acceleration(true_joints, fps))
-    )
-    slid = slides(joints, standing(joints if true_joints is None else true_joints, fps))
+    ratio = None
+    reference = joints  # the joints that decide when a foot stands
+    if scene.truth is not None:
+        reference = scene.truth.joints
+        true_mean = mean_known(acceleration(reference, fps))
+        if mean is not None and true_mean:
+            ratio = mean / true_mean
+    slid = slides(joints, standing(reference, fps))
     return {
         "acceleration": mean,
-        "acceleration_ratio": mean / true_mean
-        if mean is not None and true_mean
-        else None,
+        "acceleration_ratio": ratio,
         "foot_slide_mm": 1e3 * float(slid.mean()) if len(slid) else None,
     }
 
 
 def mean_known(values: Array) -> float | None:
-    """Return the mean of what is known of values (T,); None where nothing is."""
+    """Return the mean of the finite values (T,), or None if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else None
 
@@ -323,26 +341,31 @@ def mean_known(values: Array) -> float | None:
 def nearest(
     scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA
 ) -> Array:
-    """Return the pose (66,) of least cost in frame k of joint angles (n, 63), with the true root and translation.
+    """Return the training pose of least cost in a frame.
 
-    Of more than 8,000 only those are drawn at full size that lie, in their clips, beside the 200 that fit best of
-    every fourth in a picture a quarter as large: a fifth of the time, and the same pose but for rare ties.
+    With more than 8,000 training poses, every fourth is first compared in a picture a
+    quarter as large. Only the best 200 of these and their neighbours in the clips are
+    then compared at full size. This takes a fifth of the time, and the result is the
+    same except for rare ties.
+
+    Args:
+        scene: A scene with a known truth.
+        training: The joint angles of training poses (n, 63).
+        k: The frame's number.
+        observation: The frame's silhouettes.
+        beta: The weight in the cost of a pose.
+
+    Returns:
+        The pose (66,), with the true root.
     """
     assert scene.truth is not None
     if len(training) > MAX_FULL_SIZE_POSES:
-        sides = [
-            side for camera in scene.cameras for side in (camera.width, camera.height)
-        ]
-        factor = int(np.clip(min(sides) // MIN_SMALL_SIDE, 1, MAX_SMALL_FACTOR))
+        side = min(min(camera.width, camera.height) for camera in scene.cameras)
+        factor = int(np.clip(side // MIN_SMALL_SIDE, 1, MAX_SMALL_FACTOR))
         costs = _costs(scene, training[::SMALL_STRIDE], k, observation, beta, factor)
         first = SMALL_STRIDE * np.argsort(costs, kind="stable")[:FULL_SIZE_CANDIDATES]
-        rows = np.unique(
-            np.clip(
-                first[:, None] + np.arange(1 - SMALL_STRIDE, SMALL_STRIDE),
-                0,
-                len(training) - 1,
-            )
-        )
+        neighbours = first[:, None] + np.arange(1 - SMALL_STRIDE, SMALL_STRIDE)
+        rows = np.unique(np.clip(neighbours, 0, len(training) - 1))
         training = training[rows]
     best = training[_costs(scene, training, k, observation, beta).argmin()]
     return np.concatenate([scene.truth.poses[k, :3], best])
@@ -356,11 +379,13 @@ def _costs(
     beta: float,
     factor: int = 1,
 ) -> Array:
-    """Return the cost (n,) in frame k of joint angles (n, 63), in pictures `factor` times smaller."""
+    """Return the costs (n,) of joint angles (n, 63) in frame k.
+
+    They are computed in pictures whose sides are `factor` times smaller.
+    """
     assert scene.truth is not None
-    poses = np.column_stack(
-        [np.tile(scene.truth.poses[k, :3], (len(training), 1)), training]
-    )
+    roots = np.tile(scene.truth.poses[k, :3], (len(training), 1))
+    poses = np.column_stack([roots, training])
     translations = np.tile(scene.truth.translations[k], (len(poses), 1))
     cameras = scene.cameras
     silhouettes = observation.silhouettes
@@ -373,26 +398,33 @@ def _costs(
 
 
 def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
-    """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
+    """Return the mean anytime trace of a track's frames.
 
-    A frame that spent fewer keeps its last cost; frames without a search do not count. There are at most 64 points.
+    A frame with fewer evaluations keeps its last cost. Frames without a search do not
+    count.
+
+    Args:
+        frames: The tracked frames.
+
+    Returns:
+        At most 64 points: `evaluations` of a frame, rising, and the mean best `cost`
+        after each.
     """
     searched = [frame.trace for frame in frames if len(frame.trace)]
     if not searched:
         return {"evaluations": [], "cost": []}
     points = np.unique(np.concatenate([trace[:, 0] for trace in searched]))
-    # from where every frame has a cost
+    # begin where every frame has a cost
     points = points[points >= max(trace[0, 0] for trace in searched)]
     if len(points) > MAX_TRACE_POINTS:
         wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
         points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
-    mean = np.mean(
-        [
-            trace[np.searchsorted(trace[:, 0], points, side="right") - 1, 1]
-            for trace in searched
-        ],
-        axis=0,
-    )
+    costs = []
+    for trace in searched:
+        # the last improvement at or before each point
+        rows = np.searchsorted(trace[:, 0], points, side="right") - 1
+        costs.append(trace[rows, 1])
+    mean = np.mean(costs, axis=0)  # (points,)
     return {
         "evaluations": [int(point) for point in points],
         "cost": [float(f"{cost:.6g}") for cost in mean],
@@ -402,7 +434,17 @@ def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
 def mode_reliability(
     frames: Sequence[Frame], truth: Array, skeleton: Skeleton
 ) -> list[list[float]]:
-    """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
+    """Return how often the likeliest mode of a frame is right.
+
+    Args:
+        frames: The tracked frames.
+        truth: The true joints (T, 27, 3) in metres.
+        skeleton: The skeleton of the frames' poses.
+
+    Returns:
+        For each bin of the likeliest mode's probability: the number of frames, the mean
+        probability, and the share of frames whose mode is right.
+    """
     weighed = [
         (frame.modes, joints)
         for frame, joints in zip(frames, truth, strict=True)

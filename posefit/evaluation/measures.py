@@ -1,14 +1,16 @@
-"""The figures that say what a track is worth, each defined once: its name, label, unit, digits and meaning.
+"""The figures of a track, each defined once: its name, label, unit, digits and meaning.
 
-`Measures` are those of a whole track: summary.json, `--json`, the rows of a sweep, its CSV and the report's columns
-have them under these names. Where the truth is unknown, a figure that needs it is None.
+`Measures` has the figures of a whole track. They have the same names in summary.json,
+in `--json`, in the rows of a sweep, in its CSV and in the report. A figure that needs
+the truth is None if the truth is unknown.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-# Trivial methods that a track is held against, and what a table calls them. All have the true root and translation.
+# Trivial methods with which a track is compared, and their labels. All of them have the
+# true root and translation.
 BASELINES = {
     "mean_pose": "mean training pose",
     "persistence": "first true pose, held",
@@ -18,32 +20,44 @@ BASELINES = {
 
 @dataclass(frozen=True)
 class Measure:
-    """What a figure is: what it is called, how it is shown, and what it means."""
+    """The definition of a figure.
+
+    Attributes:
+        name: Its name in files.
+        label: Its name in texts.
+        unit: The unit of displayed values, "" if it has none.
+        digits: The digits after the point of displayed values.
+        meaning: Its meaning in half a sentence.
+        factor: Multiplies a value to convert it to `unit`.
+    """
 
     name: str
     label: str
-    unit: str  # in which it is shown; "" for none
-    digits: int  # that are shown after the point
+    unit: str
+    digits: int
     meaning: str
-    factor: float = 1.0  # what a value is multiplied by to be in `unit`
+    factor: float = 1.0
 
     def number(self, value: float | None) -> str:
-        """Return a value with its digits and without its unit; a dash where there is none."""
+        """Return a value with its digits and without its unit, or "-" for None."""
         return "-" if value is None else f"{self.factor * value:,.{self.digits}f}"
 
     def shown(self, value: float | None) -> str:
         """Return a value with its label and unit, such as `MPJPE 18 mm`."""
-        return " ".join(
-            word for word in (self.label, self.number(value), self.unit) if word
-        )
+        words = (self.label, self.number(value), self.unit)
+        return " ".join(word for word in words if word)
 
 
 def _figure(*figure: Any) -> Any:
-    """Return the field of a figure, None where it is unknown: all of `Measure` but the name."""
+    """Return the field of a figure, None by default.
+
+    The arguments are the fields of a `Measure` except its name.
+    """
     return field(default=None, metadata={"measure": figure})
 
 
 def _share(label: str, meaning: str) -> Any:
+    """Return the field of a share, which is displayed in percent."""
     return _figure(label, "%", 0, meaning, 100.0)
 
 
@@ -56,9 +70,22 @@ class Spread:
     max: float
 
 
+@dataclass(frozen=True)
+class Effort:
+    """What a track took, from the first mask that was read."""
+
+    seconds: float
+    cpu_seconds: float
+    # of each stage: first_pose, build, frames, later_passes; empty where all are of the frames
+    evaluations: Mapping[str, int] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Measures:
-    """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
+    """The figures of one track, which `MEASURES` defines.
+
+    Figures of baselines, and skills, are by the names of `BASELINES`.
+    """
 
     error_degrees: Spread | None = _figure(
         "error",
@@ -76,7 +103,7 @@ class Measures:
         "error of free angles",
         "degrees",
         2,
-        "the error over those angles alone that the skeleton lets move",
+        "the error over only the angles that the skeleton lets move",
     )
     mpjpe_mm: float | None = _figure(
         "MPJPE",
@@ -94,7 +121,8 @@ class Measures:
         "IoU",
         "",
         3,
-        "intersection over union of body and mask, the mean over usable views and frames",
+        "intersection over union of body and mask, the mean over usable views and "
+        "frames",
     )
     cost: float = _figure(
         "cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)"
@@ -107,13 +135,15 @@ class Measures:
     )
     coverage: Mapping[str, float] | None = _share(
         "coverage",
-        "share of joints but the root whose truth lies within their 50, 80 and 95 % intervals",
+        "share of joints, except the root, with the truth in their 50, 80 and 95 % "
+        "intervals",
     )
     interval_mm: Mapping[str, float] | None = _figure(
         "interval",
         "mm",
         0,
-        "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over all but the root",
+        "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over "
+        "all except the root",
     )
     unknown_rate: float | None = _share(
         "flagged unknown",
@@ -121,7 +151,7 @@ class Measures:
     )
     swapped_known_rate: float | None = _share(
         "swapped where known",
-        "share swapped of the frames whose left and right it calls known",
+        "share of swapped frames among those whose left and right it calls known",
     )
     lost_flagged_rate: float | None = _share(
         "flagged lost", "share of frames that the method calls lost"
@@ -130,23 +160,25 @@ class Measures:
         "acceleration",
         "m/s2",
         1,
-        "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter",
+        "acceleration of the joints, the mean over joints and frames: about 6 in a "
+        "walk; more is jitter",
     )
     acceleration_ratio: float | None = _figure(
-        "acceleration ratio", "", 1, "the same, over that of the true joints"
+        "acceleration ratio", "", 1, "the same, divided by the true joints'"
     )
     foot_slide_mm: float | None = _figure(
         "foot slide",
         "mm a step",
         0,
-        "how far a foot that stands (as the true one does, else where it is low and slow) gets along the ground, the "
-        "mean over steps: about 20 of motion capture",
+        "distance that a standing foot moves along the ground, the mean over steps: "
+        "about 20 in motion capture; a foot stands while the true one does, or while "
+        "it is low and slow if the truth is unknown",
     )
     held_frames: int = _figure(
         "held",
         "frames",
         0,
-        "frames that show too little: the pose is held or carried on, not searched",
+        "frames that show too little: the pose is not searched, but held or continued",
     )
     skill: Mapping[str, float | None] | None = _figure(
         "skill",
@@ -186,7 +218,8 @@ class Measures:
         "effort",
         "evaluations",
         0,
-        "evaluations by stage: the first pose, the build, the frames, and later passes over them",
+        "evaluations by stage: the first pose, the build, the frames, and later passes "
+        "over them",
     )
     evaluations_per_second: float = _figure(
         "speed", "poses a second", 0, "evaluations over that time"

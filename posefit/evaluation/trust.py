@@ -1,7 +1,9 @@
-"""Can a track be trusted, where the truth is unknown? Signs beside the mask, and one sentence that they come to.
+"""Signs of whether a track can be trusted if the truth is unknown, and their summary.
 
-The signs are of size, depth, standing feet and what moves in the pictures; each has a limit from which on it makes a
-track doubtful, and one from which on useless. docs/howto/trust.md has the limits and the footage that they are from.
+Besides the overlap with the masks they are size, depth, standing feet, motion in the
+pictures, and others. Each sign has a limit from which the track is doubtful, and one
+from which it is unusable. docs/howto/trust.md has the limits, and the footage from which
+they come.
 """
 
 from collections import deque
@@ -28,26 +30,28 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, touches_border
 from posefit.uncertainty.modes import poses_apart
 
-SMOOTH_SECONDS = 0.5  # before and after a frame, to which a smooth path is fitted
+# A smooth path is fitted to the frames within this time before and after a frame.
+SMOOTH_SECONDS = 0.5
 MIN_SMOOTH_FRAMES = 5  # of such a fit
-SCATTER_QUANTILE = 0.9  # of frames that lie nearer to that path
-TRAINING_SECONDS = 1.0 / 15.0  # between poses of a motion that others are compared with
-# of the person's longer side: motion as near as that to the body is its own clothes'
-# and hair's
+SCATTER_QUANTILE = 0.9  # the share of frames that are nearer to that path
+TRAINING_SECONDS = 1.0 / 15.0  # between the compared poses of a training motion
+# A share of the person's longer side. What moves this near to the body is clothes or
+# hair.
 CLOTHES = 0.05
-MIN_MOVED = 0.02  # of the body's area: fewer pixels that moved are noise
-USELESS_TOGETHER = 3  # signs that make a track doubtful make it useless together
-MIN_FRAMES = 12  # fewer are too few to judge depth, feet and motion by
-SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
-# within 20 degrees of the line of sight a person is seen from the front or the back
+MIN_MOVED = 0.02  # a share of the body's area; fewer pixels that moved are noise
+UNUSABLE_TOGETHER = 3  # this many signs of a doubtful track make it unusable
+MIN_FRAMES = 12  # the fewest frames to judge depth, feet and motion
+SAMPLED_FRAMES = 60  # spread over the footage; their sizes and poses are compared
+# A person within 20 degrees of the line of sight is seen from the front or the back.
 FRONTAL = np.sin(np.radians(20.0))
-MAX_STATIONARY_METRES = 1.0  # along the ground's axes: who stays within walks nowhere
+# along each axis of the ground; within this, the person stays in one place
+MAX_STATIONARY_METRES = 1.0
 
-# why a sign is unknown
+# reasons why a sign is unknown
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
 SEVERAL = "several cameras see the depth"
-NOT_REPORTED = "the method does not say"
-MASKS_ALONE = "there are masks alone"
+NOT_REPORTED = "the method does not report it"
+MASKS_ALONE = "there are only masks"
 STILL = "nothing moves enough"
 MOVES = "the camera moves"
 TOO_FEW = "too few frames show the person"
@@ -55,16 +59,28 @@ IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves t
 
 
 def longer_side(mask: Mask) -> int:
-    """Return the longer side in pixels of a mask's bounding box, 0 where it is empty or cut by the picture's edge."""
-    return (
-        0 if touches_border(mask) else max(cv2.boundingRect(mask.astype(np.uint8))[2:])
-    )
+    """Return the longer side of a mask's bounding box in pixels.
+
+    It is 0 if the mask is empty or cut by the picture's border.
+    """
+    if touches_border(mask):
+        return 0
+    return max(cv2.boundingRect(mask.astype(np.uint8))[2:])
 
 
 def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
-    """Return how far estimated depths (T,) lie off a smooth path, as a share of the depth; None of too few.
+    """Return how far depths are from a smooth path, as a share of the depth.
 
-    Nine in ten usable frames lie nearer. The path is the parabola through the frames within half a second.
+    Nine in ten usable frames are nearer to the path. It is the parabola fitted to the
+    frames within half a second.
+
+    Args:
+        depths: The depth of each frame (T,) in metres.
+        usable: Whether each frame is usable (T,).
+        fps: Frames per second.
+
+    Returns:
+        The share, or None if there are too few frames.
     """
     known = np.flatnonzero(usable & (depths > 0.0))
     away = []
@@ -77,45 +93,64 @@ def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float
 
 
 def held_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
-    """Return the share of frames that are not usable (T,) between the first and the last that are; 1 where none is.
+    """Return the share of unusable frames between the first and the last usable one.
 
-    Frames before the person comes and after they have gone say nothing against a track; nor does a gap that begins or
-    ends with a mask `cut` (T,) by the picture's border: there the person was out of the picture.
+    Frames before the person comes and after they have left do not count. Neither does a
+    gap that begins or ends with a mask cut by the picture's border, because the person
+    was then outside the picture.
+
+    Args:
+        usable: Whether each frame is usable (T,).
+        cut: Whether the picture's border cuts the mask of each frame (T,).
+
+    Returns:
+        The share of the frames from the first to the last usable one, 1 if no frame is
+        usable.
     """
     known = np.flatnonzero(usable)
     if not len(known):
         return 1.0
-    gaps = [
-        (start, stop) for start, stop in runs(~usable) if known[0] < start < known[-1]
-    ]
-    lost = [
-        stop - start
-        for start, stop in gaps
-        if not cut[[start - 1, start, stop - 1, stop]].any()
-    ]
-    return sum(lost) / float(known[-1] + 1 - known[0])
+    held = 0
+    for start, stop in runs(~usable):
+        is_inner = known[0] < start < known[-1]
+        if is_inner and not cut[[start - 1, start, stop - 1, stop]].any():
+            held += stop - start
+    return held / float(known[-1] + 1 - known[0])
 
 
 def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
-    """Return how far apart in metres the heights are at which feet stand, of joints (T, 27, 3); None of one stance.
+    """Return the spread of the heights at which feet stand, in metres.
 
-    It is the standard deviation over stances (T, 2) of the ball's height, y being up.
+    It is the standard deviation over stances of the height of the foot's ball.
+
+    Args:
+        joints: The joints (T, 27, 3) in metres; y is up.
+        stands: Whether each foot stands (T, 2).
+
+    Returns:
+        The spread, or None if there are fewer than two stances.
     """
-    each = [
-        (start, stop, ball)
-        for ball, flags in zip(BALLS, stands.T, strict=True)
-        for start, stop in runs(flags)
-    ]
-    heights = [joints[start:stop, ball, 1].mean() for start, stop, ball in each]
+    heights = []
+    for ball, flags in zip(BALLS, stands.T, strict=True):
+        for start, stop in runs(flags):
+            heights.append(joints[start:stop, ball, 1].mean())
     return float(np.std(heights)) if len(heights) > 1 else None
 
 
 def training_distances(
     skeleton: Skeleton, poses: Array, training: Sequence[Motion]
 ) -> Array:
-    """Return how far poses (n, 66) are from the nearest of some motions (n,): metres, the mean over joints.
+    """Return the distance of poses from the nearest pose of some motions.
 
-    All are turned to yaw 0, and mirror images count, too. Infinite without any motion.
+    All poses are turned to yaw 0, and mirror images count, too.
+
+    Args:
+        skeleton: The skeleton.
+        poses: The poses (n, 66).
+        training: The motions.
+
+    Returns:
+        The mean distance of the joints (n,) in metres, inf without motions.
     """
     both = np.concatenate([poses, mirrored_poses(skeleton, poses)])
     nearest = np.full(2 * len(poses), np.inf)
@@ -132,26 +167,33 @@ def training_distances(
 def explained_share(
     scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]
 ) -> float | None:
-    """Return which share of the pixels that move, at the person and around, the fitted body covers.
+    """Return the share of moving pixels at and around the person that the body covers.
 
-    The pixels of all usable frames (T,) count together, as the first camera filmed them. None without pictures, or
-    where nothing moves.
+    The pixels of all usable frames of the first camera count together.
+
+    Args:
+        scene: The footage.
+        frames: The tracked frames.
+        usable: Whether each frame is usable (T,).
+
+    Returns:
+        The share, or None if there are no pictures or nothing moves.
     """
     if scene.pictures is None:
         return None
     camera = scene.cameras[0]
     reach = 0
-    counts = np.zeros(2, dtype=np.int64)
-    before: deque[tuple[Image, Mask, Mask]] = deque(
-        maxlen=max(1, round(LAG * scene.fps))
-    )
-    for ok, frame, observation, image in zip(
+    counts = np.zeros(2, dtype=np.int64)  # of covered pixels, and of all that moved
+    # pictures are compared with one from `LAG` seconds before
+    lag = max(1, round(LAG * scene.fps))
+    before: deque[tuple[Image, Mask, Mask]] = deque(maxlen=lag)
+    for is_usable, frame, observation, image in zip(
         usable, frames, scene.observations, scene.pictures(), strict=False
     ):
         body = project(scene.body, camera, frame.pose, frame.translation)
         observed = observation.silhouettes[0].mask
         reach = max(reach, longer_side(observed))
-        if before and ok:
+        if before and is_usable:
             then, old_body, old_observed = before[0]
             counts += covered_pixels(
                 image, then, body | old_body, observed | old_observed, reach
@@ -163,36 +205,50 @@ def explained_share(
 def covered_pixels(
     image: Image, then: Image, body: Mask, observed: Mask, reach: float
 ) -> tuple[int, int]:
-    """Return how many pixels that moved since another picture lie at the body, and how many there are.
+    """Return how many pixels moved between two pictures, at the body and in all.
 
-    Only pixels as near as half of `reach`, the person's longer side in pixels, to the body or to what was
-    observed count; both masks are those of the two pictures together.
+    Only pixels near the body or the observed mask count.
+
+    Args:
+        image: A picture.
+        then: An earlier picture.
+        body: The mask of the body in both pictures together.
+        observed: The observed mask in both pictures together.
+        reach: The person's longer side in pixels. Pixels within half of it count.
+
+    Returns:
+        The number of pixels at the body, and of all. Both are 0 if only few moved.
     """
     region = body | observed
     if not region.any():
         return 0, 0
-    moved, inside = moved_pixels(
-        changed_pixels(image, then), region, body, reach, CLOTHES
-    )
+    changed = changed_pixels(image, then)
+    moved, inside = moved_pixels(changed, region, body, reach, CLOTHES)
     return (inside, moved) if moved > MIN_MOVED * body.sum() else (0, 0)
 
 
-Grade = Literal["good", "doubtful", "useless"]
+Grade = Literal["good", "doubtful", "do not use"]
+# how the sentence of each grade begins
 _BEGINNING: dict[Grade, str] = {
     "good": "good. ",
     "doubtful": "doubtful: ",
-    "useless": "do not use: ",
+    "do not use": "do not use: ",
 }
 
 
 @dataclass(frozen=True)
 class Sign:
-    """How far a figure may be off its best value until a track is doubtful or useless, and its words.
+    """The limits and the texts of a sign.
 
-    Words are formats of all figures: what speaks `against` a track, and how the figure is `listed`.
+    Texts are format strings with the names of all figures.
+
+    Attributes:
+        limits: The best value, and the distances from it at which a track is doubtful
+            and unusable. None for a sign that never speaks against a track.
+        against: The text if the sign speaks against a track.
+        listed: The text in the list of all signs.
     """
 
-    # the best, and how far off is doubtful and useless; None: never
     limits: tuple[float, float, float] | None
     against: str = ""
     listed: str = ""
@@ -201,20 +257,31 @@ class Sign:
 def _sign(
     limits: tuple[float, float, float] | None, against: str = "", listed: str = ""
 ) -> Any:
+    """Return the field of a sign."""
     return field(metadata={"sign": Sign(limits, against, listed)})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trust:
-    """Whether a track can be trusted: a sentence, a grade, what speaks against it, and every sign; None is unknown.
+    """Whether a track can be trusted. Each other attribute is a sign, None if unknown.
 
-    The limits are ours, from footage made from the truth and the demonstration video: docs/howto/trust.md has them.
+    The limits are ours. They come from footage that was made from a known truth, and
+    from the demonstration video; docs/howto/trust.md has them.
+
+    Attributes:
+        sentence: The grade, and the worst sign.
+        grade: "good", "doubtful" or "do not use".
+        against: What speaks against the track, the worst first.
+        frames: The number of frames that show enough of the person.
+        height_m: The height of the fitted body.
+        size_m: The height of the person as seen by several cameras.
+        unknown_signs: The reason why each unknown sign is unknown.
     """
 
     sentence: str
     grade: Grade
     against: list[str]
-    frames: int  # that show enough of the person
+    frames: int
     height_m: float
     size_m: float | None
     size_ratio: float | None = _sign(
@@ -229,7 +296,7 @@ class Trust:
     )
     foot_share: float | None = _sign(
         (1.0, 0.8, 1.0),
-        "a foot stands in {foot_share:.0%} of the frames only",
+        "a foot stands in only {foot_share:.0%} of the frames",
         "a foot stands in {foot_share:.0%} of frames",
     )
     stance_spread_m: float | None = _sign(
@@ -239,7 +306,7 @@ class Trust:
     )
     explained: float | None = _sign(
         (1.0, 0.3, 0.6),
-        "the body covers {explained:.0%} of what moves only",
+        "the body covers only {explained:.0%} of what moves",
         "the body covers {explained:.0%} of what moves",
     )
     interval_mm: float | None = _sign(
@@ -247,7 +314,8 @@ class Trust:
     )
     training_mm: float | None = _sign(
         (0.0, 60.0, 200.0),
-        "one camera leaves depth to the motions learned from, and the nearest are {training_mm:.0f} mm away",
+        "with one camera, depth follows the motions learned from, and the nearest is "
+        "{training_mm:.0f} mm away",
         "{training_mm:.0f} mm from the motions learned from",
     )
     lost: float | None = _sign(
@@ -262,25 +330,26 @@ class Trust:
     )
     held: float = _sign(
         (0.0, 0.25, 0.6),
-        "the person is mostly out of sight in {held:.0%} of the frames in between",
+        "the person is mostly hidden in {held:.0%} of the frames",
         "held {held:.0%}",
     )
     cropped: float | None = _sign(
         (0.0, 0.25, 0.6),
-        "the picture's border cuts the mask above and below in {cropped:.0%} of the frames: masks cropped to the "
-        "person do not show where they are",
+        "the picture's border cuts the mask above and below in {cropped:.0%} of the "
+        "frames: masks cropped to the person do not show where they are",
     )
     frontal: float | None = _sign(
         (0.0, 0.5, 1.0),
-        "one camera sees the front or the back in {frontal:.0%} of the frames, where steps and lean do not show",
+        "one camera sees the front or the back in {frontal:.0%} of the frames, where "
+        "steps and lean do not show",
     )
     iou: float = _sign(
-        (1.0, 0.35, 0.55), "the body and the mask overlap by {iou:.0%} only"
+        (1.0, 0.35, 0.55), "the body and the mask overlap by only {iou:.0%}"
     )
     acceleration: float | None = _sign(
         (0.0, 14.0, 60.0), "joints jerk, by {acceleration:.0f} m/s2"
     )
-    unknown_signs: Mapping[str, str]  # why each is unknown
+    unknown_signs: Mapping[str, str]
 
     def __str__(self) -> str:
         return self.sentence
@@ -294,58 +363,85 @@ SIGNS: dict[str, Sign] = {
 
 
 def signs_against(figures: Mapping[str, Any]) -> list[tuple[Grade, str]]:
-    """Return what speaks against a track, the worst first, by figures named as `SIGNS`; None of them is not known."""
+    """Return what speaks against a track.
+
+    Args:
+        figures: The figures of a `Trust` by name, None if unknown.
+
+    Returns:
+        The grade and the text of each sign against the track, the worst first.
+    """
     few = f"only {counted(figures['frames'], 'frame')} to judge the person by"
+    # a severity above 0 is doubtful, and above 1 unusable
     signs = [(1.0 - figures["frames"] / MIN_FRAMES, few)]
     for name, sign in SIGNS.items():
         if sign.limits is not None and figures[name] is not None:
-            best, doubtful, useless = sign.limits
-            severity = (abs(figures[name] - best) - doubtful) / (useless - doubtful)
+            best, doubtful, unusable = sign.limits
+            severity = (abs(figures[name] - best) - doubtful) / (unusable - doubtful)
             signs.append((severity, sign.against.format(**figures)))
     signs.sort(key=lambda severity_and_words: severity_and_words[0], reverse=True)
-    return [
-        ("useless" if severity > 1.0 else "doubtful", words)
-        for severity, words in signs
-        if severity > 0.0
-    ]
+    against: list[tuple[Grade, str]] = []
+    for severity, words in signs:
+        if severity > 0.0:
+            against.append(("do not use" if severity > 1.0 else "doubtful", words))
+    return against
 
 
 def grade_of(signs: Sequence[tuple[Grade, str]]) -> Grade:
-    """Return what signs come to: that of the worst, but three doubtful ones together are as bad as a useless one."""
+    """Return the grade of a track from the signs against it, the worst first.
+
+    It is the grade of the worst sign, but three signs together make a track unusable.
+    """
     if not signs:
         return "good"
-    return "useless" if len(signs) >= USELESS_TOGETHER else signs[0][0]
+    return "do not use" if len(signs) >= UNUSABLE_TOGETHER else signs[0][0]
 
 
 def sentence(figures: Mapping[str, Any], signs: Sequence[tuple[Grade, str]]) -> str:
-    """Return whether a track can be trusted: the grade, and the worst sign or what speaks for it."""
+    """Return a sentence with the grade and the worst sign, or with the good signs.
+
+    Args:
+        figures: The figures of a `Trust` by name, None if unknown.
+        signs: The signs against the track, as `signs_against` returns them.
+
+    Returns:
+        The sentence.
+    """
     beginning = f"Trust: {_BEGINNING[grade_of(signs)]}"
     if not signs:
         return f"{beginning}No sign speaks against it: {_listed(figures)}."
+    others = ""
     more = len(signs) - 1
-    others = (
-        ""
-        if not more
-        else f", and {more} more sign{'s speak' if more > 1 else ' speaks'} against it"
-    )
+    if more == 1:
+        others = ", and 1 more sign speaks against it"
+    elif more:
+        others = f", and {more} more signs speak against it"
     return f"{beginning}{signs[0][1]}{others}."
 
 
 def trust_line(trust: Mapping[str, Any]) -> str:
-    """Return the signs of a track in one line, each in words, also those that are unknown."""
+    """Return all known signs of a track in one line, and why its size is unknown.
+
+    Args:
+        trust: The attributes of a `Trust` by name.
+
+    Returns:
+        The line.
+    """
+    line = f"signs: {_listed(trust)}"
     size_unknown = trust["unknown_signs"].get("size_ratio")
-    return f"signs: {_listed(trust)}" + (
-        f"; size unknown: {size_unknown}" if size_unknown else ""
-    )
+    if size_unknown:
+        line += f"; size unknown: {size_unknown}"
+    return line
 
 
 def _listed(figures: Mapping[str, Any]) -> str:
-    known = (
-        sign.listed.format(**figures)
-        for name, sign in SIGNS.items()
-        if figures[name] is not None
-    )
-    return ", ".join(filter(None, known))
+    """Return the texts of the known signs."""
+    texts = []
+    for name, sign in SIGNS.items():
+        if figures[name] is not None and sign.listed:
+            texts.append(sign.listed.format(**figures))
+    return ", ".join(texts)
 
 
 def trust_of(
@@ -356,34 +452,44 @@ def trust_of(
     iou: float,
     training: Sequence[Motion],
 ) -> Trust:
-    """Return whether a track can be trusted: the sentence, the grade, every figure, and why some are not known.
+    """Return whether a track can be trusted.
 
-    `tracked` are the tracker's frames, and `frames` these in the end, smoothed; `iou` is their overlap with
-    the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
+    Shares are of the frames that show enough of the person.
+
+    Args:
+        scene: The footage.
+        tracked: The frames of the tracker.
+        frames: The final frames, smoothed.
+        table: The columns of frames.csv.
+        iou: The overlap of the final frames with the masks.
+        training: The motions that the method learned from.
+
+    Returns:
+        The grade, its sentence, all signs, and why some signs are unknown.
     """
     usable = table["usable"] == 1.0
-    cut, cropped = np.array([_borders(each) for each in scene.observations]).T
+    borders = [_borders(observation) for observation in scene.observations]
+    cut, cropped = np.array(borders).T
     few = usable.sum() < MIN_FRAMES
     several = len(scene.cameras) > 1
     fps = scene.fps
     joints = scene.motion(frames).joints
     camera = scene.cameras[0]
     stands = standing(joints, fps) & usable[:, None]
-    in_place = (
-        few
-        or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= MAX_STATIONARY_METRES
-    )
-    depths = (
-        np.array([frame.translation for frame in tracked]) @ camera.rotation[2]
-        + camera.translation[2]
-    )
+    in_place = few
+    if not few:
+        ground = joints[usable, 0][:, [0, 2]]  # (n, 2), the root's path
+        in_place = np.ptp(ground, axis=0).max() <= MAX_STATIONARY_METRES
+    # smoothing would hide how much depths jump, so use the tracker's frames
+    places = np.array([frame.translation for frame in tracked])  # (T, 3)
+    depths = places @ camera.rotation[2] + camera.translation[2]
     turns = np.array(
         [frame.pose[0] - facing(camera, frame.translation) for frame in frames]
     )
-    lost, unknown, radii = (
-        table[name][usable] for name in ("lost", "unknown_sides", "interval_mm")
-    )
-    # the figure of each of `SIGNS`, or a text: why it is unknown
+    lost = table["lost"][usable]
+    unknown = table["unknown_sides"][usable]
+    radii = table["interval_mm"][usable]
+    # each of `SIGNS`, as its figure or as the reason why it is unknown
     signs: dict[str, float | str] = {
         "size_ratio": _figure(
             {ONE_CAMERA: not several}, lambda: _size(scene, frames, usable), TOO_FEW
@@ -451,11 +557,15 @@ def trust_of(
 
 
 def _borders(observation: Observation) -> tuple[bool, bool]:
-    """Return whether the picture's border cuts the person in some view, and whether above and below in all."""
+    """Return whether the picture's border cuts the person.
+
+    The first value is whether it does in any view, the second whether it does above and
+    below in all views.
+    """
     masks = [silhouette.mask for silhouette in observation.silhouettes]
-    return any(map(touches_border, masks)), all(
-        mask[0].any() and mask[-1].any() for mask in masks
-    )
+    cut = any(map(touches_border, masks))
+    cropped = all(mask[0].any() and mask[-1].any() for mask in masks)
+    return cut, cropped
 
 
 def _figure(
@@ -463,11 +573,18 @@ def _figure(
     compute: Callable[[], float | None],
     otherwise: str = "",
 ) -> float | str:
-    """Return a figure, or why it is unknown: the first of the reasons that holds, or `otherwise` where it is None."""
+    """Return a figure, or the reason why it is unknown.
+
+    Args:
+        reasons: Whether each reason holds. The first one that does is returned.
+        compute: Computes the figure if none of them holds.
+        otherwise: The reason if the result is None.
+    """
     for reason, holds in reasons.items():
         if holds:
             return reason
-    return otherwise if (value := compute()) is None else value
+    value = compute()
+    return otherwise if value is None else value
 
 
 def _training_mm(
@@ -476,7 +593,7 @@ def _training_mm(
     usable: NDArray[np.bool_],
     training: Sequence[Motion],
 ) -> float | None:
-    """Return how far the poses of usable frames (T,) are from motions, millimetres, the mean."""
+    """Return the mean distance of usable frames' poses from motions in millimetres."""
     poses = np.array([frame.pose for frame in frames])[usable]
     sampled = poses[:: max(1, len(poses) // SAMPLED_FRAMES)]
     return mean_known(1e3 * training_distances(scene.body.skeleton, sampled, training))
@@ -485,16 +602,19 @@ def _training_mm(
 def _size(
     scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]
 ) -> float | None:
-    """Return how large the person looks beside the body, the median over all cameras and frames over the footage."""
+    """Return the size of the person's masks divided by the fitted body's.
+
+    It is the median over all cameras and sampled frames, or None if no mask is whole.
+    """
     shown = np.flatnonzero(usable).tolist()
     ratios = []
     for k in shown[:: max(1, len(shown) // SAMPLED_FRAMES)]:
-        for camera, silhouette in zip(
-            scene.cameras, scene.observations[k].silhouettes, strict=True
-        ):
+        frame = frames[k]
+        silhouettes = scene.observations[k].silhouettes
+        for camera, silhouette in zip(scene.cameras, silhouettes, strict=True):
             observed = longer_side(silhouette.mask)
-            fitted = longer_side(
-                project(scene.body, camera, frames[k].pose, frames[k].translation)
-            )
-            ratios += [observed / fitted] if observed and fitted else []
+            body = project(scene.body, camera, frame.pose, frame.translation)
+            fitted = longer_side(body)
+            if observed and fitted:
+                ratios.append(observed / fitted)
     return float(np.median(ratios)) if ratios else None

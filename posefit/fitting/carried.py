@@ -15,6 +15,9 @@ from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Optimiser
 from posefit.fitting.space import SearchSpace
 
+# Builds an optimiser of a space, with a generator and the evaluations of its search.
+OptimiserMaker = Callable[[Space, np.random.Generator, int], Optimiser]
+
 CARRIED = "carried"  # the name among the details of a frame
 # of a space, those that the tracker has again before its first frame
 FIXED = ("prior", "tilt", "translation", "root_order")
@@ -44,7 +47,8 @@ def revived(
     state: Mapping[str, Any],
     space: SearchSpace,
     rng: np.random.Generator,
-    make: Callable[[Space, np.random.Generator], Optimiser],
+    evaluations: int,
+    make: OptimiserMaker,
 ) -> Optimiser:
     """Return the filter that held a state, made by `make`; the generator stays as it is.
 
@@ -53,7 +57,7 @@ def revived(
     known = {name: _made(value) for name, value in state["space"].items()}
     space = replace(space, **known)
     before = rng.bit_generator.state
-    optimiser = make(space, rng)
+    optimiser = make(space, rng, evaluations)
     rng.bit_generator.state = before
     vars(plugin_of(optimiser)).update(_made(state["optimiser"], space, rng))
     return optimiser

@@ -17,6 +17,7 @@ from posefit.geometry.camera import Camera
 from posefit.silhouette.cost import (
     BETA,
     Areas,
+    check_square,
     costs_in,
     drawing_of,
     known_views,
@@ -98,6 +99,7 @@ class SilhouetteCost:
             silhouette.mask.any() for silhouette in self.silhouettes
         ):
             raise InputError("silhouettes must show a person, got an empty mask")
+        check_square(self.cameras)
         between("beta", self.beta, 0.0, 1.0)
         at_least("threads", self.threads, 1)
 

@@ -6,7 +6,7 @@ A broken rule ends the track with one line that names the tracker; a wrong figur
 import math
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -62,13 +62,13 @@ class Audit:
 
 
 def drive(
-    tracker: Tracker,
+    make: Callable[[Task], Tracker],
+    audit: Audit,
     task: Task,
     observations: Iterable[Observation],
     rng: np.random.Generator,
-    audit: Audit,
 ) -> Iterator[Frame]:
-    """Yield the tracker's frame for each observation, with the time that it took.
+    """Yield a tracker's frame for each observation, with the time that it took; `make` makes the tracker of the task.
 
     Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
     pose. An honest frame stays as it is. Raises BrokenRuleError where a frame is missing or wrong.
@@ -95,6 +95,9 @@ def drive(
             waiting.append(observation)
             yield observation
 
+    # ValueErrors of its settings, and libraries that are missing, are the user's
+    with plugin_errors(audit.name, "construction", (ValueError, ImportError)):
+        tracker = make(task)
     source = taken()
     training = (motion.poses[:, 3:] for motion in task.training)
     axes = FreeAxes(task.body.skeleton, training)

@@ -9,9 +9,10 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.box import Space, Start, displacement
+from posefit.fitting.box import Start, displacement
 from posefit.fitting.carried import (
     CARRIED,
+    OptimiserMaker,
     carried,
     plugin_of,
     revived,
@@ -157,6 +158,8 @@ class Tracker(Protocol):
 
 # Builds a tracker, as `factory(task, **settings)`: a Task and keyword-only settings.
 TrackerFactory = Callable[..., Tracker]
+# Yields a frame for each observation of a task, as a method's tracker estimates it.
+Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
 class Initialiser(Protocol):
@@ -372,13 +375,13 @@ class Predictor:
 class SynthesisTracker:
     """Follows a person by a search a frame, started around a prediction. SAPSO section 4.
 
-    `make` builds an optimiser from a space and a generator, and from the evaluations of its search where these are not
-    the task's; `next_frame` says what becomes of it in the next frame.
+    `make` builds an optimiser from a space, a generator and the evaluations of its search; `next_frame` says what
+    becomes of it in the next frame.
     """
 
     task: Task
     prior: Latents
-    make: Callable[..., Optimiser]
+    make: OptimiserMaker
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
     # of the prior and the training, where it was learned before
@@ -399,8 +402,9 @@ class SynthesisTracker:
                 yield latest
                 continue
             budget = task.evaluations - predictor.guess_evaluations
-            several = space.start is not None and len(space.start.others) > 0
-            if several and self.next_frame == "start":
+            # of a single picture, which nothing that follows can correct: a track goes on from one swarm as well
+            alone = self.next_frame == "start" and len(task.modes) > 1
+            if alone and space.start is not None and space.start.others:
                 searches = self._raced(space, observation, budget, rng)
                 best = cheapest(searches[0])
                 predictor.commit(best.best)
@@ -413,9 +417,8 @@ class SynthesisTracker:
                 cast(Filter, optimiser).advance(space)
             else:
                 known = replace(space, start=None)
-                optimiser = self._made(
-                    known if self.next_frame == "forget" else space, rng, budget
-                )
+                around = known if self.next_frame == "forget" else space
+                optimiser = self.make(around, rng, budget)
             problem = self.problem(space, observation, budget)
             minimise(problem, optimiser, budget_known=True)
             predictor.commit(problem.best)
@@ -431,16 +434,9 @@ class SynthesisTracker:
         """Return the filter that the frames before this track held; None if they held none."""
         for frame in reversed(self.task.before):
             if state := frame.details.get(CARRIED):
-                return revived(state, space, rng, self.make)
+                evaluations = self.task.evaluations
+                return revived(state, space, rng, evaluations, self.make)
         return None
-
-    def _made(
-        self, space: Space, rng: np.random.Generator, evaluations: int
-    ) -> Optimiser:
-        """Return an optimiser of a search within so many evaluations."""
-        if evaluations == self.task.evaluations:
-            return self.make(space, rng)
-        return self.make(space, rng, evaluations)
 
     def _raced(
         self,
@@ -455,7 +451,7 @@ class SynthesisTracker:
         def search(start: Start, evaluations: int) -> Problem:
             around = replace(space, start=replace(start, others=()))
             problem = self.problem(around, observation, evaluations)
-            optimiser = self._made(around, rng, evaluations)
+            optimiser = self.make(around, rng, evaluations)
             return minimise(problem, optimiser, budget_known=True)
 
         starts = [replace(space.start, others=()), *space.start.others]

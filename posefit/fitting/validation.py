@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from traceback import extract_tb
 from typing import Any
@@ -189,16 +190,21 @@ class FreeAxes:
 
     def __init__(self, skeleton: Skeleton, training: Iterable[Array]) -> None:
         self._fixed = np.flatnonzero(~skeleton.free[ANGLES - JOINT_ANGLES :])
-        self._reach = np.zeros(len(self._fixed))
-        for angles in training:
+        self._training = training
+
+    @cached_property
+    def _reach(self) -> Array:
+        """How far off 0 the angles may be (n,), which takes long to learn from a large library."""
+        reach = np.zeros(len(self._fixed))
+        for angles in self._training:
             off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
-            self._reach = np.maximum(self._reach, off)
-        self._reach += FIXED_TOLERANCE
+            reach = np.maximum(reach, off)
+        return reach + FIXED_TOLERANCE
 
     def broken(self, angles: Array) -> str:
         """Return the rule that joint angles (n, 63) break, or ""."""
         off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
-        if not (off > self._reach).any():
+        if not (off > FIXED_TOLERANCE).any() or not (off > self._reach).any():
             return ""
         worst = int((off - self._reach).argmax())
         joint, axis = divmod(int(self._fixed[worst]), 3)

@@ -9,18 +9,19 @@ What happens to a mask, an arrow a file:
 
 | from | to | file |
 |---|---|---|
-| what a user names | which kind it is, and its scene by the arrows below | source.py |
+| what a user names | of which kind it is, and its scene by the arrows below | source.py |
 | a picture | the values by which it marks a person | images.py |
-| images, an .npz or .npy file: their values | `masks.PackedMasks`, a bit a pixel | readers.py |
+| images, an .npz or .npy file: their values | a `views.View`, a bit a pixel | readers.py |
 | masks from elsewhere | those of one person, upright and without holes | cleaning.py |
 | a video file, or pictures one a frame | frames at even times | video.py |
-| frames | `masks.PackedMasks` of the person in them; the files of `posefit extract` | segmentation.py, extract.py |
+| frames | a `View` of the person in them; the files of `posefit extract` | segmentation.py, extract.py |
 | masks of segmented frames | a verdict whether they can be a person's | quality.py |
-| a stream | the person in its latest frame | live.py |
-| masks and calibrations of one camera or several | the `Scene`, straightened, in metres, +y up | cameras.py |
+| a stream | a `View` of each frame | live.py |
+| views and calibrations | the `Scene`, straightened, in metres, +y up | cameras.py |
 | a known motion | the `Scene` of its rendered masks, on a GPU, or corrupted on purpose | scene.py |
 
-What is decoded becomes bits at once, and later stages unpack these. What a source does not state is guessed in one of
-these places, and is in `Scene.guesses`. From a mask to its cost it goes on through `silhouette/mask.py`,
-`fitting/tracker.py`, `fitting/cost.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
+A new kind of source is a reader and a line of `source.KINDS`. What is decoded becomes bits at once, and a `View` is
+never changed. What a source does not state is guessed in one of these places, and is in `Scene.guesses`. From a mask to
+its cost it goes on through `silhouette/mask.py`, `fitting/tracker.py`, `fitting/cost.py`, `silhouette/cost.py` and
+`silhouette/kernels.py`.
 """

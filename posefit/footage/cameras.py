@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,8 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.errors import InputError
+from posefit.errors import InputError, NoPersonError
 from posefit.footage.images import IMAGES
-from posefit.footage.masks import ARRAYS, PackedMasks, Views, undistorted
 from posefit.footage.people import Persons, part_at, paste
 from posefit.footage.quality import (
     apparent_size,
@@ -22,7 +21,9 @@ from posefit.footage.quality import (
     extent_of,
     meeting,
 )
+from posefit.footage.readers import ARRAYS
 from posefit.footage.scene import Scene
+from posefit.footage.views import Observations, View, undistorted
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import (
     Calibration,
@@ -45,26 +46,13 @@ GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
 # of a camera from its world's origin: no metres, and no centimetres either
 FAR = 100.0
 FARTHER = 1000.0
+# metres: the origin is on the floor as a rule, or in the first camera
+BELOW = 1.0
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
 
-@dataclass(frozen=True, eq=False)
-class CameraView:
-    """The masks of one camera."""
-
-    masks: PackedMasks
-    warnings: Sequence[str]
-    name: str  # of the source
-    # size of the video, where the masks were taken from one
-    filmed: tuple[int, int] | None = None
-    pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
-    # of each frame, as `Segmenter.facing`; NaN where unknown
-    facings: Array | Sequence[float] = ()
-    moves: bool = False  # whether the camera seems to
-
-
 def combined(
-    views: Sequence[CameraView],
+    views: Sequence[View],
     name: str,
     body: Body,
     known: Sequence[Camera | Calibration],
@@ -80,27 +68,28 @@ def combined(
     InputError where views and cameras do not fit each other, or several cameras cannot see one person of this size.
     """
     rate, stated = _rate(views, fps)
-    guesses = [guess for view in views for guess in view.masks.guesses]
-    if not stated and len(views[0].masks) > 1:
+    guesses = [guess for view in views for guess in view.guesses]
+    if not stated and len(views[0]) > 1:
         guesses.append(f"{rate:g} frames a second")
     if not known:
         guesses.append(
             "a level camera, 40 degrees across: distances and sizes are as good as that"
         )
     world, metres, of_cameras = world_of(known, up, unit)
-    unit_is_open = unit is None and any(
-        isinstance(camera, Calibration) for camera in known
-    )
+    scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
+    unit_is_open = unit is None and bool(scales - {"metres"})
     if known:
-        cameras, views = map(
+        cameras, views, said = map(
             list,
             zip(*map(partial(_straight, world, metres), known, views), strict=True),
         )
+        guesses += [sentence for sentences in said for sentence in sentences]
     else:
-        cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].masks.size)]
+        cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)]
     # several cameras distinguish front and back themselves
-    yaws = yaws_of(views[0].facings if len(views) == 1 else (), cameras[0], rate)
-    observations = Views([view.masks for view in views], yaws)
+    facings = views[0].facings if len(views) == 1 else None
+    yaws = yaws_of(() if facings is None else facings, cameras[0], rate)
+    observations = Observations(views, yaws)
     if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
         miss, tall = apparent
         if unit_is_open and np.median(tall) > 0.0:
@@ -110,6 +99,13 @@ def combined(
             if METRES[likely_unit] != metres:
                 of_cameras["unit"] = f"the calibration is in {UNIT_NAMES[likely_unit]}"
             factor = METRES[likely_unit] / metres
+            if "free" in scales and disagreement(
+                factor * miss, factor * tall, body.stature
+            ):
+                factor = body.stature / float(np.median(tall))
+                of_cameras["unit"] = (
+                    f"the calibration's unit is {factor * metres:.4g} m, by the person's height"
+                )
             cameras = [
                 replace(camera, translation=factor * camera.translation)
                 for camera in cameras
@@ -117,7 +113,7 @@ def combined(
             miss = factor * miss
             tall = factor * tall
         if wrong := disagreement(miss, tall, body.stature):
-            raise InputError(f"{name}: {wrong}")
+            raise NoPersonError(f"{name}: {wrong}")
     first = observations[observations.first]
     yaw = first.yaw
     if view_degrees is not None:
@@ -138,55 +134,126 @@ def combined(
         + _unequal(views),
         guesses=[*guesses, *of_cameras.values()],
         pictures=views[0].pictures,
-        first=views[0].masks.first,
+        first=int(views[0].numbers[0]),
         camera_moves=views[0].moves,
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Straightening:
+    """How what a camera saw becomes what one without distortion sees, whose pixels are square."""
+
+    camera: Camera
+    lens: Calibration
+    maps: tuple[Any, Any]
+
+    def of(self, view: View) -> View:
+        """Return a view of the straight camera."""
+        pictures = view.pictures and partial(self._pictures, view.pictures)
+        straight = undistorted(view, self.lens, self.maps, self.camera)
+        return replace(straight, pictures=pictures)
+
+    def _pictures(self, pictures: Callable[[], Iterator[Image]]) -> Iterator[Image]:
+        for image in pictures():
+            yield np.asarray(
+                cv2.remap(image, *self.maps, cv2.INTER_LINEAR), dtype=np.uint8
+            )
+
+
+def straightening(
+    known: Camera | Calibration,
+    size: tuple[int, int],
+    filmed: tuple[int, int] | None = None,
+    world: Array | None = None,
+    metres: float = 1.0,
+) -> tuple[Camera, Straightening | None, list[str]]:
+    """Return the camera of masks, how they are straightened for it, and what is to be said of that.
+
+    This is the one place where a lens' distortion is taken off, and where pixels that are not square become square.
+
+    Args:
+        known: The camera, or its calibration.
+        size: Width and height of the masks.
+        filmed: Width and height of the video that they were taken from.
+        world: Rotation (3, 3) that turns the calibration's world so that +y is up.
+        metres: Of the calibration's unit.
+
+    Returns:
+        The camera without distortion, of square pixels; how masks and pictures become its own, None where they are;
+        sentences.
+
+    Raises:
+        InputError: The masks are not of this camera.
+
+    """
+    said = list[str]()
+    lens = Calibration.of(known, "") if isinstance(known, Camera) else known
+    if isinstance(known, Camera) and (known.width, known.height) == size:
+        camera = known
+    else:
+        stated = lens.size
+        lens = _fitting(lens, filmed or size, scaled=filmed is None)
+        # a camera's world is upright, and in metres
+        if world is None or isinstance(known, Camera):
+            world = np.eye(3)
+        camera = lens.in_metres(metres).camera(size, world)
+        if stated not in (None, filmed or size):
+            said.append(_resized(known, filmed or size))
+    square = camera.squared()
+    if square is not camera:
+        ratio = camera.focal[0] / camera.focal[1]
+        said.append(
+            f"pixels are not square, fx is {ratio:.3g} fy: {size[0]}x{size[1]} becomes "
+            f"{square.width}x{square.height}"
+        )
+    if square is camera and not lens.distorted:
+        return camera, None, said
+    return square, Straightening(square, lens, lens.maps(size, square)), said
+
+
+def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:
+    """Return what is said of pictures of another size than their calibration's."""
+    calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
+    width, height = calibration.size or size
+    change = (
+        f"is scaled to {size[0]}x{size[1]}"
+        if calibration.padded(size) is None
+        else f"holds for {size[0]}x{size[1]}, with rows or columns more or less at the end"
+    )
+    name = f" {quoted(calibration.name)}" if calibration.name else ""
+    return f"the calibration{name} of {width}x{height} {change}"
+
+
 def _straight(
-    world: Array, metres: float, known: Camera | Calibration, view: CameraView
-) -> tuple[Camera, CameraView]:
-    """Return the camera of a view, and the view as a pinhole camera has it. Raises InputError where they do not fit."""
-    size = view.masks.size
-    if isinstance(known, Calibration):
-        calibration = known if view.filmed else _fitting(known, size, scaled=True)
-        known = calibration.in_metres(metres).camera(size, world)
-        if calibration.distorted:
-            maps = calibration.maps(size)
-            pictures = (
-                None
-                if view.pictures is None
-                else partial(_straightened, view.pictures, maps)
-            )
-            view = replace(
-                view,
-                masks=undistorted(view.masks, calibration, maps),
-                pictures=pictures,
-            )
-    if (known.width, known.height) != size:
-        raise _of_another_size("", size, (known.width, known.height))
-    return known, view
+    world: Array, metres: float, known: Camera | Calibration, view: View
+) -> tuple[Camera, View, list[str]]:
+    """Return the camera of a view, the view as that camera has it, and what is to be said of it."""
+    camera, how, said = straightening(known, view.size, view.filmed, world, metres)
+    return camera, view if how is None else how.of(view), said
 
 
 def same_person(
     known: Sequence[Camera | Calibration],
-    first: CameraView,
+    first: View,
     size: tuple[int, int],
     persons: Persons,
+    filmed: tuple[int, int] | None = None,
 ) -> int:
     """Return the number of the person in another view who is followed in the first one.
 
     It is the one whose rays meet those of the first view in a person who keeps one height, in both views and all
     frames: rays of level cameras meet anyhow. `known` are the cameras of both, and `persons` are the people in the
-    other's masks, which have a `size`.
+    other's masks, which have a `size` and were taken from a video of the size `filmed`.
     """
-    sizes = (first.masks.size, size)
+    sizes = (first.size, size)
     blank = np.zeros(size[::-1], dtype=bool)
     fitted = [
         camera
-        if first.filmed or isinstance(camera, Camera)
-        else _fitting(camera, pixels, scaled=True)
-        for camera, pixels in zip(known, sizes, strict=True)
+        if isinstance(camera, Camera)
+        else _fitting(camera, film or pixels, scaled=film is None)
+        for camera, pixels, film in zip(
+            known, sizes, (first.filmed, filmed), strict=True
+        )
     ]
     cameras = [
         camera if isinstance(camera, Camera) else camera.camera(pixels, np.eye(3))
@@ -196,11 +263,11 @@ def same_person(
     for person in persons:
         # by how much rays miss each other, and the heights in both views
         pairs = list[tuple[float, Array]]()
-        for k in np.flatnonzero(first.masks.usable).tolist():
+        for k in np.flatnonzero(first.usable).tolist():
             part = part_at(person, k)
             if part is not None and part.detections[k][1] is None:
                 paste(part.detections[k][0], mask := blank.copy())
-                views = first.masks.silhouette(k), Silhouette.of(mask)
+                views = first.silhouette(k), Silhouette.of(mask)
                 pairs.append(apparent_size(cameras, [*map(_extent, fitted, views)]))
         heights = np.array([np.maximum(tall, 1e-9) for _, tall in pairs])
         misses = [miss / float(np.median(heights)) for miss, _ in pairs]
@@ -226,10 +293,16 @@ def world_of(
     guesses = (
         {"up": guess} if up is None and (guess := guessed_up(calibrations)) else {}
     )
+    for calibration in calibrations:
+        if unit not in (None, "m") and calibration.scale == "metres":
+            raise InputError(
+                f"unit must be left out for {quoted(calibration.name)}, whose file states it, got {quoted(unit)}"
+            )
     distances = [
         float(np.linalg.norm(place))
         for calibration in calibrations
         if (place := calibration.translation) is not None
+        and calibration.scale != "metres"
     ]
     if unit is None and distances:
         unit = (
@@ -239,9 +312,7 @@ def world_of(
             if max(distances) <= FARTHER
             else "mm"
         )
-        # ours are in metres
-        if unit != "m" or not all(calibration.upright for calibration in calibrations):
-            guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
+        guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
     for calibration in calibrations:
         if calibration.rotation is None:
             guesses["place"] = (
@@ -251,7 +322,17 @@ def world_of(
             guesses["size"] = (
                 "the calibration is for pictures of this size, which it does not state"
             )
-    return upright(calibrations, up), METRES[unit or "m"], guesses
+    world = upright(calibrations, up)
+    heights = [
+        float(world[1] @ place)
+        for calibration in calibrations
+        if (place := calibration.in_metres(METRES[unit or "m"]).position) is not None
+    ]
+    if min(heights, default=0.0) < -BELOW:
+        guesses["below"] = (
+            f"a camera stands {-min(heights):.1f} m below its world's origin: is its translation its place?"
+        )
+    return world, METRES[unit or "m"], guesses
 
 
 def unit_of_heights(ratio: float) -> Unit:
@@ -279,8 +360,8 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
     )
 
 
-def _unequal(views: Sequence[CameraView]) -> list[str]:
-    lengths = [len(view.masks) for view in views]
+def _unequal(views: Sequence[View]) -> list[str]:
+    lengths = [len(view) for view in views]
     if len(set(lengths)) == 1:
         return []
     came = ", ".join(
@@ -291,21 +372,19 @@ def _unequal(views: Sequence[CameraView]) -> list[str]:
     ]
 
 
-def _rate(views: Sequence[CameraView], fps: float | None) -> tuple[float, bool]:
+def _rate(views: Sequence[View], fps: float | None) -> tuple[float, bool]:
     """Return the frame rate of views: `fps`, or else what their files state, or 30; and whether it is stated.
 
     Raises InputError where views of masks differ in their rates, or in how many frames they have.
     """
     first = views[0]
     for view in views[1:]:
-        if view.filmed is None and len(view.masks) != len(first.masks):
-            came = f"{len(first.masks)} of {first.name} and {len(view.masks)} of {view.name}"
+        if view.filmed is None and len(view) != len(first):
+            came = f"{len(first)} of {first.name} and {len(view)} of {view.name}"
             raise InputError(f"views must have the same frames, got {came}")
     if fps is not None:
         return fps, True
-    stated = [
-        (view.masks.fps, view.name) for view in views if view.masks.fps is not None
-    ]
+    stated = [(view.fps, view.name) for view in views if view.fps is not None]
     for rate, name in stated[1:]:
         if views[0].filmed is None and rate != stated[0][0]:
             came = f"{stated[0][0]:g} of {stated[0][1]} and {rate:g} of {name}"
@@ -332,13 +411,6 @@ def place_of(
     depth = camera.focal[1] * stature / tall
     place = np.array([*((middle - camera.centre) / camera.focal * depth), depth])
     return np.asarray(camera.rotation.T @ (place - camera.translation))
-
-
-def _straightened(
-    pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
-) -> Iterator[Image]:
-    for image in pictures():
-        yield np.asarray(cv2.remap(image, *maps, cv2.INTER_LINEAR), dtype=np.uint8)
 
 
 def listed(
@@ -406,12 +478,10 @@ def calibrated(
         )
     if views > 1 and len(names) == views:
         known = [known[k] for k in order_by_name(known, names)]
-    return [
-        _fitting(camera, size)
-        if isinstance(camera, Calibration) and size is not None
-        else camera
-        for camera, size in zip(known, filmed, strict=False)
-    ]
+    for camera, size in zip(known, filmed, strict=False):
+        if isinstance(camera, Calibration) and size is not None:
+            _fitting(camera, size, scaled=False)
+    return known
 
 
 def order_by_name(
@@ -488,26 +558,25 @@ def _own_words(names: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def _fitting(
-    calibration: Calibration, size: tuple[int, int], *, scaled: bool = False
+    calibration: Calibration, size: tuple[int, int], *, scaled: bool
 ) -> Calibration:
-    """Return the calibration of pictures of a size, or of this shape where they may be scaled; else InputError."""
+    """Return the calibration of pictures of a size, or of this shape where they may have been scaled.
+
+    Raises InputError for others, of which it is not known which part of the sensor they show: cameras often film with a
+    part of it where the size is another.
+    """
     padded = calibration.padded(size)
     if padded is not None:
         return padded
+    name = f" {quoted(calibration.name)}" if calibration.name else ""
     if calibration.size is None:
         middle = "x".join(f"{value:g}" for value in calibration.matrix[:2, 2])
         raise InputError(
-            f"camera {quoted(calibration.name)} must be of {size[0]}x{size[1]}, got a centre of {middle}"
+            f"camera{name} must be of {size[0]}x{size[1]}, got a centre of {middle}"
         )
     width, height = calibration.size
     if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
         return calibration
-    raise _of_another_size(f" {quoted(calibration.name)}", size, (width, height))
-
-
-def _of_another_size(
-    name: str, size: tuple[int, int], came: tuple[int, int]
-) -> InputError:
-    return InputError(
-        f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {came[0]}x{came[1]}"
+    raise InputError(
+        f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
     )

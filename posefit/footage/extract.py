@@ -1,9 +1,10 @@
-"""Masks from a video of one person before a still background: `posefit extract`."""
+"""Masks of one person as a file, with a preview and a report: `posefit extract`."""
 
 import csv
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -12,113 +13,133 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.files import check_new, new_folder, opencv_name
-from posefit.footage.masks import PackedMasks, Range
-from posefit.footage.readers import name_of
+from posefit.footage.cleaning import cleaned
+from posefit.footage.scene import observed_views
 from posefit.footage.segmentation import Extraction, Progress, Segmentation
-from posefit.footage.source import films_of, kind_of, sources_of
-from posefit.footage.video import Video, VideoWriter
-from posefit.motion.motion import Motion
-from posefit.reading import existing
+from posefit.footage.source import (
+    Resolved,
+    films_of,
+    resolve,
+    scene_of,
+    useless_for,
+    views_of_masks,
+)
+from posefit.footage.video import VideoWriter
+from posefit.footage.views import Range, View, border_of
+from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
 
 def extract(
-    source: str | Path | Sequence[str | Path],
+    source: Any,
     out: str | Path,
     how: Extraction | None = None,
     *,
     frames: Range = (None, None),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return a summary of a film's masks, and write them, a preview and a report to a new folder.
+    """Return a summary of the masks of what one camera saw, and write them, a preview and a report to a new folder.
 
-    `source` is a video, or a folder or a list of pictures. masks.npz holds `masks` and `valid` (T, height, width),
-    `usable` (T,), `fps`, the number of the `first` frame in the film, and `landmarks` (T, 27, 3) where a segmenter
-    gives any, see `Segmenter`. The folder appears whole or not at all. Raises InputError for every mistake
-    in arguments or files, where no frame shows a person, and on a full disk.
+    `source` is what `posefit.track` takes. masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,), `fps`
+    where it is known, the number of the `first` frame, and `landmarks` (T, 27, 3) where a segmenter gives any, see
+    `Segmenter`. The report, quality.csv, compares masks with the pictures of a film. The folder appears whole or not
+    at all. Raises InputError for mistakes in arguments or files, where no frame shows a person, and on a full disk.
     """
     target = Path(out)
     check_new(target)
     opencv_name(target)  # a name that it cannot write is refused before the work
-    video = _film(source)
+    resolved = resolve(source)
+    if len(resolved.named) > 1:
+        raise InputError(
+            f"source must be of one camera, got {len(resolved.named)}: extract them one after the other"
+        )
     how = how or Extraction()
-    segmentation = Segmentation(video, how, frames)
+    # checked before the folder is made
+    films = films_of(resolved)
+    segmentation = Segmentation(films[0], how, frames) if films else None
+    if not films and how != Extraction(person=how.person):
+        raise useless_for(resolved.medium, "extraction", how, "video")
     with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
-        masks, rows, _, warnings, *_ = segmentation.read(progress)
+        rows: Sequence[dict[str, Any]] = ()
+        if segmentation is None:
+            view = _masks(resolved, how, frames)
+        else:
+            view, rows, _ = segmentation.read(progress)
+        warnings = [*view.warnings]
         preview = building / "preview.mp4"
         try:
-            with VideoWriter(preview, video.fps, masks.size) as writer:
-                for k, image in enumerate(
-                    video.frames(segmentation.start, segmentation.stop, masks.size)
-                ):
-                    silhouette = masks.silhouette(k)
-                    writer.write(_painted(image, silhouette, bool(masks.usable[k])))
+            with VideoWriter(preview, view.fps or FPS, view.size) as writer:
+                for k, image in enumerate(_pictures(view)):
+                    silhouette = view.silhouette(k)
+                    writer.write(_painted(image, silhouette, bool(view.usable[k])))
         except (InputError, cv2.error) as error:
             # such as of a build of OpenCV without the format: the masks are the work
             preview.unlink(missing_ok=True)
-            warnings = [*warnings, f"preview.mp4 is missing: {error}"]
-        _write_npz(building / "masks.npz", masks)
-        with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
-            table = csv.DictWriter(file, list(rows[0]))
-            table.writeheader()
-            table.writerows(rows)
+            warnings.append(f"preview.mp4 is missing: {error}")
+        _write_npz(building / "masks.npz", view)
+        if rows:
+            path = building / "quality.csv"
+            with path.open("w", newline="", encoding="utf-8") as file:
+                table = csv.DictWriter(file, list(rows[0]))
+                table.writeheader()
+                table.writerows(rows)
+    border = border_of(view.bits, view.size).any(axis=1)
     return {
-        "video": str(source),
-        "method": how.name,
-        "frames": len(rows),
-        "usable": int(masks.usable.sum()),
-        "size": list(masks.size),
-        "fps": video.fps,
-        "touching_border": sum(bool(row["touches_border"]) for row in rows),
-        "in_pieces": sum(row["pieces"] > 1 for row in rows),
+        "video": view.name,
+        "method": how.name if films else None,
+        "frames": len(view),
+        "usable": int(view.usable.sum()),
+        "size": list(view.size),
+        "fps": view.fps,
+        "touching_border": int(border.sum()),
+        # which a film's quality.csv says
+        "in_pieces": sum(row["pieces"] > 1 for row in rows) if rows else None,
         "warnings": warnings,
-        "guesses": [*video.guesses],
+        "guesses": [*view.guesses],
     }
 
 
-def _film(source: str | Path | Sequence[str | Path]) -> Video:
-    """Return the film that a source names. Raises InputError where it is none, or several."""
-    sources = sources_of(source)
-    if len(sources) > 1:
-        raise InputError(f"source must be one film, got {len(sources)}")
-    (film,) = sources
-    if isinstance(film, Motion) or kind_of(film) == "masks":
-        if isinstance(film, str | Path):
-            existing(Path(film))
-        came = "a motion" if isinstance(film, Motion) else name_of(film)
-        raise InputError(
-            f"source must be a film to extract masks from, got {came}, which needs no extraction"
-        )
-    assert not isinstance(film, np.ndarray)
-    (video,) = films_of([film], None)
-    return video
+def _masks(source: Resolved, how: Extraction, frames: Range) -> View:
+    """Return the view of a source that needs no extraction."""
+    if source.medium == "motion":
+        return observed_views(scene_of(source, frames=frames))[0]
+    (view,) = views_of_masks(source, frames)
+    return cleaned(view, choice=how.person)
 
 
-def _write_npz(path: Path, masks: PackedMasks) -> None:
+def _pictures(view: View) -> Iterator[Image]:
+    """Yield the pictures of a film, or grey ones."""
+    if view.pictures is not None:
+        return view.pictures()
+    width, height = view.size
+    return repeat(np.full((height, width, 3), 128, dtype=np.uint8), len(view))
+
+
+def _write_npz(path: Path, view: View) -> None:
     """Write masks.npz frame by frame, as there may be more than memory holds unpacked."""
     header = {
         "descr": "|u1",
         "fortran_order": False,
-        "shape": (len(masks), masks.size[1], masks.size[0]),
+        "shape": (len(view), view.size[1], view.size[0]),
     }
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for kind, attribute in (("masks", "mask"), ("valid", "valid")):
             with archive.open(f"{kind}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_1_0(member, header)
-                for k in range(len(masks)):
+                for k in range(len(view)):
                     member.write(
-                        getattr(masks.silhouette(k), attribute)
+                        getattr(view.silhouette(k), attribute)
                         .astype(np.uint8)
                         .tobytes()
                     )
         rest = {
-            "usable": masks.usable,
-            "fps": np.array(masks.fps),
-            "first": np.array(masks.first),
-            "landmarks": masks.landmarks,
+            "usable": view.usable,
+            "fps": None if view.fps is None else np.array(view.fps),
+            "first": view.numbers[0],
+            "landmarks": view.landmarks,
         }
         for name, value in rest.items():
             if value is None:

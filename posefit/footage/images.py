@@ -13,25 +13,21 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from posefit.errors import InputError
+from posefit.footage.views import MOST
 from posefit.reading import check_size
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".gif", ".webp")
 PAGED = (".tif", ".tiff", ".gif", ".webp")  # may hold several pictures
 PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
-LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
+LARGEST_FILE = 8 * PIXELS  # bytes of a picture
 FORMATS = "PNG, JPEG, BMP, TIFF, PGM, GIF or WebP"
 _JPEG = ("JPEG", "MPO")  # the latter of phones, with a preview
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "GIF", "WEBP")  # as Pillow calls them
 # of 255, and the share of an image's pixels: with more it is no grey one
 COLOUR_RANGE = 32
 COLOUR_SHARE = 0.02
-CHROMA_RANGE = 15  # the same, as a JPEG has it
-MANY_COLOURS = 64  # a picture of a place has more; so many labels are rare
-MANY_LABELS = (
-    16  # of a picture with transparent pixels: a person cut out has more colours
-)
-# of the pixels of labels have neighbours of their own label; of degrees few have
-FLAT = 0.5
+# a picture of a place, or a person cut out, has more; so many labels are rare
+MANY_COLOURS = 64
 # as Pillow calls what has no colours
 _GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")
 # what is wrong with a file is reported by posefit
@@ -154,7 +150,10 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
             *(cv2.absdiff(channel, np.full_like(channel, 128)) for channel in chroma)
         )
         return Marks(
-            bright, soft=True, photo=bool((off > CHROMA_RANGE).mean() > COLOUR_SHARE)
+            bright,
+            soft=True,
+            # a colour is about half its range off grey
+            photo=bool((off >= COLOUR_RANGE // 2).mean() > COLOUR_SHARE),
         )
     if not labelled and image.has_transparency_data:
         transparent = _transparent_marks(image)
@@ -179,7 +178,7 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
         numbers,
         photo=_is_colourful(colours)
         and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS
-        and flat_share(numbers) < FLAT,
+        and flat_share(numbers) < MOST,
     )
 
 
@@ -206,7 +205,7 @@ def _transparent_marks(image: Image.Image) -> Marks | None:
         numbers = _colour_numbers(coloured[..., :3])
     labels = np.unique(numbers[shown])
     # black, or the palette's first colour, alone is the person
-    if len(labels) > MANY_LABELS or not labels.any():
+    if len(labels) > MANY_COLOURS or not labels.any():
         return Marks(np.where(shown, alpha, 0), soft=True, alpha=True)
     return Marks(np.where(shown, numbers, 0))
 
@@ -223,7 +222,7 @@ def _colour_numbers(colours: NDArray[np.uint8]) -> NDArray[np.int32]:
 def flat_share(values: NDArray[Any]) -> float:
     """Return which share of the pixels between the lowest and the highest tenth of values has equal neighbours.
 
-    Areas of labels are flat, and degrees pass from one value to the next.
+    Most of labels are flat areas, and degrees pass from one value to the next.
     """
     middle = values[1:-1, 1:-1]
     low, high = float(values.min()), float(values.max())

@@ -7,7 +7,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -15,21 +16,19 @@ from typing import Any, BinaryIO
 import cv2
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS
 from posefit.footage.segmentation import Extraction, PersonSegmenter
 from posefit.footage.video import Video, scaled
-from posefit.geometry.skeleton import JOINTS
+from posefit.footage.views import View
 from posefit.motion.clips import FPS
 from posefit.reading import quoted
-from posefit.silhouette.foreground import Image
+from posefit.silhouette.foreground import BRIGHT, Image
 from posefit.silhouette.mask import Mask
 
 STALL_SECONDS = 5.0  # without a frame, after which a stream counts as broken
 EMPTY_SECONDS = 3.0  # in which the scene is still empty, by default: VSMM 1.1
-MASK_LEVEL = 127  # a pixel of a grey frame that is brighter belongs to the person
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,20 +38,6 @@ class LiveImage:
     number: int  # in the stream, skipped frames counted
     arrived: float  # seconds of `time.perf_counter`
     image: Image = field(repr=False)
-
-
-@dataclass(frozen=True, eq=False)
-class LiveMask:
-    """The person in a frame of a stream."""
-
-    source: LiveImage
-    mask: Mask = field(repr=False)
-    valid: Mask = field(repr=False)
-    usable: bool  # whether it shows enough of the person to be searched
-    # (27, 3), see `Segmenter`; 0 where it gives none
-    landmarks: Array = field(
-        default_factory=lambda: np.zeros((len(JOINTS), 3)), repr=False
-    )
 
 
 class Stream:
@@ -172,21 +157,21 @@ def _captured(capture: Any) -> Iterator[Image]:
     capture.release()
 
 
-def live_masks(
+def live_views(
     stream: Stream, how: Extraction | None, log: Callable[[str], None]
-) -> Iterator[LiveMask]:
-    """Yield the person in the frames of a stream: grey frames are masks; others are segmented.
+) -> Iterator[View]:
+    """Yield the view of each frame of a stream: grey frames are masks; others are segmented.
 
-    By default each pixel's background is its mean over the first three seconds, which have to show the empty scene.
+    Times are seconds of `time.perf_counter`, when frames arrived. By default each pixel's background is its mean over
+    the first three seconds, which have to show the empty scene.
     """
     images = _of_one_size(stream)
     first = next(images)
     if first.image.ndim == 2:
         for live in chain([first], images):
-            mask = live.image > MASK_LEVEL
-            yield LiveMask(
-                live, mask, np.ones_like(mask), bool(mask.any() and not mask.all())
-            )
+            mask = live.image > BRIGHT
+            usable = bool(mask.any() and not mask.all())
+            yield _view(stream, live, mask, np.ones_like(mask), usable)
         return
     learned = [first.image]
     if how is None:
@@ -205,8 +190,25 @@ def live_masks(
         image = scaled(live.image, segmenter.size)
         (person, *_), _, landmarks = segmenter.frame(image)
         quality = quality or segmenter.quality()
-        row = segmenter.row(quality, image, person, live.number)
-        yield LiveMask(live, person.mask, person.valid, bool(row["usable"]), landmarks)
+        usable = bool(segmenter.row(quality, image, person, live.number)["usable"])
+        view = _view(stream, live, person.mask, person.valid, usable)
+        pictures = partial(iter, [image])
+        yield replace(view, landmarks=landmarks[None], pictures=pictures)
+
+
+def _view(
+    stream: Stream, live: LiveImage, mask: Mask, valid: Mask, usable: bool
+) -> View:
+    return View(
+        stream.name,
+        np.array([live.number]),
+        np.array([live.arrived]),
+        np.packbits(mask)[None],
+        np.packbits(valid)[None],
+        np.array([usable]),
+        (mask.shape[1], mask.shape[0]),
+        fps=stream.rate,
+    )
 
 
 def _of_one_size(stream: Stream) -> Iterator[LiveImage]:

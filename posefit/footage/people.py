@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.errors import InputError
-from posefit.footage.masks import unpacked
-from posefit.silhouette.foreground import RIVAL_AREA, Image
+from posefit.errors import NoPersonError
+from posefit.footage.views import unpacked
+from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, padded_box
+from posefit.silhouette.pieces import RIVAL_AREA
 
 MAX_STEP = 1.0  # times the height: farther from where they are expected a person is not
 MAX_GAP_SECONDS = 1.0  # without a detection, after which a person is another one
@@ -24,11 +25,9 @@ MEMORY = 0.8  # of the last step, size and colours that is kept with each frame
 COVERED = 0.3
 SLACK = 0.04  # of the height: so far around where they are expected people may be
 AROUND = 0.3  # of the height: so far around where they are a network looks for a person
-LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
 CLEARER = 2.0  # times as many pixels of a person as of any other show whose a mask is
 MIN_DETECTIONS = 8  # frames of a person alone; what shows in fewer may be noise
-MIN_SCORE = 0.1  # of the best person's: less is noise
-COLOUR = 1.0  # what 100 grey levels of another colour count, in heights
+COLOUR = 0.01  # what a grey level of another colour counts, in heights
 AREA = 0.5  # what an area e times as large counts, in heights
 
 Cut = tuple[tuple[slice, slice], NDArray[np.uint8]]  # a box of a mask, and its bits
@@ -92,7 +91,6 @@ class Tracklet:
         self.colours = blob.colours
         self._step = np.zeros(2)  # pixels a frame
         self._usable = 0
-        self._large = False
 
     def expected(self, frame: int) -> Array:
         """Return where (2,) their middle is expected."""
@@ -101,12 +99,11 @@ class Tracklet:
     def distance(self, blob: _Blob, frame: int) -> float:
         """Return how far a blob is from what is expected, in heights; infinite where it is too far away."""
         away = float(np.linalg.norm(blob.place - self.expected(frame))) / self.height
-        colour = float(np.abs(blob.colours - self.colours).mean()) / 100.0
-        return (
-            away + COLOUR * colour + AREA * abs(np.log(blob.area / self.area))
-            if away <= MAX_STEP
-            else np.inf
-        )
+        colour = float(np.abs(blob.colours - self.colours).mean())
+        if away > MAX_STEP:
+            return np.inf
+        size = float(abs(np.log(blob.area / self.area)))
+        return away + COLOUR * colour + AREA * size
 
     def outline(self, frame: int) -> Mask:
         """Return where they are expected, and a little around."""
@@ -134,14 +131,12 @@ class Tracklet:
         self.alone = self.alone + 1
         self.last = frame
         self.latest = blob
-        self._large = self._large or self.height > LARGE * len(blob.mask)
         self.detections[frame] = cut_out(blob.mask), None
 
     def confirmed(self, least: float = MIN_DETECTIONS) -> bool:
         """Return whether they are visible so often, and as a person, that they are no noise."""
-        return self._large and (self._usable if self.rows else self.alone) >= min(
-            MIN_DETECTIONS, least
-        )
+        frames = self._usable if self.rows else self.alone
+        return frames >= min(MIN_DETECTIONS, least)
 
     def add_row(self, frame: int, row: dict[str, Any]) -> None:
         """Take the row of `FrameQuality` of a frame."""
@@ -233,8 +228,7 @@ class People:
         confirmed = [
             k
             for k, person in enumerate(persons)
-            if scores[k] >= MIN_SCORE * max(scores)
-            and any(part.confirmed(least) for part in person)
+            if any(part.confirmed(least) for part in person)
         ]
         if not confirmed:  # whatever there is
             return [[part for person in persons for part in person]] if persons else []
@@ -254,8 +248,8 @@ class People:
     ) -> tuple[list[Tracklet], str]:
         """Return the parts of the person who is followed, and what there is to say where there are several.
 
-        `name` names a frame; places in `choice` and in words are `scale` times as large as in masks. Raises InputError
-        where nobody has the number.
+        `name` names a frame; places in `choice` and in words are `scale` times as large as in masks. Raises
+        NoPersonError where nobody has the number.
         """
         persons = self.persons()
         if not persons:
@@ -276,7 +270,7 @@ class People:
             ]
             number = 1 + int(np.argmin(away))
         if not 1 <= number <= len(persons):
-            raise InputError(
+            raise NoPersonError(
                 f"person must be 1 to {len(persons)}, as many people as there are, got {number}"
             )
         if len(persons) == 1:
@@ -319,10 +313,12 @@ def _distance(tracklet: Tracklet, other: Tracklet) -> float:
     first, second = sorted((tracklet, other), key=lambda part: min(part.detections))
     start = min(second.detections)
     _, *place = second.first
-    colour = float(np.abs(first.colours - second.colours).mean()) / 100.0
+    colour = float(np.abs(first.colours - second.colours).mean())
     away = float(np.linalg.norm(np.array(place) - first.latest.place)) / first.height
-    size = AREA * float(abs(np.log(second.area / first.area)))
-    return COLOUR * colour + size + away / (1.0 + max(0, start - first.last) / 30.0)
+    size = float(abs(np.log(second.area / first.area)))
+    return (
+        COLOUR * colour + AREA * size + away / (1.0 + max(0, start - first.last) / 30.0)
+    )
 
 
 def _share(blob: _Blob, group: Sequence[Tracklet], frame: int) -> None:

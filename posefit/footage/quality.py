@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.footage.masks import Views
+from posefit.footage.people import MIN_DETECTIONS, SLACK
+from posefit.footage.views import MOST, Observations
 from posefit.geometry.camera import Camera
-from posefit.silhouette.foreground import Image, Person
+from posefit.silhouette.foreground import SAMPLES, Image, Person
 from posefit.silhouette.mask import Mask, Silhouette, box_of, padded_box
 
 # of a frame
@@ -31,39 +32,21 @@ FILL = (0.07, 0.5)
 MIN_SIDE = 12
 LAG = 0.1  # seconds between two pictures that are compared for motion
 MOVING_LEVELS = 25  # grey levels by which a pixel that moved has changed
-# of the mask's area: fewer pixels that moved outside the mask are no evidence
-MIN_MOVING = 0.1
 # of the person's longer side: motion is searched as far as that from the mask
 MOTION_REACH = 0.5
-SLACK = 0.02  # of the same: motion as near as that to the mask is the mask's own
-# a frame is not usable where a larger share of what moves lies outside the mask
-MAX_OUTSIDE = 0.5
-# an edge is in one picture only where it is stronger there by both
-EDGE_RATIO = 1.5
-EDGE_LEVELS = 6.0
 
 # of a video
 # needs no background: for a person who is always in the picture
 PEOPLE_SEGMENTER = "mediapipe"
-MIN_FRAMES = 8  # frames with a whole mask below which there is no verdict
 # more of what moves lies outside the masks, in half of the frames: they are not the
 # person
 UNEXPLAINED = 0.3
 # changes of the longer side and the area from frame to frame that one in ten exceeds
 TALLER = 0.15
 LARGER = 0.25
-# shares of frames with masks of an empty place: worth a warning, refused
-GHOSTS = 0.1
-GHOSTS_REFUSED = 0.5
-# of the frames: masks that are in pieces more often, and unsteady, are parts of a
-# person at best
-BROKEN = 0.3
-# where fewer of the frames are usable and the masks are unsteady, there is nothing to
-# track
-MIN_USABLE = 0.5
+GHOSTS = 0.1  # of the frames with masks of an empty place: worth a warning
 
 # between cameras
-CAMERA_FRAMES = 20  # that are compared, spread over the footage
 # of the person's height: rays to the middles of masks that pass each other by more do
 # not meet in a person
 APART = 0.7
@@ -98,7 +81,7 @@ class FrameQuality:
             whole
             and side >= MIN_SIDE
             and FILL[0] <= person.area / side**2 <= FILL[1]
-            and outside <= MAX_OUTSIDE
+            and outside <= MOST
             and not ghost
         )
         typical = float(np.median(self._areas)) if self._areas else float(person.area)
@@ -131,7 +114,7 @@ class FrameQuality:
         changed = changed_pixels(image, earlier) & person.valid
         moved, inside = moved_pixels(changed, covered, covered, reach, SLACK)
         outside = moved - inside
-        return outside / moved if outside > MIN_MOVING * person.area else 0.0
+        return outside / moved if moved else 0.0
 
     def _is_ghost(self, image: Image, mask: Mask) -> bool:
         """Return whether the outline of a mask is an edge of the background rather than of the picture.
@@ -147,10 +130,7 @@ class FrameQuality:
         outline = mask[box] & ~inner
         now = _edges(image[box])[outline]
         before = self._edges[box][outline]
-        return bool(
-            (before > EDGE_RATIO * now + EDGE_LEVELS).sum()
-            > (now > EDGE_RATIO * before + EDGE_LEVELS).sum()
-        )
+        return bool((before > now).sum() > (now > before).sum())
 
 
 def changed_pixels(image: Image, earlier: Image) -> Mask:
@@ -216,9 +196,9 @@ def verdict(
     instead = advice(method, learned=learned)
     none = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
     cut = sum(bool(row["touches_border"]) for row in rows)
-    if cut > 0.5 * len(rows):
+    if cut > MOST * len(rows):
         none = f"expected a person who is whole in the picture, got one at its edge in {cut} of {len(rows)} frames"
-    if len(whole) < MIN_FRAMES:
+    if len(whole) < MIN_DETECTIONS:
         return None if usable else Verdict(none, True)
     outside = float(np.median([row["beside"] for row in whole]))
     pairs = [(a, b) for a, b in pairwise(whole) if b["frame"] == a["frame"] + 1]
@@ -238,17 +218,15 @@ def verdict(
         refused = True
     elif ghosts > GHOSTS:
         text = f"{ghosts:.0%} of the masks show a place that is empty now: the person was learned into the background"
-        refused = ghosts > GHOSTS_REFUSED
+        refused = ghosts > MOST
     elif not usable:
         return Verdict(none, True)
     elif unsteady:
         pieces = (
-            f" and are in pieces in {broken:.0%} of the frames"
-            if broken > BROKEN
-            else ""
+            f" and are in pieces in {broken:.0%} of the frames" if broken > MOST else ""
         )
         text = f"the masks {changes}{pieces}: parts of the person seem to be missing"
-        refused = usable < MIN_USABLE * len(whole) or broken > BROKEN
+        refused = usable < MOST * len(whole) or broken > MOST
     elif outside > UNEXPLAINED:
         text = f"{moves} near the person lies outside the masks, which may miss parts of the person"
         refused = False
@@ -303,21 +281,22 @@ def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array,
 
 
 def apparent_sizes(
-    views: Views, cameras: Sequence[Camera]
+    observations: Observations, cameras: Sequence[Camera]
 ) -> tuple[float, Array] | None:
     """Return by how much the rays of cameras to the person miss each other, and how tall the person is in each view.
 
     Both are medians over frames, in the cameras' unit; None where no frame is usable in all views.
     """
-    usable = [
-        k for k in range(len(views)) if all(masks.usable[k] for masks in views.masks)
-    ]
+    count = len(observations)
+    each = [view.usable[:count] for view in observations.views]
+    usable = np.flatnonzero(np.all(each, axis=0)).tolist()
     if not usable:
         return None
     misses = []
     heights = []
-    for k in np.unique(np.linspace(0, len(usable) - 1, CAMERA_FRAMES).astype(int)):
-        extents = [extent_of(silhouette) for silhouette in views[usable[k]].silhouettes]
+    for k in np.unique(np.linspace(0, len(usable) - 1, SAMPLES).astype(int)):
+        silhouettes = observations[usable[k]].silhouettes
+        extents = [extent_of(silhouette) for silhouette in silhouettes]
         miss, tall = apparent_size(cameras, extents)
         misses.append(miss)
         heights.append(tall)

@@ -14,7 +14,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -27,47 +27,45 @@ from numpy.typing import NDArray
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import (
-    FLAT,
     FORMATS,
     IMAGES,
+    MANY_COLOURS,
     PIXELS,
     Marks,
     flat_share,
     page_count,
     read_marks,
 )
-from posefit.footage.masks import (
-    PackedMasks,
+from posefit.footage.views import (
+    MOST,
     Planes,
     Range,
+    View,
     empty_planes,
+    full_planes,
     span,
-    together,
+    times_of,
 )
 from posefit.geometry.skeleton import JOINTS
-from posefit.limits import check_decoded
-from posefit.reading import existing, quoted
+from posefit.limits import RATES, check_decoded
+from posefit.reading import cut, existing, quoted
 from posefit.silhouette.mask import Mask
 
-NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
+ARRAYS = (".npz", ".npy")  # files of masks
 PACKED = 2_000_000_000  # bytes of an .npz file
-MAX_FPS = 1000.0
 _KINDS = {".jpeg": ".jpg", ".tiff": ".tif"}
 NAMES = ("masks", "valid", "usable", "fps", "first", "landmarks")
 LAST = 1_000_000_000  # number of a frame
 
 # missing numbers for each image: where there are more, the numbers count something else
 MOST_MISSING = 9.0
-FEW_VALUES = 64  # masks with more values are soft
 COUNTED_VALUES = 4_096
 SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
+PERCENT = 100.0
 # times a scale: degrees may go a little beyond, as resampling makes them
 NEAR_SCALE = 1.25
-# of the highest value: where the lowest is as far below 0, they are logits, not degrees
-SIGNED = 0.2
-# the same where the highest is no usual scale: resampling goes no farther beyond an edge
+# of the highest value, where that is no usual scale: degrees go no farther below 0
 RINGING = 0.1
-LISTED_LABELS = 6  # in a message
 
 # (height, width): grey levels, an alpha channel, indices of a palette, or colours
 # 0xRRGGBB
@@ -76,79 +74,41 @@ Values = NDArray[Any]
 Classifier = Callable[[Values], Mask]
 
 
-# of one camera: (frames, height, width), or an image a frame
-Masks = NDArray[Any] | tuple[Path, ...]
+class Images(NamedTuple):
+    """Image files of one camera, one a frame or a file of pages, and what messages call them."""
+
+    name: str
+    files: tuple[Path, ...]
+    # those of successive frames, by the numbers in their names; None until `numbered_together`
+    numbered: "Numbered | None" = None
 
 
-def read_masks(
-    source: Path | Masks, frames: Range, label: int | None = None
-) -> PackedMasks:
-    """Return the masks of images, of a folder of them, of an array, or of an .npz or .npy file, cut to `frames`.
-
-    Images of a folder come in the natural order of their names: 2 before 10. `label` is the person's value, where masks
-    hold several. Raises InputError naming the file.
-    """
-    if isinstance(source, np.ndarray):
-        return _packed(name_of(source), {"masks": source}, frames, label)
-    images = images_of(source)
-    if images is not None:
-        name = name_of(source)
-        return read_images(numbered(images, name), name, frames, label)
-    assert isinstance(source, Path)
-    existing(source)
-    if source.suffix.lower() == ".npy":
-        stack = mapped(source)
-        check_decoded(str(source), stack.nbytes)
-        return _packed(str(source), {"masks": stack}, frames, label)
-    with archived(source, NAMES, "the key masks", PACKED, single=True) as arrays:
-        check_decoded(str(source), sum(array.nbytes for array in arrays.values()))
-        return _packed(str(source), arrays, frames, label)
+def read_array(
+    stack: NDArray[Any], frames: Range, label: int | None, fps: float | None
+) -> View:
+    """Return the view of masks (T, height, width) in memory."""
+    return _packed("masks", {"masks": stack}, frames, label, fps)
 
 
-def read_views(
-    sources: Sequence[Path | Masks], frames: Range, label: int | None = None
-) -> list[PackedMasks]:
-    """Return the masks of several cameras, as `read_masks` does.
-
-    Frames are of one moment where they have one number: in the names of images, or by `first` of .npz files, of which
-    those frames are used that all have. Raises
-    InputError where cameras have no frame in common.
-    """
-    names = [name_of(source) for source in sources]
-    images = [view for source in sources if (view := images_of(source)) is not None]
-    if len(images) < len(sources):
-        masks = [read_masks(source, frames, label) for source in sources]
-    else:
-        views = zip(numbered_together(images, names), names, strict=True)
-        masks = [read_images(view, name, frames, label) for view, name in views]
-    return together(masks, names)
+def read_npy(path: Path, frames: Range, label: int | None, fps: float | None) -> View:
+    """Return the view of an .npy file of masks."""
+    stack = mapped(existing(path))
+    check_decoded(str(path), stack.nbytes)
+    return _packed(str(path), {"masks": stack}, frames, label, fps)
 
 
-def images_of(source: Path | Masks) -> tuple[Path, ...] | None:
-    """Return the images of a source; None where it has none. Raises InputError for a folder without any."""
-    if isinstance(source, tuple):
-        return source
-    if isinstance(source, np.ndarray) or not source.is_dir():
-        return None
-    images = images_in(source)
-    if not images:
-        raise InputError(
-            f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none"
-        )
-    return tuple(images)
+def read_npz(path: Path, frames: Range, label: int | None, fps: float | None) -> View:
+    """Return the view of an .npz file of masks, and of what is with them: those are `NAMES`."""
+    existing(path)
+    with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
+        check_decoded(str(path), sum(array.nbytes for array in arrays.values()))
+        return _packed(str(path), arrays, frames, label, fps)
 
 
-def name_of(source: str | Path | Masks) -> str:
-    """Return what messages call masks: their path, that of a single image, the folder of several, or `masks`."""
-    if isinstance(source, str | Path):
-        return str(source)
-    if isinstance(source, tuple) and len(source) == 1:
-        return str(source[0])
-    return (
-        str(source[0].parent)
-        if isinstance(source, tuple) and source[0].parent.name
-        else "masks"
-    )
+def first_number(path: Path) -> int:
+    """Return the number of the first frame of an .npz file, which it may state; else 0."""
+    with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
+        return int(np.asarray(arrays["first"])) if "first" in arrays else 0
 
 
 def images_in(folder: Path) -> list[Path]:
@@ -165,10 +125,7 @@ def images_in(folder: Path) -> list[Path]:
 def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     """Return the key that files are sorted by: numbers in their names count as such."""
     parts = re.findall(r"[0-9]+|[^0-9]+", file.name)
-    return [
-        (int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p)
-        for p in parts
-    ], file.name
+    return [(int(p), "") if p.isdigit() else (-1, p) for p in parts], file.name
 
 
 class Numbered(NamedTuple):
@@ -257,27 +214,37 @@ def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:
     return Numbered(files, guesses, numbers)
 
 
-def numbered_together(
-    views: Sequence[tuple[Path, ...]], names: Sequence[str]
-) -> list[Numbered]:
-    """Return the images of several cameras, those with one number at one place; of a single camera as `numbered`.
+def numbered_together(cameras: Sequence[Images]) -> list[Images]:
+    """Return the images of cameras, numbered: of several, those with one number at one place.
 
     The lowest number of all is frame 0, and a number that a camera does not have is missing. Images whose names do not
     count frames are paired as they come, and that is guessed. Raises InputError where no number is in the names of all
     cameras.
     """
-    listed = [numbered(*view) for view in zip(views, names, strict=True)]
-    if len(listed) < 2:
-        return listed
+    names = [camera.name for camera in cameras]
+    listed = [numbered(camera.files, camera.name) for camera in cameras]
     known = [view.numbers for view in listed if view.numbers is not None]
-    if len(known) < len(listed):
-        several = [view for view in listed if len(view.files) > 1]
-        if several:
-            several[0].guesses.append(
+    if len(cameras) > 1 and len(known) == len(listed):
+        listed = _paired(listed, known, names)
+    elif len(cameras) > 1:
+        several = next((k for k, view in enumerate(listed) if len(view.files) > 1), 0)
+        if len(listed[several].files) > 1:
+            in_order = (
                 f"images of {' and '.join(names)} are of one moment in the order in which they come, "
                 "as not all of their names count frames"
             )
-        return listed
+            guesses = [*listed[several].guesses, in_order]
+            listed[several] = listed[several]._replace(guesses=guesses)
+    return [
+        camera._replace(numbered=view)
+        for camera, view in zip(cameras, listed, strict=True)
+    ]
+
+
+def _paired(
+    listed: Sequence[Numbered], known: Sequence[range], names: Sequence[str]
+) -> list[Numbered]:
+    """Return the images of cameras, whose numbers are `known`, at the places of their numbers."""
     shared = set.intersection(*(_own_numbers(view) for view in listed))
     if not shared:
         came = " and ".join(
@@ -311,45 +278,75 @@ def _own_numbers(view: Numbered) -> set[int]:
     return {number for number, file in numbers if file is not None}
 
 
+def together(views: Sequence[View]) -> list[View]:
+    """Return the views of several cameras, cut to the frames whose numbers all of them have, where they state numbers.
+
+    Raises InputError where they have none in common, and where only some state that theirs begin elsewhere.
+    """
+    ends = [(int(view.numbers[0]), int(view.numbers[-1]) + 1) for view in views]
+    if not all(view.counted for view in views):
+        if len({first for first, _ in ends}) > 1:
+            came = " and ".join(
+                f"{first} of {view.name}"
+                for (first, _), view in zip(ends, views, strict=True)
+            )
+            raise InputError(f"cameras must begin with one frame, got frame {came}")
+        return list(views)
+    start = max(first for first, _ in ends)
+    stop = min(last for _, last in ends)
+    came = ", ".join(
+        f"{first}:{last} of {view.name}"
+        for (first, last), view in zip(ends, views, strict=True)
+    )
+    if start >= stop:
+        raise InputError(f"cameras must have frames in common, got {came}")
+    if len(set(ends)) > 1:
+        used = f"the frames {start}:{stop} are used, which all cameras have, of {came}"
+        first = replace(views[0], guesses=[*views[0].guesses, used])
+        views = [first, *views[1:]]
+    places = [slice(start - first, stop - first) for first, _ in ends]
+    return [view[rows] for view, rows in zip(views, places, strict=True)]
+
+
 def read_images(
-    images: Numbered, name: str, frames: Range, label: int | None = None
-) -> PackedMasks:
-    """Return the masks of images of one size. Raises InputError naming the file where one is none."""
+    images: Images, frames: Range, label: int | None, fps: float | None
+) -> View:
+    """Return the view of images of one size. Raises InputError naming the file where one is none."""
+    name = images.name
+    assert images.numbered is not None
     every = [
         (file, page)
-        for file in images.files
+        for file in images.numbered.files
         for page in range(1 if file is None else page_count(existing(file)))
     ]
     start, stop = span(frames, len(every))
     chosen = every[start:stop]
-    known = np.array([file is not None for file, _ in chosen])
-    if not known.any():
+    there = np.array([file is not None for file, _ in chosen])
+    if not there.any():
         raise InputError(
             f"{name}: frames must choose some of the images that are there, got none from {start} to {stop}"
         )
     size, is_person, kind = _decided(_marks(chosen, name, label), label, name)
-    masks = _pack(_marks(chosen, name, label), int(known.sum()), size, is_person)
-    valid = None
-    if not known.all():
-        shown, masks, valid = (
-            masks,
-            *(empty_planes(len(chosen), size) for _ in range(2)),
-        )
-        masks[~known], masks[known] = 0, shown
-        valid[:] = np.where(known, 255, 0)[:, None]
-    paged = {file for file, page in chosen if page}
-    names = [
-        f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing"
-        for file, page in chosen
-    ]
-    return PackedMasks(
-        names,
-        size,
-        masks,
-        valid,
+    bits = _pack(_marks(chosen, name, label), int(there.sum()), size, is_person)
+    known = None
+    if not there.all():
+        shown = bits
+        bits = empty_planes(len(chosen), size)
+        bits[~there] = 0
+        bits[there] = shown
+        known = full_planes(len(chosen), size)
+        known[~there] = 0
+    numbers = np.arange(start, stop)
+    return View(
+        name,
+        numbers,
+        times_of(numbers, fps),
+        bits,
         known,
-        first=start,
-        guesses=[*images.guesses, *kind],
+        there,
+        size,
+        fps=fps,
+        guesses=[*images.numbered.guesses, *kind],
     )
 
 
@@ -387,8 +384,12 @@ def _packed(
     arrays: Mapping[str, Stored | NDArray[Any]],
     frames: Range,
     label: int | None,
-) -> PackedMasks:
-    """Return the masks of arrays by their names. Raises InputError naming what holds them where it holds none."""
+    rate: float | None,
+) -> View:
+    """Return the view of arrays by their names, at a `rate` or at their own.
+
+    Raises InputError naming what holds them where it holds none.
+    """
     stack = _checked_stack(name, arrays)
     count, height, width = stack.shape
     usable = (
@@ -397,8 +398,9 @@ def _packed(
         else np.ones(count, dtype=bool)
     )
     fps = float(np.asarray(arrays["fps"])) if "fps" in arrays else None
-    if fps is not None and not 0.0 < fps <= MAX_FPS:
-        raise InputError(f"{name}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
+    if fps is not None and not RATES[0] <= fps <= RATES[1]:
+        ends = f"{RATES[0]:g} to {RATES[1]:g}"
+        raise InputError(f"{name}: fps must lie in {ends}, got {fps:g}")
     first = int(np.asarray(arrays["first"])) if "first" in arrays else 0
     if not 0 <= first <= LAST:
         raise InputError(
@@ -420,7 +422,6 @@ def _packed(
         valid = _pack(
             _chosen(name, arrays["valid"], start, stop), stop - start, size, _above(0.0)
         )
-    names = [f"{name}[{k}]" for k in range(start, stop)]
     landmarks = (
         np.array(arrays["landmarks"], dtype=np.float64)[start:stop]
         if "landmarks" in arrays
@@ -432,16 +433,19 @@ def _packed(
         raise InputError(
             f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others"
         )
-    return PackedMasks(
-        names,
-        size,
+    fps = rate or fps
+    numbers = first + np.arange(start, stop)
+    return View(
+        name,
+        numbers,
+        times_of(numbers, fps),
         masks,
         valid,
-        usable[start:stop],
+        usable[start:stop].copy(),
+        size,
         fps=fps,
-        landmarks=landmarks,
-        first=first + start,
         counted="first" in arrays,
+        landmarks=landmarks,
         guesses=guesses,
     )
 
@@ -479,7 +483,7 @@ def _checked_stack(
             "f",
             f"be of shape {shape[0], len(JOINTS), 3}",
         ),
-        "fps": ((), "iuf", f"be a number up to {MAX_FPS:g}"),
+        "fps": ((), "iuf", "be a number, of frames a second"),
         "first": ((), "iu", "be a whole number, of the first frame"),
     }
     for key, (wanted, kinds, expected) in others.items():
@@ -576,7 +580,7 @@ class ValueCounts:
         if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
             self.several += len(unique) > 2
-            self.flat += len(unique) > 2 and flat_share(values) >= FLAT
+            self.flat += len(unique) > 2 and flat_share(values) >= MOST
 
     def classifier(
         self, label: int | None, name: object
@@ -598,7 +602,7 @@ class ValueCounts:
                 )
             return lambda values: np.asarray(values == label), []
         values = sorted(self.pixels)
-        many = len(values) > FEW_VALUES
+        many = len(values) > MANY_COLOURS
         if many and not self.soft and 2 * self.flat > self.several:
             most = [value for value, _ in self.pixels.most_common() if value]
             raise self._several(name, most)
@@ -644,19 +648,25 @@ class ValueCounts:
     def _half(self) -> tuple[float, str]:
         """The value half way to a whole person, 127 of 255, as whole numbers have no middle; and what the values are.
 
-        Signed ones are a network's logits, of which 0 is the middle. Degrees that were resampled go a little below 0,
-        and reach about a whole person. An alpha channel that is nowhere half opaque is a translucent colour.
+        Numbers up to about 100 are percentages. Signed ones are a network's logits, of which 0 is the middle. Degrees
+        that were resampled go a little below 0, and reach about a whole person. An alpha channel that is nowhere half
+        opaque is a translucent colour.
         """
         usual = any(
             0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
         )
-        if self.lowest < -(SIGNED if usual else RINGING) * self.highest:
+        # degrees go as far below 0 as beyond the scale
+        below = NEAR_SCALE - 1.0 if usual else RINGING
+        if self.lowest < -below * self.highest:
             return 0.0, "logits"
         if self.alpha and self.highest <= SCALES[1] // 2:
             return float(self.highest // 2), "translucent"
         # of no usual scale
         if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:
             return self.highest / 2.0, "degrees"
+        # above half of 255 there is nothing
+        if 0.5 * PERCENT < self.highest <= NEAR_SCALE * PERCENT:
+            return 0.5 * PERCENT, "percentages"
         full = next(
             (scale for scale in SCALES if self.highest <= NEAR_SCALE * scale),
             self.highest,
@@ -667,10 +677,9 @@ class ValueCounts:
         """Return some labels, the commonest first; colours as hexadecimal numbers."""
         written = [
             str(value) if self.highest <= SCALES[-1] else f"0x{value:06x}"
-            for value in labels[:LISTED_LABELS]
+            for value in labels
         ]
-        others = len(labels) - LISTED_LABELS
-        return ", ".join(written) + (f" and {others} others" if others > 0 else "")
+        return cut(", ".join(written))
 
 
 def _above(threshold: float) -> Classifier:
@@ -689,7 +698,7 @@ def _many_colours(name: object) -> InputError:
 
 def _solid(values: Values, unique: NDArray[Any]) -> list[int]:
     """Return those values that fill 3 x 3 pixels somewhere: what lies between two others at an edge does not."""
-    if len(unique) > FEW_VALUES:
+    if len(unique) > MANY_COLOURS:
         return []
     numbers = np.searchsorted(unique, values).astype(np.uint8)
     kernel = np.ones((3, 3), np.uint8)

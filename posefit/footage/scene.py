@@ -10,7 +10,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.masks import Range, span
+from posefit.footage.views import Range, View, span, times_of
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -140,6 +140,28 @@ def _rendered(
     with uncounted():  # to show a known motion is no evaluation
         masks = [project(body, camera, pose, translation) for camera in cameras]
     return Observation([Silhouette.of(mask) for mask in masks], translation)
+
+
+def observed_views(scene: Scene) -> list[View]:
+    """Return what the cameras of a scene saw."""
+    observations = list(scene.observations)
+    numbers = scene.first + np.arange(scene.count)
+    return [
+        View(
+            scene.name,
+            numbers,
+            times_of(numbers, scene.fps),
+            np.array([np.packbits(each.silhouettes[k].mask) for each in observations]),
+            np.array([np.packbits(each.silhouettes[k].valid) for each in observations]),
+            np.array([each.usable for each in observations]),
+            (camera.width, camera.height),
+            fps=scene.fps,
+            counted=True,
+            warnings=scene.warnings,
+            guesses=scene.guesses,
+        )
+        for k, camera in enumerate(scene.cameras)
+    ]
 
 
 def on_device(scene: Scene, device: str) -> Scene:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from inspect import Parameter
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
@@ -14,17 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.errors import InputError
+from posefit.errors import InputError, NoPersonError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
-from posefit.footage.masks import (
-    PackedMasks,
-    Planes,
-    Range,
-    empty_planes,
-    span,
-    unpacked,
-)
 from posefit.footage.people import (
     Choice,
     Chooser,
@@ -44,11 +36,20 @@ from posefit.footage.quality import (
     verdict,
 )
 from posefit.footage.video import Video, scaled
+from posefit.footage.views import (
+    MOST,
+    Range,
+    View,
+    empty_planes,
+    span,
+    times_of,
+    unpacked,
+)
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check
-from posefit.silhouette.foreground import Film, Image, Person, Segmenter, people
+from posefit.silhouette.foreground import BRIGHT, Film, Image, Person, Segmenter, people
 from posefit.silhouette.mask import Mask, touches_border
 
 T = TypeVar("T", bound=np.generic)
@@ -63,25 +64,20 @@ MISSING = 0.02  # the share of a file's frames that may be missing without a war
 # of the longer side: a person who goes as far across the picture within `STAYING` is
 # not on the spot
 CROSSING = 0.35
-# of the frames with a person: in so many a network has to find them to be used
-REDIRECTED = 0.5
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
 PERIOD = 5  # frames between two that are compared with the first
 SMALL = 160  # pixels: the width of the pictures that are compared
 TILES = 4  # to a side
-# pixels: smaller and larger structures are filtered out
-FINE = 1.0
-COARSE = 4.0
-REACH = 4  # pixels by which a tile is searched to either side
+FINE = 1.0  # pixels: smaller structures are filtered out
+# pixels: larger structures are filtered out, and a tile is searched so far to either
+# side
+REACH = 4
 # grey levels a pixel: a tile that changes less along some axis does not show where it
 # went
 TEXTURE = 0.7
 FREE = 0.25  # the share of these tiles that a person leaves free at least
-# the share of all tiles that have such texture at least: else it may be the person's
-# alone
-SPREAD = 0.5
 # of the width: a shift since the first frame that counts as a moving camera
 MOVED = 0.008
 
@@ -316,29 +312,14 @@ class PersonSegmenter:
         return given
 
 
-class Segmented(NamedTuple):
-    """What a pass through a video shows of the person who is followed."""
+class _Pass(NamedTuple):
+    """A pass through a video, before a person is chosen."""
 
-    masks: PackedMasks
-    rows: list[dict[str, Any]]  # of quality.csv
-    verdict: Verdict | None  # what is wrong with the masks, if anything
-    warnings: list[str]  # what a user should check before they trust the masks
-    facings: Array  # (T,) as `Segmenter.facing`; NaN where unknown or going along
-    camera_moves: bool  # whether the camera seems to
-
-
-class _Scan(NamedTuple):
-    """What the frames of a video show, before a person is chosen."""
-
-    masks: Planes  # of the largest blob
-    valid: Planes
+    view: View  # of the largest blob in each frame
     people: People
     # rows of quality.csv for the largest blobs: the person, where there is one only
     largest: list[dict[str, Any]]
     blanks: list[dict[str, Any]]  # rows for empty masks
-    facings: list[float]
-    landmarks: Array  # (T, 27, 3)
-    camera_moves: bool
     choice: Choice | Chooser | None  # who is followed, as `People.chosen`
 
 
@@ -360,19 +341,19 @@ class Segmentation:
 
     def read(
         self, progress: Progress | None = None, choose: Chooser | None = None
-    ) -> Segmented:
-        """Return the masks of the video, which is decoded once, after the background was learned.
+    ) -> tuple[View, list[dict[str, Any]], Verdict | None]:
+        """Return the view of the video, which is decoded once, after the background was learned.
 
-        Of several people `choose` returns the number of the one who is followed, where the extraction names none.
-        Raises InputError where no frame shows a person.
+        With it come the rows of quality.csv, and what is wrong with the masks, if anything. Of several people `choose`
+        returns the number of the one who is followed, where the extraction names none. Raises NoPersonError where no
+        frame shows a person.
         """
         video = self.video
         scan = self._scan(progress)
         if self._among is not None:
             scan = self._among.with_identities(self, scan, progress)
-        count = len(scan.blanks)
         learned = self._segmenter.learned
-        several, rows, apart = self._follow_person(
+        view, several, rows, apart = self._follow_person(
             scan if choose is None else scan._replace(choice=choose)
         )
         missing = max(0, video.claimed - video.count())
@@ -382,47 +363,43 @@ class Segmentation:
         if not any(row["area"] for row in rows):
             none = "expected a person who moves before a still background, got none in any frame"
             reason = f"; {damage}" if damage else advice(self.how.name, learned=learned)
-            raise InputError(f"{video.path}: {none}{reason}")
+            raise NoPersonError(f"{video.path}: {none}{reason}")
         doubt = verdict(apart, self.how.name, learned=learned)
+        if doubt is not None:
+            doubt = replace(doubt, text=f"{video.path}: {doubt.text}")
+        moves = "the camera seems to move, and silhouettes need a still one; expect poor masks"
         warnings = [
-            doubt and doubt.text,
-            damage if missing > MISSING * count else "",
+            damage if missing > MISSING * len(view) else "",
             several,
-            scan.camera_moves
-            and "the camera seems to move, and silhouettes need a still one; expect poor masks",
+            moves if view.moves else "",
         ]
-        packed = PackedMasks(
-            names=[f"{video.path}, frame {self.start + k}" for k in range(count)],
-            size=self.size,
-            masks=scan.masks,
-            valid=scan.valid,
+        landmarks = view.landmarks
+        facings = view.facings
+        # nothing is decoded for a segmenter that reports none
+        if facings is not None and np.isfinite(facings).any():
+            sides = [row["longer_side"] for row in rows]
+            facings = facings_on_the_spot(facings, _middles(view), sides, video.fps)
+        view = replace(
+            view,
             usable=np.array([row["usable"] for row in rows], dtype=bool),
-            fps=video.fps,
-            landmarks=scan.landmarks if scan.landmarks[..., 2].any() else None,
-            first=self.start,
-            guesses=video.guesses,
+            landmarks=landmarks
+            if landmarks is not None and landmarks[..., 2].any()
+            else None,
+            facings=facings,
+            doubt="" if doubt is None else doubt.text,
+            warnings=[
+                *video.warnings,
+                *([] if doubt is None else [doubt.text]),
+                *(f"{video.path}: {text}" for text in warnings if text),
+            ],
         )
-        columns = [
-            np.flatnonzero(packed.silhouette(k).mask) % self.size[0]
-            for k in range(count)
-        ]
-        middles = [float(each.mean()) if len(each) else math.nan for each in columns]
-        return Segmented(
-            packed,
-            rows,
-            doubt and replace(doubt, text=f"{video.path}: {doubt.text}"),
-            [*video.warnings, *(f"{video.path}: {text}" for text in warnings if text)],
-            facings_on_the_spot(
-                scan.facings, middles, [row["longer_side"] for row in rows], video.fps
-            ),
-            scan.camera_moves,
-        )
+        return view, rows, doubt
 
     def _scan(
         self,
         progress: Progress | None,
         changed: Callable[[int, Image], Image] | None = None,
-    ) -> _Scan:
+    ) -> _Pass:
         """Return what each frame shows: the largest blob, and the people with the quality of their masks.
 
         The segmenter gets the pictures as `changed` returns them.
@@ -461,20 +438,28 @@ class Segmentation:
             blanks.append(self._row(blank_quality, image, empty, k))
             largest.append(self._row(largest_quality, image, blobs[0], k))
         count = len(blanks)  # the file may break off
-        frames = (
+        numbers = np.arange(self.start, self.start + count)
+        view = View(
+            str(self.video.path),
+            numbers,
+            times_of(numbers, self.video.fps),
             masks[:count],
             valid[:count],
-            people,
-            largest,
-            blanks,
-            facings,
-            np.array(landmarks),
+            np.array([row["usable"] for row in largest], dtype=bool),
+            self.size,
+            fps=self.video.fps,
+            filmed=self.video.size,
+            landmarks=np.array(landmarks),
+            facings=np.array(facings),
+            moves=camera.moves,
+            guesses=self.video.guesses,
+            pictures=partial(self.video.frames, self.start, self.stop, self.size),
         )
-        return _Scan(*frames, camera.moves, self.how.person)
+        return _Pass(view, people, largest, blanks, self.how.person)
 
     def with_identities(
-        self, single: "Segmentation", scan: _Scan, progress: Progress | None
-    ) -> _Scan:
+        self, single: "Segmentation", scan: _Pass, progress: Progress | None
+    ) -> _Pass:
         """Return the scan of a segmenter that reports one person only, with the people of this still background.
 
         Nothing changes where this one has one person only, or poor masks of all. For the person who is followed
@@ -488,10 +473,10 @@ class Segmentation:
             verdict(rows_of(person, own.blanks)[1], self.how.name, learned=learned)
             for person in persons
         ]
-        if len(persons) < 2 or own.camera_moves or all(doubts):
+        if len(persons) < 2 or own.view.moves or all(doubts):
             return scan
         indices = person_indices(
-            persons, (unpacked(plane, self.size) for plane in scan.masks)
+            persons, (unpacked(plane, self.size) for plane in scan.view.bits)
         )
         if not any(index is not None for index in indices):
             return scan
@@ -503,29 +488,35 @@ class Segmentation:
                 single, parts, own.people.others(parts), progress
             )
             indices = person_indices(
-                persons, (unpacked(plane, self.size) for plane in scan.masks)
+                persons, (unpacked(plane, self.size) for plane in scan.view.bits)
             )
             frames = [
                 k
                 for k, index in enumerate(indices)
                 if index is not None and persons[index] == parts
             ]
-            if len(frames) >= REDIRECTED * len(
+            if len(frames) >= MOST * len(
                 {frame for part in parts for frame in part.detections}
             ):
                 break
-        landmarks = np.zeros_like(scan.landmarks)
-        facings = [math.nan] * len(indices)
         for k in frames:
-            replace_detection(
-                parts, k, unpacked(scan.masks[k], self.size), scan.largest[k]
-            )
-            own.valid[k], landmarks[k], facings[k] = (
-                scan.valid[k],
-                scan.landmarks[k],
-                scan.facings[k],
-            )
-        return own._replace(landmarks=landmarks, facings=facings, choice=choice)
+            mask = unpacked(scan.view.bits[k], self.size)
+            replace_detection(parts, k, mask, scan.largest[k])
+        used = np.zeros(len(indices), dtype=bool)
+        used[frames] = True
+        one = scan.view
+        # a pass states all of these
+        assert one.known is not None
+        assert own.view.known is not None
+        assert one.landmarks is not None
+        assert one.facings is not None
+        view = replace(
+            own.view,
+            known=np.where(used[:, None], one.known, own.view.known),
+            landmarks=np.where(used[:, None, None], one.landmarks, 0.0),
+            facings=np.where(used, one.facings, np.nan),
+        )
+        return own._replace(view=view, choice=choice)
 
     def _without_others(
         self,
@@ -533,7 +524,7 @@ class Segmentation:
         parts: Sequence[Tracklet],
         others: Sequence[Tracklet],
         progress: Progress | None,
-    ) -> _Scan:
+    ) -> _Pass:
         """Return another pass of a segmentation, through pictures with the background where a person is not."""
 
         def changed(k: int, image: Image) -> Image:
@@ -546,23 +537,28 @@ class Segmentation:
         )._scan(progress, changed)
 
     def _follow_person(
-        self, scan: _Scan
-    ) -> tuple[str, list[dict[str, Any]], list[dict[str, Any]]]:
-        """Return what there is to say of several people, and the rows of the one who is followed, as `rows_of`.
+        self, scan: _Pass
+    ) -> tuple[View, str, list[dict[str, Any]], list[dict[str, Any]]]:
+        """Return the view of the person who is followed, what there is to say of several, and the rows as `rows_of`.
 
-        Of several, the scan's masks become those of this one, and the pixels of the others are unknown.
+        The pixels of the others are unknown.
         """
         scale = 1.0 / self._segmenter.scale
         parts, several = scan.people.chosen(
             scan.choice, lambda k: f"frame {self.start + k}", scale
         )
         if not several:
-            return several, scan.largest, scan.largest
+            return scan.view, several, scan.largest, scan.largest
         others = scan.people.others(parts)
+        bits = np.empty_like(scan.view.bits)
+        known = np.empty_like(scan.view.bits)
         for k in range(len(scan.blanks)):
-            planes = planes_of(parts, others, k, unpacked(scan.valid[k], self.size))
-            scan.masks[k], scan.valid[k] = (np.packbits(plane) for plane in planes)
-        return several, *rows_of(parts, scan.blanks)
+            shown = scan.view.silhouette(k).valid
+            mask, valid = planes_of(parts, others, k, shown)
+            bits[k] = np.packbits(mask)
+            known[k] = np.packbits(valid)
+        view = replace(scan.view, bits=bits, known=known)
+        return view, several, *rows_of(parts, scan.blanks)
 
     def _row(
         self, quality: FrameQuality, image: Image, person: Person, k: int
@@ -589,8 +585,16 @@ def _alone(
     )
 
 
+def _middles(view: View) -> list[float]:
+    """Return the middle column of each mask, in pixels; NaN where it is empty."""
+    columns = [
+        np.flatnonzero(unpacked(bits, view.size)) % view.size[0] for bits in view.bits
+    ]
+    return [float(each.mean()) if len(each) else math.nan for each in columns]
+
+
 def facings_on_the_spot(
-    facings: Sequence[float],
+    facings: Array | Sequence[float],
     middles: Sequence[float],
     sides: Sequence[float],
     fps: float,
@@ -643,9 +647,9 @@ class CameraMotion:
             cv2.resize(image, self._size, interpolation=cv2.INTER_AREA),
             cv2.COLOR_BGR2GRAY,
         )
-        # noise is no texture,
+        # noise is no texture, and light that changes is none
         grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)
-        grey -= cv2.GaussianBlur(grey, (0, 0), COARSE)  # and light that changes is none
+        grey -= cv2.GaussianBlur(grey, (0, 0), REACH)
         wide, tall = (side // TILES for side in self._size)
         corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]
         tiles = [
@@ -664,7 +668,7 @@ class CameraMotion:
                 )[3]
                 shifts.append(float(np.hypot(*np.subtract(best, REACH))))
         return (
-            float(np.quantile(shifts, FREE)) if len(shifts) > SPREAD * TILES**2 else 0.0
+            float(np.quantile(shifts, FREE)) if len(shifts) > MOST * TILES**2 else 0.0
         )
 
 
@@ -709,4 +713,4 @@ def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
         raise InputError(
             f"{path}: expected an image of what to ignore, got a file that is none"
         )
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > 127)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > BRIGHT)

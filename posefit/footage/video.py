@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS, page_count, read_image
-from posefit.footage.readers import Numbered
+from posefit.footage.readers import Images
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 
@@ -148,15 +148,16 @@ class Video:
         return cls(name, fps, size, pictures=images, _order=order, _filmed=order >= 0)
 
     @classmethod
-    def of_pictures(cls, images: Numbered, name: Path, fps: float | None) -> "Video":
+    def of_pictures(cls, images: Images, fps: float | None = None) -> "Video":
         """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
-        files = [file for file in images.files if file is not None]
-        guesses = list(images.guesses)
+        assert images.numbered is not None
+        files = [file for file in images.numbered.files if file is not None]
+        guesses = list(images.numbered.guesses)
         pictures: list[tuple[Path, int] | Image] = [
             (file, page) for file in files for page in range(page_count(file))
         ]
         image = _picture(pictures[0])
-        filmed = np.array([file is not None for file in images.files])
+        filmed = np.array([file is not None for file in images.numbered.files])
         # a film that begins with missing pictures holds the first one
         order = np.maximum(np.cumsum(filmed) - 1, 0)
         if len(pictures) > len(files):
@@ -166,7 +167,7 @@ class Video:
         if fps is None:
             guesses.append(f"{FPS:g} frames a second")
         return cls(
-            name,
+            Path(images.name),
             fps or FPS,
             size,
             0,

@@ -7,7 +7,7 @@
 | root and joint angles as rotations. Interpretation S3 | rotation.py |
 | poses with nearly the same silhouette: mirrored, turned, reflected, limbs exchanged | symmetry.py |
 | a pinhole camera | camera.py |
-| calibration files: OpenCV, Qualisys, Pose2Sim and ours; lens distortion | calibration.py |
+| calibration files, a reader a program; lens distortion | calibration/ |
 | forward kinematics, compiled | kernels.py |
 
 World: y up, metres. Camera: x right, y down, z forward. Names chain:

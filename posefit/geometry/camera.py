@@ -3,7 +3,8 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,9 @@ LARGEST_SIDE = 16_384  # pixels
 LARGEST_FILE = 1_000_000  # bytes
 # across the larger side; our guess for an unknown camera
 FIELD_OF_VIEW = math.radians(40.0)
+# by how much of themselves the focal lengths of square pixels may differ: of a limb that
+# is 40 pixels wide, a tenth of a pixel
+SQUARE = 0.005
 FOCALS = 0.05, 100.0  # times the larger side: lenses of 170 degrees to 0.6
 MARGIN = 0.06  # share of the image left free around what `framing` shows
 _KEYS = ("width", "height", "focal", "centre", "camera_from_world")
@@ -155,6 +159,30 @@ class Camera:
         in_camera = np.asarray(points) @ self.rotation.T + self.translation
         depths = in_camera[..., 2]
         return in_camera[..., :2] / depths[..., None] * self.focal + self.centre, depths
+
+    @cached_property
+    def square(self) -> bool:
+        """Whether its pixels are square, so that a ball is a circle in its pictures; bodies are drawn by that."""
+        longest = float(self.focal.max())
+        return longest - float(self.focal.min()) <= SQUARE * longest
+
+    def squared(self) -> "Camera":
+        """Return the camera of the same view whose pixels are square; it is this one where its own are.
+
+        The longer focal length holds in both directions, so that pictures get more columns or more rows.
+        """
+        if self.square:
+            return self
+        focal = float(self.focal.max())
+        finer = focal / self.focal
+        width, height = np.rint(finer * (self.width, self.height)).astype(int)
+        return replace(
+            self,
+            width=max(int(width), 1),
+            height=max(int(height), 1),
+            focal=np.full(2, focal),
+            centre=finer * self.centre,
+        )
 
     def to_json(self) -> str:
         """Return the text that `from_json` reads: sizes and pixels, and the 4 x 4 matrix camera_from_world."""

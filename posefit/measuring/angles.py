@@ -1,8 +1,9 @@
 """Clinical joint angles, in degrees: of hip, knee and ankle, of shoulder and elbow.
 
-Each is counted from the anatomical position, where it is zero, and has one sign for both sides of the body. The axes
-are those of `posefit.measuring.segments`. The shoulder's plane and rotation mean nothing where the arm hangs straight
-down, as longitudes do at a pole; near it they are left out.
+Each is zero in the anatomical position, and has the same sign on both sides of the
+body. The axes are those of `posefit.measuring.segments`. The shoulder's plane and
+rotation are undefined if the arm hangs straight down, like longitudes at a pole; near
+that pose they are left out.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from posefit.geometry.rotation import angles_about, unwrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.measuring.segments import SIDES, segment_rotations
 
-# Each joint's angles, with what a positive one is.
+# each joint's angles, and the direction of positive values
 MEANINGS = {
     "hip": {
         "flexion": "thigh forwards",
@@ -40,102 +41,122 @@ MEANINGS = {
         "pronation": "palm backwards",
     },
 }
-BETWEEN = {  # the segments of each, the proximal first
+# each joint's segments, the proximal one first
+BETWEEN = {
     "hip": ("pelvis", "thigh"),  # WU2002 (hip)
     "knee": ("thigh", "shank"),  # GROOD1983 (knee)
     "ankle": ("shank", "foot"),  # WU2002 (ankle)
     "shoulder": ("thorax", "upper_arm"),
     "elbow": ("upper_arm", "forearm"),  # WU2005 (elbow)
 }
+# columns of angles.csv, in order
 COLUMNS = tuple(
     f"{side}_{joint}_{angle}"
     for joint, angles in MEANINGS.items()
     for side in SIDES
     for angle in angles
-)  # of angles.csv, in its order
-# the mirror between left and right, in segments' axes
+)
+# mirrors left and right, in segments' axes
 _ACROSS = np.diag([1.0, 1.0, -1.0])
-# degrees from hanging or pointing straight up: 2 degrees of error turn the plane by
-# more than ten
+# degrees between an arm and its straight-down or straight-up pose: so near, an error of
+# 2 degrees turns the plane by more than ten
 NEAR_POLE = 10.0
-_LEVEL = 1e-9  # the sine of an elevation, below which its plane is not determined
+_LEVEL = 1e-9  # sine of an elevation below which its plane is not determined
 
 
 def joint_coordinates(proximal: Array, distal: Array) -> Array:
-    """Return rotations (..., 3) in radians of a distal about a proximal segment of the right side, both (..., 3, 3).
+    """Return rotations (..., 3) in radians of a distal about a proximal segment.
 
-    They are about the proximal segment's Z, about the floating axis at right angles to both others, and about the
-    distal segment's Y: forwards, inwards, and turned inwards.
+    They are about the proximal segment's Z, about the floating axis at right angles to
+    both others, and about the distal segment's Y: forwards, inwards, turned inwards.
+
+    Args:
+        proximal: axes (..., 3, 3) of a segment of the right side.
+        distal: axes (..., 3, 3) of the next segment.
     """
     relative = np.swapaxes(proximal, -1, -2) @ distal
     return angles_about((2, 0, 1), relative)  # GROOD1983 (joint coordinate system)
 
 
 def joint_angles(joint: str, proximal: Array, distal: Array) -> Array:
-    """Return the angles (..., 3) of a joint of the right side, in the order of `MEANINGS`, in radians."""
+    """Return the angles (..., 3) of a joint of the right side, in radians.
+
+    Args:
+        joint: a key of `MEANINGS`, which also has the order of the angles.
+        proximal: axes (..., 3, 3) of the segment above the joint.
+        distal: axes (..., 3, 3) of the segment below it.
+    """
     if joint == "shoulder":
         return shoulder_angles(proximal, distal)
-    return joint_coordinates(proximal, distal) * (
-        [-1.0, 1.0, 1.0] if joint == "knee" else 1.0
-    )
+    coordinates = joint_coordinates(proximal, distal)
+    if joint == "knee":
+        return coordinates * [-1.0, 1.0, 1.0]
+    return coordinates
 
 
 def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
-    """Return plane of elevation, elevation and internal rotation (..., 3) of the right shoulder, in radians.
+    """Return the right shoulder's angles (..., 3) in radians.
 
-    The source counts elevation downwards from 0 to -180 degrees; here it is positive. Where the arm hangs straight
-    down or points straight up, all of the turn is reported as rotation.
+    They are plane of elevation, elevation and internal rotation. The source counts
+    elevation downwards from 0 to -180 degrees; here it is positive. If the arm hangs
+    straight down or points straight up, the whole turn is reported as rotation.
+
+    Args:
+        thorax: axes (..., 3, 3).
+        upper_arm: axes (..., 3, 3).
     """
     relative = np.swapaxes(thorax, -1, -2) @ upper_arm
     level = np.hypot(relative[..., 1, 0], relative[..., 1, 2])
     pole = level < _LEVEL
     elevation = np.arctan2(level, relative[..., 1, 1])  # WU2005 (shoulder)
     plane = np.where(pole, 0.0, np.arctan2(-relative[..., 0, 1], -relative[..., 2, 1]))
-    alone = np.arctan2(relative[..., 0, 2], relative[..., 0, 0])
-    rotation = np.where(
-        pole, alone, np.arctan2(-relative[..., 1, 0], relative[..., 1, 2])
-    )
+    rotation_at_pole = np.arctan2(relative[..., 0, 2], relative[..., 0, 0])
+    rotation = np.arctan2(-relative[..., 1, 0], relative[..., 1, 2])
+    rotation = np.where(pole, rotation_at_pole, rotation)
     return np.stack([plane, elevation, rotation], axis=-1)
 
 
 def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
-    """Return the angles (T,) in degrees of poses (T, 66), by the names of `COLUMNS`.
+    """Return the clinical angles (T,) of poses in degrees, by the names of `COLUMNS`.
 
-    Poses are successive, and angles have no jumps of whole turns from one to the next; most lie in -180 to 180. A
-    joint's first and last angles are NaN within `NEAR_POLE` degrees of where they are about one axis, such as the plane
-    and the rotation of a shoulder that hangs or points straight up.
+    Angles do not jump by whole turns from one pose to the next; most lie in -180 to
+    180. A joint's first and last angles are NaN within `NEAR_POLE` degrees of a pose in
+    which both are about the same axis, such as plane and rotation of a shoulder that
+    hangs or points straight up.
+
+    Args:
+        skeleton: the skeleton.
+        poses: successive poses (T, 66).
     """
     segments = segment_rotations(skeleton, poses)
     columns: dict[str, Array] = {}
     for side in SIDES:
-        # a left side is measured as the right one that it is in the mirror
-        axes = {
-            name.removeprefix(f"{side}_"): _ACROSS @ rotation @ _ACROSS
-            if side == "left"
-            else rotation
-            for name, rotation in segments.items()
-        }
+        axes = {}
+        for name, rotation in segments.items():
+            # a mirrored left side is a right side
+            if side == "left":
+                rotation = _ACROSS @ rotation @ _ACROSS
+            axes[name.removeprefix(f"{side}_")] = rotation
         by_joint = {
             joint: joint_angles(joint, *(axes[segment] for segment in pair))
             for joint, pair in BETWEEN.items()
         }
         for joint, values in by_joint.items():
-            level = (
-                np.sin(values[:, 1]) if joint == "shoulder" else np.cos(values[:, 1])
-            )
-            values[level < np.sin(np.radians(NEAR_POLE))] *= [np.nan, 1.0, np.nan]
+            # near 0, the first and the last angle are about the same axis
+            apart = np.cos(values[:, 1])
+            if joint == "shoulder":
+                apart = np.sin(values[:, 1])
+            values[apart < np.sin(np.radians(NEAR_POLE))] *= [np.nan, 1.0, np.nan]
             for k, angle in enumerate(MEANINGS[joint]):
-                columns[f"{side}_{joint}_{angle}"] = np.degrees(
-                    _continuous(values[:, k])
-                )
+                series = _continuous(values[:, k])
+                columns[f"{side}_{joint}_{angle}"] = np.degrees(series)
     return {name: columns[name] for name in COLUMNS}
 
 
 def _continuous(angles: Array) -> Array:
-    """Return angles (T,) without jumps, shifted by whole turns so that their median lies in -pi to pi."""
+    """Return angles (T,) without jumps, with a median in -pi to pi."""
     series = unwrapped(angles)
     if np.isnan(series).all():
         return series
-    return np.asarray(
-        series - 2.0 * np.pi * np.floor(np.nanmedian(series) / (2.0 * np.pi) + 0.5)
-    )
+    turns = np.floor(np.nanmedian(series) / (2.0 * np.pi) + 0.5)
+    return np.asarray(series - 2.0 * np.pi * turns)

@@ -1,7 +1,8 @@
-"""Joint positions and the events of gait as a .c3d file, which programs of motion analysis open.
+"""Joint positions and the events of gait as a .c3d file, for motion analysis programs.
 
-The format is that of the C3D file format user guide (2008): a header, parameters and 3D points in blocks of 512 bytes,
-here as little-endian real numbers, in millimetres. An unobserved point has the residual -1.
+The format follows the C3D file format user guide (2008): a header, parameters and 3D
+points in blocks of 512 bytes, here as little-endian real numbers, in millimetres. An
+unobserved point has the residual -1.
 """
 
 import struct
@@ -19,8 +20,8 @@ from posefit.version import __version__
 BLOCK = 512  # bytes
 MAGIC = 0x50
 INTEL = 84
-MAX_FRAMES = 0xFFFF  # frames that the header can count; more are in TRIAL
-MAX_EVENTS = 255  # that a parameter can hold
+MAX_FRAMES = 0xFFFF  # frames that the header can count; TRIAL has the full number
+MAX_EVENTS = 255  # events that a parameter can hold
 MILLIMETRES = 1e3  # in a metre
 _ICONS = {"Foot Strike": 1, "Foot Off": 2}
 
@@ -31,25 +32,26 @@ def write_c3d(
     blank: Collection[int] = (),
     gait: Gait | None = None,
 ) -> None:
-    """Write the 27 joints of every frame as points named by `PLACES`, y up; of `blank` frames, by number, none.
+    """Write the 27 joints of every frame as points, y up, under the names of `PLACES`.
 
-    Strikes and toe-offs of `gait` are the file's events, the first 255 of them.
+    Args:
+        path: the file.
+        motion: the motion.
+        blank: numbers of frames in which all points are unobserved.
+        gait: its strikes and toe-offs become the file's events, the first 255 of them.
     """
     joints = motion.joints * MILLIMETRES
-    points = np.concatenate([joints, np.zeros((*joints.shape[:2], 1))], axis=2).astype(
-        "<f4"
-    )
+    residuals = np.zeros((*joints.shape[:2], 1))
+    points = np.concatenate([joints, residuals], axis=2).astype("<f4")  # (T, 27, 4)
     points[[number - motion.first for number in blank]] = (0.0, 0.0, 0.0, -1.0)
     parameters = b""
     start = 0
-    # once more, as the parameters state the block that comes after them
+    # repeated, because the parameters state the block after them, and so their own size
     while start != 2 + len(parameters) // BLOCK:
         start = 2 + len(parameters) // BLOCK
         parameters = _section(_parameters(motion, start, gait))
-    first, last = (
-        min(number, MAX_FRAMES)
-        for number in (motion.first + 1, motion.first + len(motion))
-    )
+    first = min(motion.first + 1, MAX_FRAMES)
+    last = min(motion.first + len(motion), MAX_FRAMES)
     header = struct.pack(
         "<BBHHHHHfHHf",
         2,
@@ -65,9 +67,8 @@ def write_c3d(
         motion.fps,
     )
     data = points.tobytes()
-    Path(path).write_bytes(
-        header.ljust(BLOCK, b"\0") + parameters + data + bytes(-len(data) % BLOCK)
-    )
+    padding = bytes(-len(data) % BLOCK)
+    Path(path).write_bytes(header.ljust(BLOCK, b"\0") + parameters + data + padding)
 
 
 def _parameters(
@@ -96,7 +97,10 @@ def _parameters(
         },
         "MANUFACTURER": {"SOFTWARE": "posefit", "VERSION": __version__},
     }
-    if events := sorted(_events(gait))[:MAX_EVENTS] if gait and not gait.why else []:
+    events = []
+    if gait and not gait.why:
+        events = sorted(_events(gait))[:MAX_EVENTS]
+    if events:
         groups["EVENT"] = {
             "USED": len(events),
             "CONTEXTS": [foot.title() for _, foot, _ in events],
@@ -108,7 +112,7 @@ def _parameters(
 
 
 def _in_words(number: int) -> list[int]:
-    """Return a number of 32 bits as two of 16, the lower first."""
+    """Return a number of 32 bits as two numbers of 16, the lower half first."""
     return [number & MAX_FRAMES, number >> 16]
 
 
@@ -120,26 +124,21 @@ def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:
 
 
 def _section(groups: dict[str, dict[str, Any]]) -> bytes:
-    """Return the parameter section, in whole blocks, of parameters by group and name."""
+    """Return the parameter section, in whole blocks, for groups of parameters."""
     records = b""
     for number, (group, parameters) in enumerate(groups.items(), 1):
-        records += (
-            struct.pack("<bb", len(group), -number)
-            + group.encode()
-            + struct.pack("<hB", 3, 0)
-        )
+        records += struct.pack("<bb", len(group), -number)
+        records += group.encode()
+        records += struct.pack("<hB", 3, 0)
         for name, value in parameters.items():
             body = _encoded(value) + b"\0"  # no description
-            records += (
-                struct.pack("<bb", len(name), number)
-                + name.encode()
-                + struct.pack("<h", 2 + len(body))
-                + body
-            )
-    size = -(-(4 + len(records)) // BLOCK)
-    return (struct.pack("<BBBB", 1, MAGIC, size, INTEL) + records).ljust(
-        size * BLOCK, b"\0"
-    )
+            records += struct.pack("<bb", len(name), number)
+            records += name.encode()
+            records += struct.pack("<h", 2 + len(body))
+            records += body
+    blocks = -(-(4 + len(records)) // BLOCK)
+    section = struct.pack("<BBBB", 1, MAGIC, blocks, INTEL) + records
+    return section.ljust(blocks * BLOCK, b"\0")
 
 
 def _encoded(value: Any) -> bytes:
@@ -148,14 +147,8 @@ def _encoded(value: Any) -> bytes:
     if array.dtype.kind == "U":
         words = array.astype("S").reshape(-1)
         sizes = bytes((words.itemsize, *array.shape))
-        return (
-            struct.pack("<bB", -1, len(sizes))
-            + sizes
-            + b"".join(word.ljust(words.itemsize) for word in words)
-        )
+        content = b"".join(word.ljust(words.itemsize) for word in words)
+        return struct.pack("<bB", -1, len(sizes)) + sizes + content
     kind, stored = (2, "<u2") if array.dtype.kind == "i" else (4, "<f4")
-    return (
-        struct.pack("<bB", kind, array.ndim)
-        + bytes(array.shape[::-1])
-        + array.astype(stored).tobytes()
-    )
+    sizes = bytes(array.shape[::-1])
+    return struct.pack("<bB", kind, array.ndim) + sizes + array.astype(stored).tobytes()

@@ -1,7 +1,8 @@
-"""What the 27 joints of the skeleton are on a person, in the words of anatomy.
+"""Names the 27 joints of the skeleton in the words of anatomy.
 
-The skeleton calls a joint after the bone that ends in it, so that `lfemur` is the left knee. Tables and markers have
-the names below; poses and motion capture files keep the skeleton's own.
+The skeleton calls a joint after the bone that ends in it, so that `lfemur` is the left
+knee. Tables and markers have the names below; poses and motion capture files have the
+skeleton's names.
 """
 
 from posefit.arrays import Array
@@ -30,7 +31,7 @@ _PLACES = {
 
 
 def place_name(joint: str) -> str:
-    """Return what a joint of the skeleton is on a person: `left_knee` of `lfemur`, `head_top` of `head`."""
+    """Return a joint's anatomical name: `left_knee` for `lfemur`."""
     place = _PLACES[kind(joint)]
     return place if side(joint) == "middle" else f"{side(joint)}_{place}"
 
@@ -41,6 +42,9 @@ CENTRES = tuple(f"{which}_{joint}" for joint in _LARGE for which in ("left", "ri
 
 
 def joint_centres(motion: Motion) -> dict[str, Array]:
-    """Return where the centres of the twelve large joints are in each frame, (T, 3) metres in the world, by name."""
+    """Return the centres of the twelve large joints by name.
+
+    They have shape (T, 3), in metres in the world.
+    """
     joints = motion.joints
     return {name: joints[:, PLACES.index(name)] for name in CENTRES}

@@ -1,8 +1,9 @@
-"""When feet touch the ground and leave it, of a motion in 3D. Zeni et al. 2008, coordinate-based.
+"""When feet touch the ground and leave it, from joints in 3D. Zeni et al. 2008.
 
-A foot strikes where the heel is farthest ahead of the pelvis, and lifts off where the toes are farthest behind it. That
-needs no force plate, no floor and no foot at rest, so it holds for feet that slide a little and for bodies that a
-silhouette has put a few centimetres too high. Here the ankle stands for the heel and the root for the sacrum.
+A foot strikes where the heel is farthest ahead of the pelvis, and lifts off where the
+toes are farthest behind it. That needs no force plate, no floor and no foot at rest.
+So it also works for feet that slide a little, and for bodies that a silhouette has put
+a few centimetres too high. Here the ankle replaces the heel, and the root the sacrum.
 """
 
 from dataclasses import dataclass
@@ -16,40 +17,51 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.segments import FORWARDS, SIDES
 from posefit.motion.motion import Motion
 
-# above it there is next to nothing of a walk. Winter, Biomechanics and motor control,
+# hertz: a walk has hardly anything above it. Winter, Biomechanics and motor control,
 # 2009
 CUTOFF_HZ = 6.0
-MIN_FPS = 2.0 * CUTOFF_HZ  # frames a second: the Nyquist rate
-# the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the
-# person turns
+MIN_FPS = 2.0 * CUTOFF_HZ  # frames per second: the Nyquist rate
+# hertz: the pelvis sways once in a stride, 0.8 to 1.1 times a second; turns are slower
 SWAY_HZ = 0.3
-# metres that a foot moves to and fro at least, relative to the pelvis, for an event
+# metres that a foot must swing relative to the pelvis, for an event
 MIN_FOOT_SWING = 0.1
-MIN_SWING_SHARE = 0.2  # and at least this share of the range of all its swings
+MIN_SWING_SHARE = 0.2  # and the least share of the range of all its swings
 
 
 @dataclass(frozen=True, eq=False)
 class GaitEvents:
-    """Times in frames, counted from 0 and with fractions, by side; and where the person went meanwhile."""
+    """Times of events in frames, counted from 0 and with fractions, and the path.
 
-    strikes: dict[str, Array]  # initial contact, by side
-    offs: dict[str, Array]  # toe off, by side
-    # (T, 2) of x and z: the unit vector that the pelvis faces along, without its sway
+    Attributes:
+        strikes: times of initial contact, by side.
+        offs: times of toe off, by side.
+        heading: unit vector (T, 2) of x and z that the pelvis faces along, without its
+            sway.
+        pelvis: place (T, 2) in metres.
+        ankles: places (T, 2) in metres, by side.
+    """
+
+    strikes: dict[str, Array]
+    offs: dict[str, Array]
     heading: Array
-    pelvis: Array  # (T, 2) metres
-    ankles: dict[str, Array]  # (T, 2) metres, by side
+    pelvis: Array
+    ankles: dict[str, Array]
 
 
 def gait_events(motion: Motion) -> GaitEvents:
-    """Return when the feet of a motion strike and lift off; no event at all where they do not move to and fro.
+    """Return when the feet of a motion strike and lift off.
 
-    Raises InputError where there are too few frames a second.
+    There are no events if the feet do not swing.
+
+    Raises:
+        InputError: the motion has too few frames per second.
     """
     if motion.fps < MIN_FPS:
         raise InputError(
-            f"fps must be at least {MIN_FPS:g} to find the events of gait, got {motion.fps:g}"
+            f"fps must be at least {MIN_FPS:g} to find the events of gait, "
+            f"got {motion.fps:g}"
         )
-    # over the ground: x and z
+    # x and z only: the ground
     joints = low_pass(motion.joints[:, :, ::2], CUTOFF_HZ, motion.fps)
     facing = rotation_from_root_angles(motion.poses[:, :3]) @ FORWARDS
     heading = low_pass(facing[:, ::2], SWAY_HZ, motion.fps)
@@ -57,9 +69,8 @@ def gait_events(motion: Motion) -> GaitEvents:
     pelvis = joints[:, 0]
 
     def ahead(place: str) -> Array:
-        return np.asarray(
-            ((joints[:, PLACES.index(place)] - pelvis) * heading).sum(axis=1)
-        )
+        distance = (joints[:, PLACES.index(place)] - pelvis) * heading  # (T, 2)
+        return np.asarray(distance.sum(axis=1))
 
     # ZENI2008 (heel strike)
     strikes = {side: _tops(ahead(f"{side}_ankle")) for side in SIDES}
@@ -69,10 +80,15 @@ def gait_events(motion: Motion) -> GaitEvents:
 
 
 def low_pass(series: Array, cutoff: float, fps: float) -> Array:
-    """Return series (T, ...) without what is faster than `cutoff` hertz, which keeps 0.71 of its size.
+    """Return series (T, ...) without frequencies above a limit.
 
-    The filter is a Gaussian, which shifts nothing in time. The ends are extended by odd reflection, which keeps an even
-    pace.
+    The filter is a Gaussian, which shifts nothing in time. The ends are extended by odd
+    reflection, which keeps an even pace.
+
+    Args:
+        series: values in frames.
+        cutoff: frequency in hertz of which 0.71 of the amplitude is left.
+        fps: frames per second.
     """
     width = np.sqrt(np.log(2.0)) / (2.0 * np.pi * cutoff) * fps  # frames
     reach = min(int(4.0 * width) + 1, len(series) - 1)
@@ -87,9 +103,10 @@ def low_pass(series: Array, cutoff: float, fps: float) -> Array:
 
 
 def _tops(series: Array) -> Array:
-    """Return where a series is at its tops, in frames and between them.
+    """Return the times of a series' maxima, in frames with fractions.
 
-    A top is the highest place between two where it is lower by a fifth of the whole range, and by `MIN_FOOT_SWING`.
+    On both sides of a maximum the series falls by at least a fifth of its range, and by
+    at least `MIN_FOOT_SWING`.
     """
     lowest, highest = np.percentile(series, [2, 98])
     step = max(MIN_FOOT_SWING, MIN_SWING_SHARE * float(highest - lowest))
@@ -118,7 +135,7 @@ def _peaks(series: Array) -> list[tuple[int, float]]:
 
 
 def _between(series: Array, k: int) -> float:
-    """Return where the parabola through three neighbours has its top."""
+    """Return the maximum of the parabola through a value and its neighbours."""
     before, here, after = series[k - 1 : k + 2]
     bend = before - 2.0 * here + after
     return k + 0.5 * float((before - after) / bend) if bend < 0.0 else float(k)

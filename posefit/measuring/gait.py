@@ -1,8 +1,10 @@
-"""What a walk is like, left and right: cadence, steps and strides, speed, stance and width; and who walks backwards.
+"""Measures of a walk, left and right: cadence, steps, strides, speed, stance, width.
 
-A step of a foot lasts from the other foot's strike to its own, a stride from one of its strikes to its next. Only those
-count whose feet strike in turn, in which the person moves the way they face, and of which every frame is known. Of a
-person who walks and stays in one place, as on a treadmill or before a camera that turns with them, times alone count.
+It also finds people who walk backwards. A step of a foot lasts from the other foot's
+strike to its own, a stride from one of its strikes to the next. A step or a stride
+counts if the feet strike in turn, if the person moves the way they face, and if every
+frame of it is known. If a person walks and stays in one place, as on a treadmill or
+before a camera that turns with them, only times count.
 """
 
 from collections.abc import Collection, Iterator
@@ -20,81 +22,109 @@ from posefit.measuring.events import MIN_FPS, GaitEvents, gait_events
 from posefit.measuring.segments import SIDES
 from posefit.motion.motion import Motion, at_frames
 
-STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps a minute
-MIN_SPEED = 0.2  # metres a second
+STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps per minute
+MIN_SPEED = 0.2  # metres per second
 MIN_STEPS = 2  # of a walk
-MIN_STEPS_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
-# metres between the lines that the feet of a walk keep to; who dances or dodges goes
-# wider
+MIN_STEPS_SHARE = 1.0 / 3.0  # least share of the known time that the steps last
+# metres between the lines on which the feet of a walk strike; in dancing or dodging it
+# is wider
 MAX_STEP_WIDTH = 0.35
 RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
-# share of a stride; a runner's foot stands shorter, judged by the rearmost toes
+# share of a stride; judged by the rearmost toes, a runner's foot stands shorter
 MIN_STANCE_SHARE = 0.57
-# ours: of strides in one place, the standard deviation over the mean; those of a dance
-# differ more
+# ours: standard deviation over mean of strides in one place; a dance's differ more
 MAX_UNEVEN = 0.1
-# ours: more than of a walk, as other motions stay in one place, too
+# ours: greater than MIN_STEPS_SHARE, because other motions stay in one place, too
 MIN_STEPS_SHARE_IN_PLACE = 0.5
-IN_PLACE = "the person stays in one place: on the spot, on a treadmill, or before a camera that turns with them"
-CYCLE = 101  # moments of a stride, of which the last is the first of the next
-GRAVITY = 9.81  # metres a second squared
-TRAVEL_SECONDS = 0.5  # ours: over which the direction is measured
-MIN_TRAVEL_SPEED = 0.3  # metres a second, ours: below it a person goes nowhere
-WARNING_SHARE = 0.05  # ours: of frames, from which it is worth a warning
+IN_PLACE = (
+    "the person stays in one place: on the spot, on a treadmill, "
+    "or before a camera that turns with them"
+)
+CYCLE = 101  # samples of a stride; the last is the first of the next stride
+GRAVITY = 9.81  # metres per second squared
+TRAVEL_SECONDS = 0.5  # ours: time over which the direction of travel is measured
+MIN_TRAVEL_SPEED = 0.3  # metres per second, ours: a slower person has no direction
+WARNING_SHARE = 0.05  # ours: share of frames from which a warning is given
 
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """A strike of a foot, with the step that ends in it and the stride that it begins; None where either is not known.
+    """A strike of a foot, with the step that it ends and the stride that it begins.
 
-    Seconds count from the first frame.
+    What is unknown is None. Seconds count from the first frame, lengths are metres.
+
+    Attributes:
+        foot: "left" or "right".
+        strike_seconds: time of the strike.
+        toe_off_seconds: time of the next toe off.
+        step_seconds: duration of the step.
+        step_length: from the other ankle at its strike, along the way the person faces.
+        step_width: between both ankles at the strike, across the way.
+        stride_seconds: duration of the stride.
+        stride_length: from this strike to the foot's next one.
+        stance_share: share of the stride in which the foot stands.
     """
 
-    foot: str  # left or right
+    foot: str
     strike_seconds: float
     toe_off_seconds: float | None = None
     step_seconds: float | None = None
-    # metres along the way that the person faces, from the other ankle at its strike
     step_length: float | None = None
-    # metres across it, between both ankles at the strike
     step_width: float | None = None
     stride_seconds: float | None = None
-    stride_length: float | None = None  # metres
+    stride_length: float | None = None
     stance_share: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class FootGait:
-    """The means over a foot's steps, which end in its strikes, and over its strides; None where there is none."""
+    """Means over the steps that end in a foot's strikes, and over its strides.
+
+    A mean is None if there are no values. Lengths are metres.
+    """
 
     steps: int = 0
     step_seconds: float | None = None
-    step_length: float | None = None  # metres
-    stride_length: float | None = None  # metres
+    step_length: float | None = None
+    stride_length: float | None = None
     stance_share: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
-    """The gait of a motion, with every step; None where it is no walk, with the reason in `why`.
+    """The gait of a motion, with every step.
 
-    Strides and stance are None, too, where no stride is whole, and lengths and speed with a reason in `why_no_lengths`.
+    If it is not a walk, all measures are None. Strides and stance are also None if no
+    stride is complete.
+
+    Attributes:
+        steps: every strike, with its measures.
+        why: why it is not a walk; empty if it is one.
+        why_no_lengths: why lengths and speed are None; empty if they are known.
+        left: means of the left foot.
+        right: means of the right foot.
+        cadence: steps per minute.
+        speed: metres per second.
+        step_length: metres.
+        stride_length: metres.
+        step_width: metres.
+        stance_share: share of a stride.
     """
 
     steps: list[Step] = field(default_factory=list, repr=False)
-    why: str = ""  # empty where it is a walk
+    why: str = ""
     why_no_lengths: str = ""
     left: FootGait = FootGait()
     right: FootGait = FootGait()
-    cadence: float | None = None  # steps a minute
-    speed: float | None = None  # metres a second
-    step_length: float | None = None  # metres
-    stride_length: float | None = None  # metres
-    step_width: float | None = None  # metres
+    cadence: float | None = None
+    speed: float | None = None
+    step_length: float | None = None
+    stride_length: float | None = None
+    step_width: float | None = None
     stance_share: float | None = None
 
     def as_dict(self) -> dict[str, object]:
-        """Return the gait as summary.json holds it."""
+        """Return the gait in the form of summary.json."""
         counted = {"steps": len(_values(self.steps, "step_seconds"))}
         reasons = {
             "why": self.why or None,
@@ -104,35 +134,33 @@ class Gait:
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
-    """Return the gait of a motion; `unknown` frames, by number, such as held or lost ones, count for nothing."""
+    """Return the gait of a motion.
+
+    Args:
+        motion: the motion.
+        unknown: numbers of frames that count for nothing, such as held or lost ones.
+    """
     if motion.fps < MIN_FPS:
         return Gait(why=f"fewer than {MIN_FPS:g} frames a second")
     events = gait_events(motion)
-    speed = float(
-        ((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum()
-        / max(len(motion) - 1, 1)
-        * motion.fps
-    )
+    moved = events.pelvis[1:] - events.pelvis[:-1]  # (T - 1, 2)
+    distance = (moved * events.heading[1:]).sum()
+    speed = float(distance / max(len(motion) - 1, 1) * motion.fps)
     in_place = abs(speed) < MIN_SPEED
-    steps = list(
-        _steps(
-            events,
-            motion.fps,
-            motion.first,
-            {number - motion.first for number in unknown},
-            in_place,
-        )
-    )
-    if why := _why_not(
-        motion, events, steps, speed, (len(motion) - len(unknown)) / motion.fps
-    ):
+    frames = {number - motion.first for number in unknown}
+    steps = list(_steps(events, motion.fps, motion.first, frames, in_place))
+    known = (len(motion) - len(unknown)) / motion.fps
+    if why := _why_not(motion, events, steps, speed, known):
         return Gait(steps=steps, why=why)
     left, right = (
         _of_foot([step for step in steps if step.foot == side]) for side in SIDES
     )
 
     def mean(name: str) -> float | None:
-        """Return the mean of the feet's means: the steps of one may be more, and of a limp are longer or shorter."""
+        """Return the mean of the feet's means.
+
+        One foot may have more steps, and the feet of a limp differ.
+        """
         values = [
             value
             for foot in (left, right)
@@ -170,7 +198,10 @@ def _of_foot(steps: list[Step]) -> FootGait:
 def _steps(
     events: GaitEvents, fps: float, first: int, unknown: set[int], in_place: bool
 ) -> Iterator[Step]:
-    """Yield every strike in the order of time, with what is known of its step and its stride; `in_place` no lengths."""
+    """Yield every strike in order of time, with its step and stride if they are known.
+
+    With `in_place` they have no lengths.
+    """
     least = -np.inf if in_place else MIN_SPEED
     strikes = sorted(
         (time, side) for side in SIDES for time in _known(events.strikes[side], unknown)
@@ -190,6 +221,7 @@ def _steps(
         before, foot_before = strikes[k - 1] if k else (time, foot)
         if foot_before == other and _walked(events, fps, before, time, unknown, least):
             measures |= _step(events, fps, foot, other, before, time)
+        # a stride: the other foot, then this one again
         following = strikes[k + 1 : k + 3]
         times = [time, *(later for later, _ in following)]
         in_turn = [side for _, side in following] == [other, foot]
@@ -205,18 +237,17 @@ def _steps(
 def _step(
     events: GaitEvents, fps: float, foot: str, other: str, start: float, end: float
 ) -> dict[str, float | None]:
-    """Return the measures of a step of a foot, from the strike of the other one to its own."""
+    """Return the measures of a step, from the other foot's strike to the foot's own."""
     struck = at_frames(events.ankles[foot], end)
     x, z = at_frames(events.heading, end)
-    # both ankles at one moment: between two moments an error of the person's depth would count
-    beside = struck - at_frames(events.ankles[other], end)
+    # both ankles at the same time: an error of the person's depth would count otherwise
+    between = struck - at_frames(events.ankles[other], end)
+    advance = struck - at_frames(events.ankles[other], start)
     return {
         "step_seconds": (end - start) / fps,
         # WHITTLE2007 (step length)
-        "step_length": float(
-            (struck - at_frames(events.ankles[other], start)) @ (x, z)
-        ),
-        "step_width": abs(float(beside @ (z, -x))),
+        "step_length": float(advance @ (x, z)),
+        "step_width": abs(float(between @ (z, -x))),
     }
 
 
@@ -228,7 +259,10 @@ def _stride(
     end: float,
     off: float | None,
 ) -> dict[str, float | None]:
-    """Return the measures of a stride of a foot, from one of its strikes to the next; it lifts `off` in between."""
+    """Return the measures of a stride of a foot, between two of its strikes.
+
+    `off` is when it lifts off in between, or None.
+    """
     moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], start)
     return {
         "stride_seconds": (end - start) / fps,
@@ -239,7 +273,7 @@ def _stride(
 
 
 def _known(times: Array, unknown: set[int]) -> list[float]:
-    """Return the times that do not lie beside a frame of which nothing is known."""
+    """Return the times that do not lie next to an unknown frame."""
     return [
         float(time) for time in times if not {int(time), int(np.ceil(time))} & unknown
     ]
@@ -253,40 +287,51 @@ def _walked(
     unknown: set[int],
     least: float,
 ) -> bool:
-    """Return whether the person walked on at `least` so fast from a strike to the next, with every frame known."""
+    """Return whether the person walked from a strike to the next, at least so fast.
+
+    All frames must be known, and the time must be that of a step of a walk.
+    """
     seconds = (end - start) / fps
-    if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & set(
-        range(int(start), int(end) + 2)
-    ):
+    frames = set(range(int(start), int(end) + 2))
+    if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & frames:
         return False
     moved: Array = at_frames(events.pelvis, end) - at_frames(events.pelvis, start)
-    return (
-        float(moved @ at_frames(events.heading, 0.5 * (start + end))) >= least * seconds
-    )
+    heading = at_frames(events.heading, 0.5 * (start + end))
+    return float(moved @ heading) >= least * seconds
 
 
 def _why_not(
     motion: Motion, events: GaitEvents, steps: list[Step], speed: float, known: float
 ) -> str:
-    """Return why a motion at a speed, of which so many seconds are known, is no walk; empty where it is one."""
+    """Return why a motion is not a walk, or "" if it is one.
+
+    Args:
+        motion: the motion.
+        events: its events.
+        steps: its steps.
+        speed: forwards, in metres per second.
+        known: seconds that are known.
+    """
     strikes = sum(len(events.strikes[side]) for side in SIDES)
     if strikes <= MIN_STEPS:
-        return (
-            f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot detected"
-        )
+        plural = "" if strikes == 1 else "s"
+        return f"{strikes or 'no'} strike{plural} of a foot detected"
     if speed <= -MIN_SPEED:
         return f"the person moves backwards at {-speed:.2f} m/s"
     stance = _values(steps, "stance_share")
     froude = speed**2 / (GRAVITY * _leg(motion))  # ALEXANDER1989 (Froude number)
     if froude > RUNNING_FROUDE or (stance and np.mean(stance) < MIN_STANCE_SHARE):
-        return "the person runs" + (
-            f", at {speed:.1f} m/s" if speed >= MIN_SPEED else " in one place"
-        )
+        how = f", at {speed:.1f} m/s" if speed >= MIN_SPEED else " in one place"
+        return f"the person runs{how}"
     timed = _values(steps, "step_seconds")
     if len(timed) < MIN_STEPS:
-        return "the feet do not strike in turn at the pace of a walk, or too little is known"
+        return (
+            "the feet do not strike in turn at the pace of a walk, "
+            "or too little is known"
+        )
     in_place = abs(speed) < MIN_SPEED
-    if sum(timed) < (MIN_STEPS_SHARE_IN_PLACE if in_place else MIN_STEPS_SHARE) * known:
+    least = MIN_STEPS_SHARE_IN_PLACE if in_place else MIN_STEPS_SHARE
+    if sum(timed) < least * known:
         return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
     strides = _values(steps, "stride_seconds")
     if in_place and (
@@ -294,11 +339,9 @@ def _why_not(
     ):
         return "the person stays in one place, without even strides"
     width = _mean(steps, "step_width")
-    return (
-        f"steps are {width:.2f} m wide"
-        if width is not None and width > MAX_STEP_WIDTH
-        else ""
-    )
+    if width is not None and width > MAX_STEP_WIDTH:
+        return f"steps are {width:.2f} m wide"
+    return ""
 
 
 def _leg(motion: Motion) -> float:
@@ -315,28 +358,40 @@ def _mean(steps: list[Step], name: str) -> float | None:
 
 
 def stride_curves(motion: Motion, gait: Gait, angle: str) -> dict[str, Array]:
-    """Return an angle of `clinical_angles` over the whole strides of each foot, by side (n, 101): degrees."""
+    """Return an angle over the whole strides of each foot.
+
+    Args:
+        motion: the motion.
+        gait: its gait.
+        angle: a name of `clinical_angles` without the side.
+
+    Returns:
+        Degrees (strides, 101) by side.
+    """
     angles = clinical_angles(motion.skeleton, motion.poses)
     curves = {}
     for side in SIDES:
-        strides = [
-            at_frames(
-                angles[f"{side}_{angle}"],
-                start + np.linspace(0.0, step.stride_seconds, CYCLE) * motion.fps,
-            )
-            for step in gait.steps
-            if step.foot == side and step.stride_seconds is not None
-            for start in [step.strike_seconds * motion.fps - motion.first]
-        ]
+        series = angles[f"{side}_{angle}"]
+        strides = []
+        for step in gait.steps:
+            if step.foot == side and step.stride_seconds is not None:
+                start = step.strike_seconds * motion.fps - motion.first
+                seconds = np.linspace(0.0, step.stride_seconds, CYCLE)
+                strides.append(at_frames(series, start + seconds * motion.fps))
         curves[side] = np.array(strides).reshape(-1, CYCLE)
     return curves
 
 
 def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
-    """Return in which frames (T,) the root faces away from its way; `unknown` frames, by number, count for nothing.
+    """Return the frames (T,) in which the root faces away from the direction of travel.
 
-    The way of a frame is that of the half second about it, over the ground, as far as all of it is known. A person who
-    moves slower than 0.3 m/s has none. A heading is away from the way where it lies more than 90 degrees from it.
+    That direction is measured over the half second around a frame, on the ground, if
+    all of it is known. A person slower than 0.3 m/s has none. A heading more than 90
+    degrees from it faces away.
+
+    Args:
+        motion: the motion.
+        unknown: numbers of frames that count for nothing.
     """
     count = len(motion)
     half = max(round(0.5 * TRAVEL_SECONDS * motion.fps), 1)
@@ -346,9 +401,8 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
     yaws = motion.poses[half : count - half, 0]
     ground = motion.translations[:, [0, 2]]
     way = ground[2 * half :] - ground[: -2 * half]
-    away = np.asarray(
-        (way * np.column_stack([np.sin(yaws), np.cos(yaws)])).sum(axis=1) < 0.0
-    )
+    headings = np.column_stack([np.sin(yaws), np.cos(yaws)])  # (T - 2 half, 2)
+    away = np.asarray((way * headings).sum(axis=1) < 0.0)
     frame_known = np.isin(motion.first + np.arange(count), [*unknown], invert=True)
     known = np.asarray(sliding_window_view(frame_known, 2 * half + 1).all(axis=1))
     fast = np.linalg.norm(way, axis=1) > MIN_TRAVEL_SPEED * 2 * half / motion.fps
@@ -357,10 +411,14 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
 
 
 def backwards_warning(back: NDArray[np.bool_]) -> str:
-    """Return a warning about frames in which the person walks backwards; empty where they are few."""
+    """Return a warning about frames in which the person walks backwards.
+
+    It is empty if they are few.
+    """
     if back.mean() < WARNING_SHARE:
         return ""
     return (
-        f"the person seems to walk backwards in {back.sum()} of {len(back)} frames: expected to face the direction "
-        "of travel; if they do, the track faces the wrong way there"
+        f"the person seems to walk backwards in {back.sum()} of {len(back)} frames: "
+        "expected to face the direction of travel; "
+        "if they do, the track faces the wrong way there"
     )

@@ -1,4 +1,4 @@
-"""A measured motion as tables: clinical angles, the steps of a walk, and joints as a .trc file."""
+"""Writes a measured motion: clinical angles, the steps of a walk, joints as .trc."""
 
 import csv
 import importlib
@@ -19,7 +19,11 @@ STEP_COLUMNS = tuple(field.name for field in fields(Step))
 
 
 def import_pandas() -> Any:
-    """Return the module pandas. Raises ImportError that says how to install it."""
+    """Return the module pandas.
+
+    Raises:
+        ImportError: it is not installed; the message says how to install it.
+    """
     try:
         return importlib.import_module("pandas")
     except ImportError as error:
@@ -29,14 +33,20 @@ def import_pandas() -> Any:
 
 
 def angle_columns(motion: Motion, blank: Collection[int] = ()) -> dict[str, Array]:
-    """Return the clinical angles (T,) in degrees by name; NaN in the frames numbered in `blank`."""
+    """Return the clinical angles (T,) in degrees, by name.
+
+    They are NaN in the frames with the numbers in `blank`.
+    """
     unknown = np.isin(motion.first + np.arange(len(motion)), list(blank))
     angles = clinical_angles(motion.skeleton, motion.poses)
     return {name: np.where(unknown, np.nan, values) for name, values in angles.items()}
 
 
 def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
-    """Write one row a frame of the clinical angles in degrees; of those numbered in `blank` only the time."""
+    """Write the clinical angles in degrees as a .csv file, one row per frame.
+
+    Frames with the numbers in `blank` have only the time.
+    """
     angles = angle_columns(motion, blank)
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -48,24 +58,32 @@ def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) 
 
 
 def write_gait(path: str | Path, gait: Gait) -> None:
-    """Write one row for each strike of a foot, in the order of time; none where the motion is no walk."""
+    """Write a .csv file with one row for each strike of a foot, in order of time.
+
+    There are no rows if the motion is not a walk.
+    """
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(STEP_COLUMNS)
         for step in [] if gait.why else gait.steps:
-            writer.writerow(
-                [
-                    "" if v is None else v if isinstance(v, str) else f"{v:.6f}"
-                    for v in astuple(step)
-                ]
-            )
+            cells = []
+            for value in astuple(step):
+                if value is None:
+                    cells.append("")
+                elif isinstance(value, str):
+                    cells.append(value)
+                else:
+                    cells.append(f"{value:.6f}")
+            writer.writerow(cells)
 
 
 def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
-    """Write the 27 joints of every frame as markers, in metres and y up; frames numbered in `blank` have no row.
+    """Write the 27 joints of every frame as markers in a .trc file, in metres, y up.
 
-    Markers are named by `PLACES`. OpenSim's inverse kinematics stops at a row without markers, and takes the others by
-    their times. It needs at least one row: where every frame is blank, each has a row of empty cells.
+    Markers have the names of `PLACES`. Frames with the numbers in `blank` have no row,
+    because OpenSim's inverse kinematics stops at a row without markers; it takes the
+    others by their times. It needs at least one row: if every frame is blank, each has
+    a row of empty cells.
     """
     path = Path(path)
     count = len(motion)
@@ -96,7 +114,7 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
     for k in rows:
         cells = [f"{value:.6f}" for value in points[k]]
         if unknown[k]:
-            # one cell more, as OpenSim does not count a last one that is empty
+            # one cell more, because OpenSim does not count an empty last cell
             cells = [""] * (len(cells) + 1)
         time = f"{numbers[k] / motion.fps:.6f}"
         lines.append("\t".join([str(numbers[k] + 1), time, *cells]))

@@ -31,10 +31,10 @@ from posefit.reading import check_size, quoted
 FPS = 120.0  # CMU's rate; its files do not state it
 RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # in posefit's own files
 SIZE_LIMIT = 500_000_000  # bytes
-LONGEST_LINE = 10_000  # bytes; a root line has about 60
-VALUES = 20_000_000  # numbers of a file: 200,000 frames of 100 channels
+LONGEST_LINE = 10_000  # bytes; the root's line has about 60
+VALUES = 20_000_000  # numbers in a file: 200,000 frames of 100 channels
 
-Spans = dict[str, tuple[int, int]]  # bone: where its values start and stop in a frame
+Spans = dict[str, tuple[int, int]]  # bone: start and stop of its values in a frame
 
 
 def read_clip(
@@ -45,17 +45,23 @@ def read_clip(
     unit: Unit | None = None,
     up: Up | None = None,
 ) -> Motion:
-    """Return the motion of an .amc file over the skeleton of its .asf file, in that file's length unit or in `unit`.
+    """Return the motion of an .amc file on the skeleton of its .asf file.
 
-    `up` is the axis of the world that points up, by default y. Raises InputError with file and line where one of them
-    is not what it should be.
+    Args:
+        asf: path of the skeleton.
+        amc: path of the motion.
+        fps: frames per second, by default the file's own rate, or else CMU's.
+        unit: length unit of both files, by default the one that the .asf states.
+        up: axis of the world that points up, y by default.
+
+    Raises:
+        InputError: a file is invalid; the message has its name and the line.
     """
     acclaim = parse_asf(asf, unit)
     motion = read_amc(amc, acclaim.skeleton, fps=fps, metres_per_unit=acclaim.metres)
-    return replace(
-        motion if up is None else motion.turned(np.array(TURNS[up])),
-        notes=(*acclaim.notes, *motion.notes),
-    )
+    if up is not None:
+        motion = motion.turned(np.array(TURNS[up]))
+    return replace(motion, notes=(*acclaim.notes, *motion.notes))
 
 
 def read_amc(
@@ -65,12 +71,22 @@ def read_amc(
     fps: float | None = None,
     metres_per_unit: float = CMU_UNIT,
 ) -> Motion:
-    """Return the motion of an .amc file, named after it: every frame, in radians and metres.
+    """Return the motion of an .amc file, named after it: every frame.
 
-    The rate is `fps`, or else the one that posefit's own files state, or else CMU's, which is noted.
-    `metres_per_unit` scales the root's translation; `read_clip` takes it from the .asf file. Angles of end bones and
-    of bones outside the 27 joints are read and left out. All angles are unwrapped along time. Every frame must give
-    all channels of `skeleton`, in any order. Raises InputError with file and line.
+    Every frame must give all channels of `skeleton`, in any order. Angles of end bones
+    and of bones outside the 27 joints are read and left out. All angles are unwrapped
+    along time.
+
+    Args:
+        path: the file.
+        skeleton: the skeleton that the file's channels belong to.
+        fps: frames per second. By default the rate that posefit states in its own
+            files, or else CMU's, which is noted.
+        metres_per_unit: scale of the root's translation; `read_clip` takes it from the
+            .asf file.
+
+    Raises:
+        InputError: the file is invalid; the message has its name and the line.
     """
     path = Path(path)
     check_size(path, SIZE_LIMIT)
@@ -79,8 +95,10 @@ def read_amc(
     radians, stated, first = _head(lines)
     values = _frames(lines, spans, first, skeleton.name)
     rate = fps or stated or FPS
-    assumed = f"{path}: the file does not state its rate: {FPS:g} frames a second are assumed; --rate sets it"
-    notes = () if fps or stated else (assumed,)
+    notes: tuple[str, ...] = ()
+    if not (fps or stated):
+        assumed = f"{FPS:g} frames a second are assumed; --rate sets it"
+        notes = (f"{path}: the file does not state its rate: {assumed}",)
     angles = values if radians else np.deg2rad(values)
     poses = np.zeros((len(values), ANGLES))
     poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
@@ -96,7 +114,7 @@ def read_amc(
 
 
 def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.int64]]:
-    """Return the spans of a frame's values, and which of its columns go to which of the 66 angles."""
+    """Return the spans of a frame's values, and which columns are which angles."""
     spans: Spans = {"root": (0, 6)}
     columns: list[int] = []
     targets: list[int] = []
@@ -111,7 +129,7 @@ def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.in
 
 
 def _head(lines: Iterator[Line]) -> tuple[bool, float | None, int]:
-    """Return whether angles are radians, the rate if it is stated, and the number of the first frame."""
+    """Return whether angles are radians, the stated rate, and the first frame."""
     radians = rate = None
     while True:
         line = next(lines)
@@ -134,7 +152,7 @@ def _head(lines: Iterator[Line]) -> tuple[bool, float | None, int]:
 
 
 def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array:
-    """Return all frames (T, values of a frame) in file units, from that of a number on."""
+    """Return all frames (T, values of a frame) in file units, numbered from `frame`."""
     width = max(stop for _, stop in spans.values())
     data = array("d")
     row = [0.0] * width
@@ -160,10 +178,10 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
             data.extend(row)
             if number is not None and number != frame + 1:
                 raise line.mistake(f"frame {frame + 1}", f"frame {number}")
-            if number is not None and len(data) >= min(LONGEST * width, VALUES):
+            most = min(LONGEST * width, VALUES)
+            if number is not None and len(data) >= most:
                 raise line.mistake(
-                    f"at most {min(LONGEST, VALUES // width)} frames of {width} numbers",
-                    "more",
+                    f"at most {most // width} frames of {width} numbers", "more"
                 )
             frame += 1
             bones_read.clear()
@@ -173,18 +191,16 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
 
 
 def _frame_number(line: Line) -> int | None:
-    """Return the number of a line that is one alone."""
-    alone = (
-        len(line.words) == 1
-        and line.key.isascii()
-        and line.key.isdigit()
-        and len(line.key) < 10
-    )
-    return int(line.key) if alone else None
+    """Return the number on a line that holds nothing else, or None."""
+    word = line.key
+    if len(line.words) != 1 or len(word) >= 10:
+        return None
+    # isdigit alone also accepts digits that int() does not
+    return int(word) if word.isascii() and word.isdigit() else None
 
 
 def _rate(line: Line, word: str) -> float:
-    """Return the rate that a comment states."""
+    """Return the rate in a comment."""
     (rate,) = line._replace(words=["rate", word]).numbers(1)
     if not RATES[0] <= rate <= RATES[1]:
         raise line.mistake(
@@ -194,15 +210,20 @@ def _rate(line: Line, word: str) -> float:
 
 
 def write_amc(path: str | Path, motion: Motion) -> None:
-    """Write an .amc file in the CMU database's unit that reads back as the same motion, up to whole turns.
+    """Write a motion as an .amc file in the CMU database's unit.
 
-    A comment states its rate. Channels that a pose does not hold, such as fingers, are written as 0. Raises InputError
-    where the motion turns a joint about an axis that its skeleton has no channel for, as the file could not hold that.
+    The file reads back as the same motion, up to whole turns. A comment states its
+    rate. Channels that a pose does not hold, such as fingers, are written as 0.
+
+    Raises:
+        InputError: the motion turns a joint about an axis for which the skeleton has no
+            channel.
     """
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)
     if lost > 1e-9:
         raise InputError(
-            f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one"
+            "motion must turn joints about their free axes only, "
+            f"got {lost:.3g} rad about another one"
         )
     spans, columns, targets = _layout(motion.skeleton)
     values = np.zeros((len(motion), max(stop for _, stop in spans.values())))

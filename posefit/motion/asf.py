@@ -37,7 +37,7 @@ from posefit.reading import check_size, quoted
 
 SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
-# Where to hang the bones that a Skeleton knows by their channels alone.
+# parents of bones of which a Skeleton knows only the channels
 _FINGERS = {
     "lfingers": "lhand",
     "lthumb": "lwrist",
@@ -54,7 +54,7 @@ class _Bone(NamedTuple):
 
 
 class Acclaim(NamedTuple):
-    """What an .asf file holds: a skeleton in metres, its unit in metres, and what was guessed."""
+    """Content of an .asf file: skeleton, metres per unit, and what was guessed."""
 
     skeleton: Skeleton
     metres: float
@@ -62,11 +62,19 @@ class Acclaim(NamedTuple):
 
 
 def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
-    """Return what an .asf file holds. Its unit is `unit`, or else the one that it states.
+    """Return the content of an .asf file.
 
-    Where no person has the stature that it states, and a known unit gives a person's, the unit is that one, and noted.
-    Bones beside the 26 of `posefit.geometry.skeleton.BONES` keep their place in `channels` alone. Raises InputError
-    with file and line where the file is not an Acclaim skeleton of this tree.
+    If the stated unit gives a person of an impossible stature, and a known unit gives a
+    plausible one, the latter is taken, and a note says so. Bones other than the 26 of
+    `posefit.geometry.skeleton.BONES` are kept in `channels` only.
+
+    Args:
+        path: the file.
+        unit: length unit of the file, by default the one that it states.
+
+    Raises:
+        InputError: the file is not an Acclaim skeleton with the 26 bones; the message
+            has its name and the line.
     """
     path = Path(path)
     check_size(path, SIZE_LIMIT)
@@ -91,17 +99,20 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
         came = f"{path}: the length that it states makes a person of {stature:.2f} m"
         if guess is not None:
             wanted = metres_of(guess)
-            came += f"; lengths are taken for {UNIT_NAMES[guess]}: {stature / metres * wanted:.2f} m; --unit sets it"
+            came += (
+                f"; lengths are taken for {UNIT_NAMES[guess]}: "
+                f"{stature / metres * wanted:.2f} m; --unit sets it"
+            )
         notes.append(came)
     ratio = wanted / metres
-    skeleton = (
-        stated if ratio == 1.0 else replace(stated, offsets=stated.offsets * ratio)
-    )
+    skeleton = stated
+    if ratio != 1.0:
+        skeleton = replace(stated, offsets=stated.offsets * ratio)
     return Acclaim(skeleton, wanted, tuple(notes))
 
 
 def _limits(bones: dict[str, _Bone]) -> Array | None:
-    """Return the limits (63, 2) of the joint angles; None where a free angle has none."""
+    """Return the limits (63, 2) of the joint angles, or None if some are unknown."""
     limits = np.zeros((ANGLES, 2))
     for name in (JOINTS[joint] for joint in INNER if bones[JOINTS[joint]].free):
         if bones[name].limits is None:
@@ -111,7 +122,7 @@ def _limits(bones: dict[str, _Bone]) -> Array | None:
 
 
 def _sections(path: Path) -> dict[str, list[Line]]:
-    """Return the lines of each section, the first of them its name."""
+    """Return the lines of each section. The first line holds the section's name."""
     sections: dict[str, list[Line]] = {}
     current: list[Line] | None = None
     for line in lines_of(path, SIZE_LIMIT):
@@ -130,7 +141,10 @@ def _sections(path: Path) -> dict[str, list[Line]]:
 
 
 def _units(lines: list[Line]) -> tuple[float, bool]:
-    """Return metres per file unit and whether angles are degrees; Acclaim's own defaults are inches and degrees."""
+    """Return metres per file unit, and whether angles are degrees.
+
+    Acclaim's defaults are inches and degrees.
+    """
     metres = INCH
     degrees = True
     for line in lines[1:]:
@@ -188,10 +202,8 @@ def _bones(lines: list[Line], radians: float) -> dict[str, _Bone]:
 
 
 def _bone(block: dict[str, Line], radians: float) -> _Bone:
-    direction, (length,) = (
-        np.array(block["direction"].numbers(3)),
-        block["length"].numbers(1),
-    )
+    direction = np.array(block["direction"].numbers(3))
+    (length,) = block["length"].numbers(1)
     norm = float(np.linalg.norm(direction))
     if length < 0.0:
         raise block["length"].mistake("a length of 0 or more")
@@ -201,24 +213,18 @@ def _bone(block: dict[str, Line], radians: float) -> _Bone:
     if len(axis.words) != 5 or axis.words[4].upper() != "XYZ":
         raise axis.mistake("axis order XYZ")
     angles = np.array(axis._replace(words=axis.words[:4]).numbers(3))
-    free = (
-        tuple(word.lower() for word in block["dof"].words[1:]) if "dof" in block else ()
-    )
+    free: tuple[str, ...] = ()
+    if "dof" in block:
+        free = tuple(word.lower() for word in block["dof"].words[1:])
     if not set(free) <= {"rx", "ry", "rz"} or sorted(set(free)) != list(free):
         raise block["dof"].mistake("dof out of rx ry rz, in this order")
     limits = None
-    # (lowest highest) for each free angle, such as `(-160.0 20.0)`, on one line or
-    # several
+    # (lowest highest) for each free angle, such as `(-160.0 20.0)`, on one line or more
     if "limits" in block:
-        words = (
-            " ".join(block["limits"].words).replace("(", " ").replace(")", " ").split()
-        )
-        limits = (
-            np.array(
-                block["limits"]._replace(words=words).numbers(2 * len(free))
-            ).reshape(-1, 2)
-            * radians
-        )
+        text = " ".join(block["limits"].words)
+        words = text.replace("(", " ").replace(")", " ").split()
+        numbers = block["limits"]._replace(words=words).numbers(2 * len(free))
+        limits = np.array(numbers).reshape(-1, 2) * radians  # (free angles, 2)
         if (limits[:, 0] > limits[:, 1]).any():
             raise block["limits"].mistake("limits (lowest highest) in order")
     return _Bone(
@@ -234,7 +240,8 @@ def _check_tree(path: Path, lines: list[Line], bones: Iterable[str]) -> None:
     for name in BONES:
         if name not in known:
             raise InputError(
-                f"{path}: the skeleton needs bone {name!r}, which this file does not define"
+                f"{path}: the skeleton needs bone {name!r}, "
+                "which this file does not define"
             )
     parents: dict[str, tuple[str, Line]] = {}
     for line in lines[1:]:
@@ -246,7 +253,7 @@ def _check_tree(path: Path, lines: list[Line], bones: Iterable[str]) -> None:
         for name in line.words[1:]:
             if name in parents or name == "root":
                 raise line.mistake(
-                    "one parent a bone", f"another one for {quoted(name)}"
+                    "one parent for each bone", f"a second one for {quoted(name)}"
                 )
             parents[name] = line.words[0], line
     for name, above in zip(BONES, PARENTS[1:], strict=True):
@@ -260,14 +267,17 @@ def _check_tree(path: Path, lines: list[Line], bones: Iterable[str]) -> None:
 
 
 def write_asf(path: str | Path, skeleton: Skeleton) -> None:
-    """Write an .asf file in the CMU database's unit that reads back as the same skeleton.
+    """Write a skeleton as an .asf file in the CMU database's unit.
 
-    Bones of which only the channels are known, such as fingers, get the length 0.
+    The file reads back as the same skeleton. Bones of which only the channels are
+    known, such as fingers, get the length 0.
     """
     axes = np.rad2deg(joint_angles_from_rotation(skeleton.axes))
+    name = "_".join(skeleton.name.split()) or "skeleton"
     header = (
-        f":version 1.10\n:name {'_'.join(skeleton.name.split()) or 'skeleton'}\n:units\n  mass 1.0\n"
-        f"  length {INCH / CMU_UNIT!r}\n  angle deg\n:root\n  order {' '.join(ROOT_CHANNELS)}\n  axis XYZ\n"
+        f":version 1.10\n:name {name}\n:units\n  mass 1.0\n"
+        f"  length {INCH / CMU_UNIT!r}\n  angle deg\n"
+        f":root\n  order {' '.join(ROOT_CHANNELS)}\n  axis XYZ\n"
         "  position 0 0 0\n  orientation 0 0 0\n:bonedata\n"
     )
     text = [header]
@@ -289,14 +299,12 @@ def write_asf(path: str | Path, skeleton: Skeleton) -> None:
         dof = f"    dof {' '.join(free)}\n" if free else ""
         if skeleton.limits is not None and (angles := channel_angles(name, free)):
             rows = np.degrees(skeleton.limits[[angle - 3 for angle in angles]]).tolist()
-            dof += (
-                "    limits "
-                + "\n           ".join(f"({low!r} {high!r})" for low, high in rows)
-                + "\n"
-            )
+            pairs = [f"({low!r} {high!r})" for low, high in rows]
+            dof += "    limits " + "\n           ".join(pairs) + "\n"
         text.append(
-            f"  begin\n    id {number}\n    name {name}\n    direction {_spaced(direction)}\n"
-            f"    length {length / CMU_UNIT!r}\n    axis {_spaced(axis)} XYZ\n{dof}  end\n"
+            f"  begin\n    id {number}\n    name {name}\n"
+            f"    direction {_spaced(direction)}\n    length {length / CMU_UNIT!r}\n"
+            f"    axis {_spaced(axis)} XYZ\n{dof}  end\n"
         )
     text.append(":hierarchy\n  begin\n")
     parents = {

@@ -1,12 +1,17 @@
-"""The built-in motions: small periodic models, so that everything runs without any data.
+"""The built-in motions: small periodic models, so that everything runs without data.
 
-Every kind has styles, each from another person: `walk-a`, `walk-b`, ... Kinds are `walk`, `run`, `march` (raising the
-knees on the spot), `jacks` (jumping jacks), `squat`, `jump`, `step` (walking on the spot), and `arms-out` and `wave`
-(walking with both arms held out, or with one waving). Without a letter it is the mean of the styles, in step. So `walk`
-is none of the motions that its prior is trained on, but within their reach; a prior trained on other people only, as
-for `walk-a`, is the harder case. They were fitted to CMU clips by `docs/studies/make_motions.py`; arms held out or
-waving are drawn by hand. The data used in this project was obtained from mocap.cs.cmu.edu. The database was created
-with funding from NSF EIA-0196217.
+Every kind has styles, each from another person: `walk-a`, `walk-b`, ... The kinds are
+`walk`, `run`, `march` (raising the knees on the spot), `jacks` (jumping jacks),
+`squat`, `jump`, `step` (walking on the spot), and `arms-out` and `wave` (walking with
+both arms held out, or with one waving).
+
+A name without a letter is the mean of the kind's styles, aligned in phase. The prior of
+`walk` has seen all the styles that `walk` is the mean of. A style such as `walk-a` is
+harder: its prior is trained on other people only.
+
+The motions were fitted to CMU clips by `docs/studies/make_motions.py`; arms held out or
+waving were added by hand. The data used in this project was obtained from
+mocap.cs.cmu.edu. The database was created with funding from NSF EIA-0196217.
 """
 
 import json
@@ -28,7 +33,7 @@ from posefit.reading import quoted, suggestion
 
 @lru_cache(maxsize=1)
 def _stored() -> dict[str, Any]:
-    """Return what built_in.json holds: the average skeleton, and the models by style."""
+    """Return the content of built_in.json: the average skeleton and the styles."""
     stored: dict[str, Any] = json.loads(
         (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
     )
@@ -37,18 +42,19 @@ def _stored() -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def names() -> tuple[str, ...]:
-    """Return the names that `motion` takes."""
+    """Return the names that `motion` accepts."""
     styles = tuple(_stored()["motions"])
     return tuple(dict.fromkeys(activity_of(name) for name in styles)) + styles
 
 
 def activity_of(name: str) -> str:
-    """Return the kind of motion that a name is of: `walk` of `walk-a`, `arms-out` of `arms-out`."""
+    """Return the kind of motion of a name: `walk` for `walk-a` and for `walk`."""
     return re.sub(r"-[a-z]$", "", name)
 
 
+@lru_cache
 def other_styles(name: str) -> tuple[str, ...]:
-    """Return the other styles of a motion's kind, what its prior is trained on by default."""
+    """Return the other styles of a motion's kind: the default training motions."""
     _check(name)
     return tuple(
         style
@@ -59,20 +65,21 @@ def other_styles(name: str) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def average_skeleton() -> Skeleton:
-    """Return the skeleton of the built-in motions: the mean of nine people, symmetric."""
+    """Return the skeleton of the built-in motions: a symmetric mean of nine people."""
     return stored_skeleton("average", _stored()["skeleton"])
 
 
 def stored_skeleton(name: str, stored: Mapping[str, Any]) -> Skeleton:
-    """Return a skeleton that the package holds as JSON, with its angles in degrees."""
+    """Return a skeleton that the package stores as JSON, with angles in degrees."""
+    limits = None
+    if stored["limits_degrees"] is not None:
+        limits = np.radians(stored["limits_degrees"])
     return Skeleton(
         name,
         np.array(stored["offsets"]),
         rotation_from_joint_angles(np.radians(stored["axes_degrees"])),
         tuple((bone, tuple(free)) for bone, free in stored["channels"]),
-        None
-        if stored["limits_degrees"] is None
-        else np.radians(stored["limits_degrees"]),
+        limits,
     )
 
 
@@ -84,11 +91,20 @@ def motion(
     speed: float = 1.0,
     phase: float = 0.0,
 ) -> Motion:
-    """Return a built-in motion of so many frames. It goes along +z, and half its way is behind the origin.
+    """Return a built-in motion. It goes along +z, and passes the origin halfway.
 
-    `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
-    lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe; a mean of styles may be 2 cm
-    off. Raises InputError for an unknown name, and where a number is not what it should be.
+    The lowest joint of the cycle is about 3 cm above the ground y = 0, as much as a toe
+    is thick; a mean of styles may be 2 cm off.
+
+    Args:
+        name: one of `names()`.
+        frames: number of frames.
+        fps: frames per second.
+        speed: factor of the cadence, and of the pace with it.
+        phase: where in its cycle the motion starts, in cycles.
+
+    Raises:
+        InputError: the name is unknown, or a number is invalid.
     """
     angles, series, period, pace = _model(name)
     if (
@@ -106,11 +122,8 @@ def motion(
     if not np.isfinite(phase):
         raise InputError(f"phase must be finite, got {phase}")
     times = np.arange(frames) * speed / fps
-    turns = (
-        2.0
-        * np.pi
-        * np.outer(times / period + phase, np.arange(1, series.shape[1] // 2 + 1))
-    )
+    harmonics = np.arange(1, series.shape[1] // 2 + 1)
+    turns = 2.0 * np.pi * np.outer(times / period + phase, harmonics)  # (T, harmonics)
     values = np.column_stack([np.ones(frames), np.cos(turns), np.sin(turns)]) @ series.T
     poses = np.zeros((frames, ANGLES))
     poses[:, angles] = values[:, 3:]
@@ -121,7 +134,7 @@ def motion(
 
 @lru_cache(maxsize=64)
 def _model(name: str) -> tuple[list[int], Array, float, float]:
-    """Return the free angles, the series of path and angles, the period in seconds and the pace in m/s."""
+    """Return free angles, Fourier series, period in seconds and pace in m/s."""
     _check(name)
     styles = [name] if name in _stored()["motions"] else other_styles(name)
     models = [_stored()["motions"][style] for style in styles]
@@ -135,6 +148,7 @@ def _model(name: str) -> tuple[list[int], Array, float, float]:
 def _check(name: str) -> None:
     if name not in names():
         raise InputError(
-            "motion must be a file, a folder, a recorded one that posefit motions lists, or one of "
-            f"{', '.join(names())}, got {quoted(name)}{suggestion(name, names())}"
+            "motion must be a file, a folder, a recorded one that posefit motions "
+            f"lists, or one of {', '.join(names())}, "
+            f"got {quoted(name)}{suggestion(name, names())}"
         )

@@ -1,9 +1,11 @@
-"""BVH motions: read from whatever program wrote them, and written.
+"""BVH motions: read from the files of many programs, and written.
 
-In a BVH file a joint's rotation turns everything that starts at it. In a `Skeleton` the angles named after a bone
-turn that bone about the joint it starts from. So the BVH joint that stands for a bone is the one at the bone's start:
-`LeftUpLeg` (the hip) holds the angles of `lfemur`, and the offset of its child `LeftLeg` (the knee) is that bone's
-vector. What the joints are is read off their names, see joint_names.py; how they go with posefit's, see rig.py.
+In a BVH file a joint's rotation turns everything that starts at the joint. In a
+`Skeleton` the angles named after a bone turn that bone about the joint it starts from.
+So a bone corresponds to the BVH joint at the bone's start: `LeftUpLeg` (the hip) holds
+the angles of `lfemur`, and the offset of its child `LeftLeg` (the knee) is that bone's
+vector. joint_names.py recognises joints by name; rig.py converts the motion to
+posefit's skeleton.
 """
 
 from array import array
@@ -27,7 +29,8 @@ from posefit.motion.motion import LONGEST, Motion
 from posefit.motion.rig import STANDING, Rig, retargeted, upward
 from posefit.reading import check_size, cut, quoted
 
-_LIMBS = {  # names in the CMU conversions by cgspeed, without their side
+# names in the CMU conversions by cgspeed, without their side
+_LIMBS = {
     "hipjoint": "HipJoint",
     "femur": "UpLeg",
     "tibia": "Leg",
@@ -59,24 +62,33 @@ ROTATIONS = "Zrotation Xrotation Yrotation"
 LONGEST_LINE = 100_000  # bytes; a frame of CMU's files has about 1,000
 NODES = 1_000  # joints and ends of a file
 FRAME_TIMES = (1e-4, 10.0)  # seconds
-# how far a rate may be from a whole number, as a share: files state 0.0083333 for 1 /
-# 120
+# relative difference between a rate and the nearest whole number within which the whole
+# number is taken: files state 0.0083333 for 1 / 120
 WHOLE_RATE = 1e-4
-MISSED = 1e-3  # metres that a joint may be off its place in the file without a word
+MISSED = 1e-3  # metres that a joint may be off its place in the file without a note
 
 
 def read_bvh(
     path: str | Path, *, unit: Unit | None = None, up: Up | None = None
 ) -> Motion:
-    """Return the motion of a .bvh file, with a skeleton of its own, in radians and metres, y up.
+    """Return the motion of a .bvh file with its own skeleton, y up, radians and metres.
 
-    Joints may have the names of many programs. Those that are missing, of toes, hands, neck or spine, are at rest, with
-    the lengths of an average person; further joints are left out, and so are the rotations of toes, hands and of a head
-    above a neck of two joints. The file does not state its unit or which axis is up: without `unit` it is the one in
-    which the person has a person's stature, and without `up` the axis along which they stand. Joint angles are counted
-    from the pose of rest and about the axes of the CMU database, as those of its .amc files. The root is where its
-    position channels say; its OFFSET is not added. What was guessed is in the motion's `notes`. Raises InputError where
-    the file is not one of a person.
+    Joints may have the names of many programs. Missing joints of toes, hands, neck or
+    spine are at rest, with the lengths of an average person. Further joints are left
+    out, and so are the rotations of toes and hands, and of a head above a neck of two
+    joints. Joint angles are counted from the rest pose and about the axes of the CMU
+    database, as in its .amc files. The root is where its position channels say; its
+    OFFSET is not added. The motion's `notes` say what was guessed.
+
+    Args:
+        path: the file.
+        unit: its length unit, by default the one in which the person has a plausible
+            stature.
+        up: the world's axis that points up, by default the one that the person stands
+            along.
+
+    Raises:
+        InputError: the file is not a motion of a person; the message has its name.
     """
     path = Path(path)
     known = None if unit is None else metres_of(unit)
@@ -92,8 +104,10 @@ def read_bvh(
     stature = Body.of(result.skeleton).stature
     chosen = unit or unit_of(stature)
     if chosen is None:
-        expected = f"a person of a stature in a unit that is known, or --unit {'|'.join(UNITS)}"
-        raise InputError(f"{path}: expected {expected}, got one of {stature:g} units")
+        raise InputError(
+            f"{path}: expected a person of a stature in a unit that is known, "
+            f"or --unit {'|'.join(UNITS)}, got one of {stature:g} units"
+        )
     metres = METRES[chosen] if known is None else known
     skeleton = replace(
         result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres
@@ -101,25 +115,27 @@ def read_bvh(
     notes = []
     if others:
         followed = quoted(rig.names[rig.joints.hips])
-        notes.append(
-            f"{path}: the person of {followed} is read; {', '.join(map(quoted, others))} left out"
-        )
+        left_out = ", ".join(map(quoted, others))
+        notes.append(f"{path}: the person of {followed} is read; {left_out} left out")
     if unit is None and chosen != "m":
-        stands = f"as the person stands {stature:.4g} of them"
         notes.append(
-            f"{path}: lengths are taken for {UNIT_NAMES[chosen]}, {stands}; --unit sets it"
+            f"{path}: lengths are taken for {UNIT_NAMES[chosen]}, "
+            f"as the person stands {stature:.4g} of them; --unit sets it"
         )
     elif unit is not None and unit_of(stature * metres) is None:
         notes.append(
-            f"{path}: the person stands {stature * metres:.2f} m with lengths in {UNIT_NAMES[unit]}"
+            f"{path}: the person stands {stature * metres:.2f} m "
+            f"with lengths in {UNIT_NAMES[unit]}"
         )
     if up is None and axis != "y":
         notes.append(
-            f"{path}: {axis} is taken to be up, as the person stands along it; --up sets it"
+            f"{path}: {axis} is taken to be up, as the person stands along it; "
+            "--up sets it"
         )
     if result.filled:
         notes.append(
-            f"{path}: without {', '.join(result.filled)}, which are an average person's at rest"
+            f"{path}: without {', '.join(result.filled)}, "
+            "which are an average person's at rest"
         )
     if result.off * metres > MISSED:
         off = f"{1e3 * result.off * metres:.1f} mm off"
@@ -137,7 +153,7 @@ def read_bvh(
 
 
 def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
-    """Return the axis that is up, such as -z, and the turn (3, 3) of the world that brings it to y."""
+    """Return the axis that is up, such as -z, and the turn (3, 3) from it to y."""
     if up is not None:
         if up not in TURNS:
             raise InputError(f"an axis up of x, y or z, got {quoted(up)}")
@@ -147,25 +163,28 @@ def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
     if abs(cosine) < STANDING:
         return "y", np.eye(3)
     turn = np.array(TURNS[name], dtype=np.float64)
-    return (
-        (name, turn)
-        if cosine > 0.0
-        else (f"-{name}", np.diag([1.0, -1.0, -1.0]) @ turn)
-    )
+    if cosine > 0.0:
+        return name, turn
+    # the person stands along the negative axis
+    return f"-{name}", np.diag([1.0, -1.0, -1.0]) @ turn
 
 
 @dataclass
 class _Node:
-    name: str  # "" of an End Site
+    name: str  # "" for an End Site
     parent: int
     offset: Array | None = None
-    # whether it turns, and its axis
+    # for each channel: whether it is a rotation, and its axis
     channels: list[tuple[bool, int]] = field(default_factory=list)
-    column: int = 0  # of its first channel
+    column: int = 0  # column of the first channel
 
 
 def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
-    """Return a file's nodes, values (T, channels) and rate. Raises InputError with the line where it is no BVH file."""
+    """Return a file's nodes, values (T, channels) and rate.
+
+    Raises:
+        InputError: the file is not a BVH file; the message has the line.
+    """
     lines = lines_of(path, LONGEST_LINE)
     nodes, width = _hierarchy(lines)
     count, frame_time = _head(lines)
@@ -188,21 +207,20 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
     values = np.array(data).reshape(rows, width)
     if not (np.abs(values) < LARGEST).all():
         raise InputError(
-            f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}"
+            f"{path}: expected finite numbers below {LARGEST:g}, "
+            f"got {np.abs(values).max()}"
         )
     rate = 1.0 / frame_time
-    return (
-        nodes,
-        values,
-        float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate,
-    )
+    if abs(rate - round(rate)) < WHOLE_RATE * rate:
+        rate = float(round(rate))
+    return nodes, values, rate
 
 
 def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
-    """Return the joints and ends, and how many channels they have, of the lines up to MOTION."""
+    """Return the joints and ends before MOTION, and the total number of channels."""
     nodes: list[_Node] = []
     opened: list[int] = []  # numbers of the nodes whose braces are open
-    waiting = False  # for the brace of the last node
+    waiting = False  # for the opening brace of the last node
     width = 0
     while True:
         line = next(lines)
@@ -249,7 +267,7 @@ def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
 
 
 def _head(lines: Iterator[Line]) -> tuple[int, float]:
-    """Return how many frames there are to be, and the seconds of one."""
+    """Return the stated number of frames, and the seconds of a frame."""
     count = -1
     while True:
         line = next(lines)
@@ -260,10 +278,10 @@ def _head(lines: Iterator[Line]) -> tuple[int, float]:
             and len(line.words[1]) < 10
         ):
             count = int(line.words[1])
-        elif [word.lower() for word in line.words[:2]] == [
+        elif count >= 0 and [word.lower() for word in line.words[:2]] == [
             "frame",
             "time:",
-        ] and count >= 0:
+        ]:
             (frame_time,) = line._replace(words=line.words[1:]).numbers(1)
             if not FRAME_TIMES[0] <= frame_time <= FRAME_TIMES[1]:
                 low, high = FRAME_TIMES
@@ -276,7 +294,7 @@ def _head(lines: Iterator[Line]) -> tuple[int, float]:
 
 
 def _channels(line: Line) -> list[tuple[bool, int]]:
-    """Return the channels of a joint, in their order."""
+    """Return the channels of a joint, in order."""
     channels = []
     for word in line.words[2:]:
         axis = "XYZ".find(word[:1].upper())
@@ -286,12 +304,16 @@ def _channels(line: Line) -> list[tuple[bool, int]]:
         channels.append((kind == "rotation", axis))
     counted = line.words[1:2] == [str(len(channels))] and len(channels) <= 6
     if not counted or len(set(channels)) != len(channels):
-        raise line.mistake("a count of at most 6 channels, and these")
+        raise line.mistake("a number of at most 6 channels, and these channels")
     return channels
 
 
 def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
-    """Return the joints of a file, at rest and in each frame. Raises InputError where they are not a person's."""
+    """Return the joints of a file, at rest and in each frame.
+
+    Raises:
+        InputError: they are not the joints of a person.
+    """
     names = [node.name for node in nodes]
     parents = [node.parent for node in nodes]
     joints = joints_of(names, parents)
@@ -299,7 +321,7 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
         raise InputError(
             f"a person's joints, got one without {cut(', '.join(joints), 200)}"
         )
-    wanted: set[int] = set()  # the joints of the person, and all above them
+    wanted: set[int] = set()  # the joints of the person, and all nodes above them
     for number in (
         joints.hips,
         joints.chest,
@@ -320,18 +342,19 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
         rest[number] = node.offset + (rest[above] if above >= 0 else 0.0)
         if number in wanted:
             turn, offset = _movement(node, values)
-            turns[number] = turn if above < 0 else turns[above] @ turn
-            places[number] = (
-                offset
-                if above < 0
-                else places[above] + np.einsum("tij,tj->ti", turns[above], offset)
-            )
+            if above < 0:
+                turns[number] = turn
+                places[number] = offset
+            else:
+                carried = np.einsum("tij,tj->ti", turns[above], offset)
+                turns[number] = turns[above] @ turn
+                places[number] = places[above] + carried
     at_rest = np.tile(np.eye(3), (len(nodes), 1, 1))
     return Rig(names, parents, joints, (at_rest, rest), (turns, places))
 
 
 def _others(rig: Rig) -> list[str]:
-    """Return the names of what a file holds beside the person: other roots, and other people below the same root."""
+    """Return the names of other roots, and of other people below the same root."""
     above = [rig.joints.hips]
     while rig.parents[above[-1]] >= 0:
         above.append(rig.parents[above[-1]])
@@ -353,7 +376,7 @@ def _others(rig: Rig) -> list[str]:
 
 
 def _movement(node: _Node, values: Array) -> tuple[Array, Array]:
-    """Return how a node turns (T or 1, 3, 3) and where it is (T, 3), in the frame of the node above it."""
+    """Return a node's turn (T or 1, 3, 3) and place (T, 3) relative to its parent."""
     assert node.offset is not None
     turn = np.eye(3)[None]
     offset = np.tile(node.offset, (len(values), 1))
@@ -367,28 +390,28 @@ def _movement(node: _Node, values: Array) -> tuple[Array, Array]:
     if positions and node.parent >= 0:
         at_rest = node.offset[positions]
         stated = offset[:, positions]
-        # some programs write what is added to the offset
+        # some programs write the displacement from the offset, others the position
         if np.abs(stated).mean() < np.abs(stated - at_rest).mean():
             offset[:, positions] += at_rest
     return turn, offset
 
 
 def write_bvh(path: str | Path, motion: Motion) -> None:
-    """Write a .bvh file, in metres and y up, that reads back as the same motion of a skeleton with the same bones.
+    """Write a motion as a .bvh file, in metres and y up.
 
-    Joint names are those of the CMU conversions, as `read_bvh` takes them. Angles are counted in other axes there, so
-    the poses that come back differ, and the joints do not.
+    The file reads back as the same motion of a skeleton with the same bones. Joints
+    have the names of the CMU conversions. BVH counts angles about other axes, so that
+    the poses that come back differ, while the joints do not.
     """
     lines = ["HIERARCHY"]
     order = []
 
     def visit(joint: int, depth: int) -> None:
         tab = "\t" * depth
-        where = (
-            np.zeros(3)
-            if PARENTS[joint] <= 0
-            else motion.skeleton.offsets[PARENTS[joint] - 1]
-        )
+        above = PARENTS[joint]
+        where = np.zeros(3)
+        if above > 0:
+            where = motion.skeleton.offsets[above - 1]
         order.append(joint)
         lines.append(f"{tab}{'JOINT' if joint else 'ROOT'} {NAMES[JOINTS[joint]]}")
         channels = "6 Xposition Yposition Zposition" if joint == 0 else "3"
@@ -416,11 +439,9 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
 
     visit(0, 0)
     turns = motion.skeleton.turns(motion.poses)[order]
-    # ZXY
-    angles = np.degrees(
-        steady_angles(np.swapaxes(angles_about((2, 0, 1), turns), 0, 1))
-    )
-    angles = angles.reshape(len(motion), -1)
+    # in the order of ROTATIONS: Z, X, Y
+    radians = np.swapaxes(angles_about((2, 0, 1), turns), 0, 1)  # (T, joints, 3)
+    angles = np.degrees(steady_angles(radians)).reshape(len(motion), -1)
     lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
     lines += [_plain(row) for row in np.hstack([motion.translations, angles])]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -1,4 +1,7 @@
-"""The motions that a user names: built-in, recorded, or of files; those that are followed, and those learned from."""
+"""Finds the motions that a user names: built-in, recorded, or of files.
+
+They are the motions to follow, and the motions to learn from.
+"""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -19,19 +22,25 @@ from posefit.reading import existing, quoted
 
 FPS = 30.0  # of motions and masks that state no rate
 MOTIONS = (".amc", ".bvh")
-# that a method takes to learn from a pose: its angles, joints and codes, and copies
+# memory for each pose that a method learns from: angles, joints, codes, and copies
 POSE_BYTES = 3_000
 Source = str | Path | Motion
 
 
 class FileOptions(NamedTuple):
-    """What the files of motions do not state, or state wrongly."""
+    """What motion files do not state, or state wrongly.
 
-    asf: str | Path | None = None  # of an .amc; None for the only one beside it
-    unit: Unit | None = None  # of lengths; None for the one that is recognised
-    # the axis that is up; None for y, or the one that a .bvh's person stands along
+    Attributes:
+        asf: skeleton of an .amc file; None for the only .asf file in its folder.
+        unit: length unit; None to recognise it.
+        up: axis that points up; None for y, or the axis that a .bvh's person stands
+            along.
+        rate: frames per second of an .amc file; None for what it states, or 120.
+    """
+
+    asf: str | Path | None = None
+    unit: Unit | None = None
     up: Up | None = None
-    # frames a second of an .amc; None for what it states, or 120
     rate: float | None = None
 
 
@@ -40,21 +49,35 @@ RECOGNISED = FileOptions()
 
 @dataclass(frozen=True)
 class SourceClip:
-    """Gives a motion at any rate, `clip.motion(fps)`; before it is made, `clip.count(fps)` says how long it is."""
+    """A motion that can be had at any rate.
+
+    Attributes:
+        motion: `clip.motion(fps)` makes the motion.
+        poses: how many poses are stored.
+        fps: rate of the stored poses; None for a built-in motion, which has the same
+            number of poses at any rate.
+    """
 
     motion: Callable[[float], Motion] = field(repr=False)
-    poses: int  # of the motion as it is stored
-    fps: float | None  # None for a built-in motion, which has as many at any rate
+    poses: int
+    fps: float | None
 
     def count(self, fps: float) -> int:
-        """Return about how many poses the motion has at a rate."""
-        return self.poses if self.fps is None else round(self.poses * fps / self.fps)
+        """Return about how many poses the motion has at a rate, without making it."""
+        if self.fps is None:
+            return self.poses
+        return round(self.poses * fps / self.fps)
 
 
 def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
-    """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
+    """Return the clip that a source names. A file is read once, now.
 
-    A file is read once, now. Raises InputError where there is no such motion.
+    Args:
+        source: a built-in or recorded motion's name, an .amc or .bvh file, or a motion.
+        stated: what the file does not state.
+
+    Raises:
+        InputError: there is no such motion.
     """
     if source in built_in.names():
         name = str(source)
@@ -68,7 +91,7 @@ def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
 
 
 def recorded_clip(clip: recorded.RecordedClip) -> SourceClip:
-    """Return what gives a recorded clip's motion at any rate, which is made only then."""
+    """Return a recorded clip, whose motion is made only on demand."""
     return SourceClip(
         lambda fps: _resampled(clip, float(fps)),
         int(clip.times[-1]) + 1,
@@ -76,7 +99,7 @@ def recorded_clip(clip: recorded.RecordedClip) -> SourceClip:
     )
 
 
-# those of the whole library at one rate, or at two: 40 MB
+# holds the whole library at two rates: 40 MB
 @lru_cache(maxsize=512)
 def _resampled(clip: recorded.RecordedClip, fps: float) -> Motion:
     return clip.motion().resampled(fps)
@@ -96,40 +119,47 @@ def _motion_in(source: str | Path, stated: FileOptions) -> Motion:
         raise InputError(
             f"{existing(path)}: expected {expected}, got {path.suffix or 'a folder'}"
         )
-    return built_in.motion(str(source))  # raises: there is none of that name
+    return built_in.motion(str(source))  # raises an error with all names
 
 
 def load_motion(
     source: Source, fps: float = FPS, stated: FileOptions = RECOGNISED
 ) -> Motion:
-    """Return the motion that a source names, at a rate: built-in, recorded, or of an .amc or .bvh file.
+    """Return the motion that a source names, at a rate.
 
-    Raises InputError where there is no such motion, and where something is stated that only files have use for.
+    Args:
+        source: a built-in or recorded motion's name, an .amc or .bvh file, or a motion.
+        fps: frames per second.
+        stated: what the file does not state.
+
+    Raises:
+        InputError: there is no such motion, or unit or up is given for a source that is
+            not a file.
     """
-    suffix = (
-        ""
-        if isinstance(source, Motion) or source in built_in.names()
-        else Path(source).suffix.lower()
-    )
+    suffix = ""
+    if not isinstance(source, Motion) and source not in built_in.names():
+        suffix = Path(source).suffix.lower()
     for name, value in (("unit", stated.unit), ("up", stated.up)):
         if value is not None and suffix not in MOTIONS:
             raise InputError(
-                f"{name} must be given for {' and '.join(MOTIONS)} files only, got {quoted(value)}"
+                f"{name} must be given for {' and '.join(MOTIONS)} files only, "
+                f"got {quoted(value)}"
             )
     return clip_of(source, stated).motion(fps)
 
 
 def skeleton_file(amc: Path, asf: str | Path | None) -> Path:
-    """Return the .asf file of an .amc file: the given one, or the only one beside it."""
+    """Return the .asf file of an .amc file: the given one, or the only one in reach."""
     if asf is not None:
         return existing(Path(asf))
     existing(amc)
-    beside = sorted(amc.parent.glob("*.asf"))
-    if len(beside) != 1:
+    found = sorted(amc.parent.glob("*.asf"))
+    if len(found) != 1:
         raise InputError(
-            f"{amc}: expected --asf or exactly one .asf file beside it, got {len(beside)}"
+            f"{amc}: expected --asf or exactly one .asf file beside it, "
+            f"got {len(found)}"
         )
-    return beside[0]
+    return found[0]
 
 
 def training_clips(
@@ -138,36 +168,48 @@ def training_clips(
     *,
     followed: Source | None = None,
 ) -> list[SourceClip]:
-    """Return the clips that sources name, each of which gives its motion at any rate.
+    """Return the clips that sources name.
 
-    A source is what `clip_of` takes; a folder of .amc files with their .asf, or of .bvh files; or `library`,
-    `library:02,16` and `library:-16`: all recorded motions, some people's, all but some people's. The clip that is
-    `followed` is left out of a folder and the library. Raises InputError where there is no such motion, where none is
-    left, and where they would take more memory than this process may have.
+    Args:
+        sources: each is what `clip_of` takes; or a folder of .amc files with their
+            .asf, or of .bvh files; or `library` for all recorded motions,
+            `library:02,16` for some people's, `library:-16` for all but some people's.
+        stated: what the files do not state.
+        followed: the motion that is followed. A folder and the library are used
+            without it.
+
+    Raises:
+        InputError: there is no such motion, none is left, or the motions would take
+            more memory than this process may use.
     """
     clips = []
     poses = 0
+    most = allowed_bytes()
     for source in sources:
         for clip in _clips(source, stated, followed):
             clips.append(clip)
             poses += clip.count(FPS)
-            _check_memory(poses, FPS)
+            _check_memory(poses, FPS, most)
     return clips
 
 
 def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
-    """Return the motions of clips at a rate. Raises InputError where they would take more memory than there may be."""
-    _check_memory(sum(clip.count(fps) for clip in clips), fps)
+    """Return the motions of clips at a rate.
+
+    Raises:
+        InputError: they would take more memory than this process may use.
+    """
+    _check_memory(sum(clip.count(fps) for clip in clips), fps, allowed_bytes())
     return [clip.motion(fps) for clip in clips]
 
 
-def _check_memory(poses: int, fps: float) -> None:
-    """Raise InputError where learning from poses would take more memory than this process may have."""
-    most = allowed_bytes()
+def _check_memory(poses: int, fps: float, most: int) -> None:
+    """Raise InputError if learning from poses would take more memory than `most` bytes."""
     if poses * POSE_BYTES > most:
-        took = f"{poses * POSE_BYTES / 1e9:.1f} GB for {poses:,} poses at {fps:g} frames a second"
+        took = f"{poses * POSE_BYTES / 1e9:.1f} GB for {poses:,} poses"
         raise InputError(
-            f"train must take at most the {most / 1e9:.1f} GB of memory that there may be, got {took}"
+            f"train must take at most the {most / 1e9:.1f} GB of memory that posefit "
+            f"may use, got {took} at {fps:g} frames a second"
         )
 
 
@@ -180,7 +222,8 @@ def _clips(
         ]
         if not clips:
             raise InputError(
-                f"train must hold another clip than the source, got {source} for {followed}"
+                "train must hold another clip than the source, "
+                f"got {source} for {followed}"
             )
         yield from (recorded_clip(clip) for clip in clips)
     elif not isinstance(source, Motion) and Path(source).is_dir():
@@ -191,12 +234,14 @@ def _clips(
         )
         if not paths:
             raise InputError(
-                f"{source}: expected a folder of {' or '.join(MOTIONS)} files, got none in it"
+                f"{source}: expected a folder of {' or '.join(MOTIONS)} files, "
+                "got none in it"
             )
         others = [path for path in paths if not _same(path, followed)]
         if not others:
             raise InputError(
-                f"{source}: expected a folder with another clip than the source, got that one alone"
+                f"{source}: expected a folder with another clip than the source, "
+                "got that one alone"
             )
         yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):
@@ -206,14 +251,10 @@ def _clips(
 
 
 def _stem(source: Source | None) -> str | None:
-    """Return a clip's name: a recorded one's, or that of a file such as 16_15.amc."""
-    return (
-        source.name
-        if isinstance(source, Motion)
-        else None
-        if source is None
-        else Path(source).stem
-    )
+    """Return the name of a recorded clip, or of a file such as 16_15.amc."""
+    if isinstance(source, Motion):
+        return source.name
+    return None if source is None else Path(source).stem
 
 
 def _same(source: Source, other: Source | None) -> bool:

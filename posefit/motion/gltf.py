@@ -1,7 +1,8 @@
-"""The moving body as one .glb file, which Blender, browsers and game engines open: glTF 2.0 of the Khronos Group.
+"""The moving body as one .glb file: glTF 2.0 of the Khronos Group.
 
-A node a bone stands where the bone starts and holds the shape of its cone; an animation turns the nodes. Metres, y up,
-left limbs orange and right ones blue, as in the viewer.
+Blender, browsers and game engines open it. Each bone has a node at the bone's start,
+with the bone's cone as its mesh; an animation turns the nodes. Lengths are metres and
+y is up. Left limbs are orange and right ones blue, as in the viewer.
 """
 
 import json
@@ -24,10 +25,9 @@ COLOURS = {
     "middle": (0.6, 0.6, 0.6),
 }
 MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.7}
-# corners of a ring, and rings of a cap
-RING_CORNERS = 16
-CAP = 4
-# glTF's numbers of types and of what a buffer is for
+RING_CORNERS = 16  # corners of a ring
+CAP = 4  # rings of a cap
+# glTF's numbers for data types and for uses of a buffer
 FLOAT = 5126
 SHORT = 5123
 ARRAY = 34962
@@ -39,7 +39,13 @@ BINARY = 0x004E4942
 
 
 def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
-    """Write a motion of a body whose bones have these radii (26, 2), in metres."""
+    """Write a motion of a body as a .glb file.
+
+    Args:
+        path: the file.
+        motion: the motion.
+        radii: radii (26, 2) of the bones' cones at their two ends, in metres.
+    """
     skeleton = motion.skeleton
     data = _Buffer()
     sides = list(COLOURS)
@@ -106,7 +112,7 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
 
 
 class _Buffer:
-    """The bytes of a file, and what glTF says of them."""
+    """The binary part of a file, and its description in glTF."""
 
     def __init__(self) -> None:
         self.bytes = bytearray()
@@ -116,7 +122,13 @@ class _Buffer:
     def add(
         self, values: NDArray[Any], target: int | None, bounds: bool = False
     ) -> int:
-        """Add vectors (n, k) of 32 bits, or indices (n,) of 16, and return their number; with `bounds` their ends."""
+        """Add an array, and return its number.
+
+        Args:
+            values: vectors (n, k), stored with 32 bits, or indices (n,) with 16.
+            target: glTF's number for the use, or None.
+            bounds: whether to state the smallest and the largest values.
+        """
         indices = values.ndim == 1
         raw = values.astype("<u2" if indices else "<f4")
         view = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": raw.nbytes}
@@ -140,13 +152,15 @@ class _Buffer:
 def _capped_cone(
     offset: Array, radii: Sequence[float] | Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return points and normals (n, 3) and triangles' corners (3 m,) of a cone with half balls at its ends."""
+    """Return a cone with half balls at its ends: points, normals, triangles' corners.
+
+    Points and normals have shape (n, 3), the corners (3 m,).
+    """
     length = float(np.linalg.norm(offset))
     down = np.linspace(-0.5 * np.pi, 0.0, CAP)
     up = np.linspace(0.0, 0.5 * np.pi, CAP)
-    rings = [(angle, radii[0], 0.0) for angle in down] + [
-        (angle, radii[1], length) for angle in up
-    ]
+    rings = [(angle, radii[0], 0.0) for angle in down]
+    rings += [(angle, radii[1], length) for angle in up]
     around = np.linspace(0.0, 2.0 * np.pi, RING_CORNERS, endpoint=False)
     normals = np.array(
         [

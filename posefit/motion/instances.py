@@ -1,18 +1,20 @@
 """Numbered instances: what "instance 17" is, wherever posefit numbers something.
 
-An instance is a person, their pose or motion, and what cameras see of it. A number and the settings beside it mean the
-same instance on every machine and in every version. Numbers 0 to 9,999 are for training and tuning; 10,000 to 19,999
-are held out. A number alone is not a picture: the table says what else belongs to it, and what the number decides.
+An instance is a person, their pose or motion, and what cameras see of it. A number
+means the same instance on every machine and in every version, provided that the other
+settings are the same. Numbers 0 to 9,999 are for training and tuning; 10,000 to 19,999
+are held out. The table says what belongs to a number, and what the number decides.
 
-| what is numbered | beside the number | what the number decides | stream |
+| numbered | settings | decided by the number | stream |
 |---|---|---|---|
-| a motion, in sweeps and environments | the motion, its frames | speed, phase, turn of the cameras | motion |
-| what an environment shows of it | its arguments | noise, guesses of yaw and place, fitted body | scene |
-| a problem of a suite | function, dimension | person, pose, cameras, box, noise | suite |
+| motion of a sweep, an environment | motion, frames | speed, phase, view | motion |
+| scene of an environment | arguments | noise, guesses of yaw and place, body | scene |
+| problem of a suite | function, dimension | person, pose, cameras, box, noise | suite |
 
-So a sweep's instance 17 of "walk" is the motion of an environment's instance 17 of "walk", and both differ from
-instance 17 of a suite's function. Each row draws from a random stream of its own, `generator`: what one draws changes
-nothing in another. Instance 0 of a motion is the motion as it is.
+So a sweep's instance 17 of "walk" is the motion of an environment's instance 17 of
+"walk", and both differ from instance 17 of a suite's function. Each row has a separate
+random stream, see `generator`: what one row draws changes nothing in another. Instance
+0 of a motion is the motion itself.
 """
 
 from collections.abc import Sequence
@@ -33,21 +35,30 @@ HELD_OUT = range(10_000, 20_000)
 INSTANCES = range(20_000)
 
 Stream = Literal["motion", "scene", "suite"]
-# part of the seed of everything that an instance draws; published numbers depend on them
+# part of the seed of every instance: published numbers depend on these values
 RNG_STREAMS: dict[Stream, int] = {"motion": 2013, "scene": 2012, "suite": 2026}
 
-# how far the cadence of a built-in motion's instance is from its own at most
+# greatest relative change of a built-in motion's cadence in an instance
 SPEED = 0.15
-VIEW_DEGREES = 10.0  # how far the cameras of an instance are turned at most
+VIEW_DEGREES = 10.0  # greatest turn of an instance's cameras
 
 
 def generator(stream: Stream, *numbers: int) -> np.random.Generator:
-    """Return the random numbers of an instance: its number, or a suite's function and its number."""
+    """Return the random generator of an instance.
+
+    Args:
+        stream: a row of the table above.
+        numbers: the instance's number, for a suite after the function's.
+    """
     return np.random.default_rng([RNG_STREAMS[stream], *numbers])
 
 
 def instance_number(number: object) -> int:
-    """Return the number of an instance as an int. Raises InputError where there is no such instance."""
+    """Return the number of an instance as an int.
+
+    Raises:
+        InputError: there is no such instance.
+    """
     last = INSTANCES[-1]
     if isinstance(number, bool) or not isinstance(number, int | np.integer):
         raise InputError(
@@ -60,21 +71,28 @@ def instance_number(number: object) -> int:
 
 @dataclass(frozen=True)
 class Variation:
-    """How an instance differs from the motion as it is."""
+    """How an instance differs from the motion itself.
 
-    speed: float  # the motion's own times this
-    phase: float  # where in its cycle it begins, 0 to 1
-    turn_degrees: float  # of all cameras, about the person
-    start: float  # where in a file the frames begin, as a share of what is possible
+    Attributes:
+        speed: factor of the motion's speed.
+        phase: where in its cycle the motion begins, 0 to 1.
+        turn_degrees: turn of all cameras about the person.
+        start: where in a file the frames begin: 0 at its start, 1 as late as possible.
+    """
+
+    speed: float
+    phase: float
+    turn_degrees: float
+    start: float
 
     def views(self, view_degrees: Sequence[float]) -> list[float]:
-        """Return the view angles of the instance, in degrees, from those of the motion as it is."""
+        """Return the view angles of the instance, given the motion's, in degrees."""
         return [view + self.turn_degrees for view in view_degrees]
 
 
 @lru_cache(maxsize=256)
 def variation(number: int) -> Variation:
-    """Return how an instance differs from the motion as it is, whatever the motion."""
+    """Return how an instance differs from the motion itself, whatever the motion."""
     if number == 0:
         return Variation(speed=1.0, phase=0.0, turn_degrees=0.0, start=0.0)
     rng = generator("motion", number)
@@ -89,9 +107,16 @@ def variation(number: int) -> Variation:
 def motion_of_instance(
     source: str | Motion, number: int, *, frames: int, fps: float
 ) -> Motion:
-    """Return so many frames of an instance of a motion: a built-in motion's name, a file or a motion.
+    """Return frames of an instance of a motion.
 
-    Raises InputError where a file has fewer frames.
+    Args:
+        source: name of a built-in motion, a file or a motion.
+        number: the instance's number.
+        frames: how many frames.
+        fps: frames per second.
+
+    Raises:
+        InputError: a file has fewer frames.
     """
     varied = variation(number)
     if isinstance(source, str) and source in built_in.names():

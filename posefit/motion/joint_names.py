@@ -1,9 +1,11 @@
-"""What the joints of somebody else's skeleton are, by their names and by how they hang together.
+"""Recognises the joints of another program's skeleton by name and position in the tree.
 
-Names of many programs are known: those of Acclaim, the CMU conversions by cgspeed, MotionBuilder and HumanIK, Mixamo,
-LAFAN1, Bandai Namco, 3ds Max's Biped, Biovision, Xsens, Poser, SMPL, Unreal, VRM, Blender and freemocap. Namespaces,
-prefixes, numbers and the ways to write a side do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and `thigh.L` are
-one joint. A limb's joints are named; the spine is what lies between the legs and the arms, whatever it is called.
+Names of many programs are known: those of Acclaim, the CMU conversions by cgspeed,
+MotionBuilder and HumanIK, Mixamo, LAFAN1, Bandai Namco, 3ds Max's Biped, Biovision,
+Xsens, Poser, SMPL, Unreal, VRM, Blender and freemocap. Namespaces, prefixes, numbers
+and the way to write a side do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and
+`thigh.L` are the same joint. Limbs are found by the names of their joints; the spine is
+whatever lies between legs and arms.
 """
 
 import re
@@ -11,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-# Of each joint of a side, from the trunk outwards: its names, and those that also other joints have.
+# each joint of a side, outwards: its names, and names that other joints have, too
 _LIMBS: Mapping[str, tuple[set[str], set[str]]] = {
     "thigh": ({"upleg", "upperleg", "thigh", "femur", "uleg", "legupper"}, {"hip"}),
     "shin": (
@@ -50,7 +52,7 @@ _MIDDLE = {
     "neck": {"neck", "lowerneck", "upperneck"},
 }
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
-# LUArm, RFArm
+# two letters that join side and limb, as in LUArm and RFArm
 _JOINED = {
     "lu": ("left", "u"),
     "ru": ("right", "u"),
@@ -65,11 +67,11 @@ _ENDINGS = {"joint", "jnt", "bone"}
 LEGS = ("thigh", "shin", "foot")
 ARMS = ("arm", "forearm", "hand")
 NEEDED = tuple((side, joint) for side in ("left", "right") for joint in (*LEGS, *ARMS))
-LONGEST_NAME = 200  # characters; of what is longer, the end counts
+LONGEST_NAME = 200  # characters; of a longer name only the end is read
 
 
 class Part(NamedTuple):
-    """What a name says: the side, the part in one word, and how many other words stand before it."""
+    """Content of a name: side, part in one word, number of other words before it."""
 
     side: str
     part: str
@@ -77,7 +79,7 @@ class Part(NamedTuple):
 
 
 def part_of(name: str) -> Part:
-    """Return what a joint's name says; without a known part, the part is ""."""
+    """Return the content of a joint's name. If no part is known, the part is ""."""
     words = [
         word.lower() for word in _WORD.findall(name[-LONGEST_NAME:].rpartition(":")[2])
     ]
@@ -90,7 +92,7 @@ def part_of(name: str) -> Part:
             side, letter = _JOINED[word]
             sides.append(side)
             rest.append(letter)
-        # lThigh in small letters, lfemur
+        # a side's letter before the part, such as lThigh in small letters or lfemur
         elif word not in _KNOWN and word[0] in "lr" and word[1:] in _KNOWN:
             sides.append(_SIDES[word[0]])
             rest.append(word[1:])
@@ -110,89 +112,92 @@ def part_of(name: str) -> Part:
 
 
 class Joints(NamedTuple):
-    """Which nodes of a tree are a person's joints, by their numbers."""
+    """Which nodes of a tree are a person's joints.
 
-    # such as ("left", "thigh"); those of `NEEDED` at least
+    Attributes:
+        limbs: nodes by side and joint, such as ("left", "thigh"); at least `NEEDED`.
+        hips: the node from which the legs start.
+        chest: the node from which arms and head start.
+        spine: nodes between the hips and the joint that carries the neck, which is
+            the last one.
+        neck: nodes from the base of the neck up to the head, which is not included.
+        head: the head's node, or None.
+    """
+
     limbs: Mapping[tuple[str, str], int]
     hips: int
-    chest: int  # from which arms and head go
-    spine: Sequence[int]  # from behind the hips to the joint that bears the neck
-    neck: Sequence[int]  # from the base of the neck to before the head
+    chest: int
+    spine: Sequence[int]
+    neck: Sequence[int]
     head: int | None
 
 
 def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str]:
-    """Return the joints of a tree whose nodes come after their parents, -1 for a root's; or what it lacks.
+    """Return a person's joints in a tree, or what the tree lacks.
 
-    Where a bone ends that no joint follows, the node's name is "".
+    Args:
+        names: names of the nodes, "" for the end of a bone without a further joint.
+        parents: their parents, which come before them; -1 for a root.
+
+    Returns:
+        The joints, or a list of what is missing.
     """
     parts = [part_of(name) for name in names]
-    paths: list[list[int]] = []  # of each node, from a root to it
+    paths: list[list[int]] = []  # for each node, the nodes from a root to it
     for node, parent in enumerate(parents):
-        paths.append([*(paths[parent] if parent >= 0 else []), node])
+        path = paths[parent] if parent >= 0 else []
+        paths.append([*path, node])
     limbs: dict[tuple[str, str], int] = {}
     for side in ("left", "right"):
-        limbs.update(
-            {(side, joint): node for joint, node in _limbs(side, parts, paths).items()}
-        )
-        # a limb may end there
+        for joint, node in _limbs(side, parts, paths).items():
+            limbs[side, joint] = node
+        # a limb may end at an ankle or a wrist without a name
         for above, end in (("shin", "foot"), ("forearm", "hand")):
             last = limbs.get((side, above))
-            ends = [
-                child
-                for child, parent in enumerate(parents)
-                if parent == last and not names[child]
-            ]
-            if ends and (side, end) not in limbs:
-                limbs[side, end] = ends[0]
+            for child, parent in enumerate(parents):
+                if parent == last and not names[child]:
+                    limbs.setdefault((side, end), child)
     if missing := _missing(limbs, names, paths):
         return missing
     legs = [limbs[side, "thigh"] for side in ("left", "right")]
     arms = [limbs[side, "arm"] for side in ("left", "right")]
     hips = _common(paths, legs)
-    heads = [
-        node
-        for node, part in enumerate(parts)
-        if part.part in _MIDDLE["head"] and not part.side
-    ]
-    head = min(
-        heads,
-        key=lambda node: (
-            parts[node].part != "head",
-            parts[node].others,
-            len(paths[node]),
-        ),
-        default=None,
-    )
-    if (
-        hips is None
-        or (chest := _common(paths, arms if head is None else [*arms, head])) is None
-    ):
+    heads = []
+    necks = []
+    for node, part in enumerate(parts):
+        if part.part in _MIDDLE["head"] and not part.side:
+            heads.append(node)
+        if part.part == "neck" and not part.side:
+            necks.append(node)
+
+    def unlikeness_to_head(node: int) -> tuple[bool, int, int]:
+        part = parts[node]
+        return part.part != "head", part.others, len(paths[node])
+
+    head = min(heads, key=unlikeness_to_head, default=None)
+    above_chest = arms if head is None else [*arms, head]
+    chest = _common(paths, above_chest)
+    if hips is None or chest is None:
         return ["a root from which legs, arms and head go"]
     if hips not in paths[chest]:
         return [f"arms and head above the hips ({names[hips]!r})"]
-    between = paths[chest][paths[chest].index(hips) + 1 :]
-    if head is None:
-        necks = [
-            node
-            for node, part in enumerate(parts)
-            if part.part == "neck" and not part.side
-        ]
-        neck = min(necks, key=lambda node: len(paths[node]), default=None)
-        bearing = (
-            []
-            if neck is None or chest not in paths[neck]
-            else paths[neck][paths[neck].index(chest) + 1 :]
-        )
-    else:
-        bearing = paths[head][paths[head].index(chest) + 1 : -1]
-    if parts[chest].part == "neck" and between:  # Biped's shoulders hang from the neck
-        bearing = [between[-1], *bearing]
-        between = between[:-1]
-    return Joints(limbs, hips, chest, between, bearing, head)
+    spine = paths[chest][paths[chest].index(hips) + 1 :]
+    neck: list[int] = []
+    if head is not None:
+        neck = paths[head][paths[head].index(chest) + 1 : -1]
+    elif necks:
+        lowest = min(necks, key=lambda node: len(paths[node]))
+        if chest in paths[lowest]:
+            neck = paths[lowest][paths[lowest].index(chest) + 1 :]
+    # the shoulders of Biped hang from the neck
+    if parts[chest].part == "neck" and spine:
+        neck = [spine[-1], *neck]
+        spine = spine[:-1]
+    return Joints(limbs, hips, chest, spine, neck, head)
 
 
-# where two nodes in a row have names of one joint: `leg` and below it `knee`, `ankle` and `foot`, `wrist` and `hand`
+# pairs of nodes that may have names of the same joint: `leg` and below it `knee`,
+# `ankle` and `foot`, `wrist` and `hand`
 _TWO_IN_A_ROW = {
     "shin": ("thigh", "shin"),
     "foot": ("foot", "toe"),
@@ -203,10 +208,13 @@ _TWO_IN_A_ROW = {
 def _limbs(
     side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]
 ) -> dict[str, int]:
-    """Return the joints of a side's arm and leg: of nodes with names of one joint, that nearest to the root."""
+    """Return the joints of a side's arm and leg.
+
+    If several nodes have names of the same joint, the nearest to the root is taken.
+    """
 
     def nodes_named(names: set[str]) -> list[int]:
-        """Return the nodes whose names have the fewest other words, from the root outwards."""
+        """Return the nodes with the fewest other words in their names, root first."""
         nodes = [
             node
             for node, part in enumerate(parts)
@@ -219,7 +227,7 @@ def _limbs(
         )
 
     nodes = {joint: nodes_named(names) for joint, (names, _) in _LIMBS.items()}
-    # `shoulder` is the arm; with an `upperarm` below, it is the clavicle
+    # `shoulder` is the arm, unless there is an `upperarm` below: then the clavicle
     for joint in ("thigh", "arm", "clavicle"):
         if not nodes[joint] and not (
             joint == "clavicle" and nodes["arm"] == nodes_named({"shoulder"})
@@ -229,7 +237,8 @@ def _limbs(
         absent = below if joint == above else above
         two = nodes[joint]
         if not nodes[absent] and len(two) > 1 and two[0] in paths[two[1]]:
-            nodes[above], nodes[below] = two[:1], two[1:]
+            nodes[above] = two[:1]
+            nodes[below] = two[1:]
     return {joint: named[0] for joint, named in nodes.items() if named}
 
 
@@ -238,7 +247,7 @@ def _missing(
     names: Sequence[str],
     paths: Sequence[Sequence[int]],
 ) -> list[str]:
-    """Return what limbs lack: joints, and that each joint of a leg or an arm hangs from the one before it."""
+    """Return what limbs lack: a joint, or its place below the joint before it."""
     missing = [
         f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs
     ]
@@ -252,13 +261,14 @@ def _missing(
                 and first not in paths[second][:-1]
             ):
                 missing.append(
-                    f"{side} {below} ({names[second]!r}) under {side} {above} ({names[first]!r})"
+                    f"{side} {below} ({names[second]!r}) "
+                    f"under {side} {above} ({names[first]!r})"
                 )
     return missing
 
 
 def _common(paths: Sequence[Sequence[int]], nodes: Sequence[int]) -> int | None:
-    """Return the last node that is on the paths to all of some nodes."""
+    """Return the last node on the paths to all the nodes, or None."""
     shared = [
         steps[0]
         for steps in zip(*(paths[node] for node in nodes), strict=False)

@@ -8,13 +8,13 @@ from typing import NamedTuple
 from posefit.errors import InputError
 from posefit.reading import SHOWN, cut
 
-# no angle or length of a person comes near; beyond it arithmetic would overflow
+# far above any angle or length of a person; beyond it arithmetic would overflow
 LARGEST = 1e6
-BOM = b"\xef\xbb\xbf"  # which some editors write first
+BOM = b"\xef\xbb\xbf"  # some editors write it at the start
 
 
 class Line(NamedTuple):
-    """One line of a file, as words; that after the last one has none."""
+    """One line of a file, as words. The line after the last one has no words."""
 
     path: Path
     number: int
@@ -22,19 +22,29 @@ class Line(NamedTuple):
 
     @property
     def key(self) -> str:
-        """The first word in small letters, "" after the last line."""
+        """The first word in lower case, "" after the last line."""
         return self.words[0].lower() if self.words else ""
 
     def mistake(self, expected: str, got: str | None = None) -> InputError:
-        """Return the error of this line; what came is all of it where it is not stated."""
+        """Return the error of this line.
+
+        Args:
+            expected: what should be there.
+            got: what is there, by default the whole line.
+        """
         if got is None:
             got = quoted_words(self.words) if self.words else "the end of the file"
         return InputError(
-            f"{self.path}:{self.number}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}"
+            f"{self.path}:{self.number}: expected {cut(expected, 2 * SHOWN)}, "
+            f"got {cut(got)}"
         )
 
     def numbers(self, count: int) -> list[float]:
-        """Return the numbers after the first word. Raises InputError where they are not so many small ones."""
+        """Return the `count` numbers after the first word.
+
+        Raises:
+            InputError: there are more or fewer, or one is not a number, or too large.
+        """
         first = quoted_words(self.words[:1])
         words = self.words[1:]
         if len(words) != count:
@@ -43,7 +53,8 @@ class Line(NamedTuple):
             values = [float(word) for word in words]
         except ValueError:
             raise self.mistake(f"numbers for {first}", quoted_words(words)) from None
-        if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
+        # this comparison also fails for NaN
+        if not sum(map(abs, values)) < LARGEST:
             raise self.mistake(
                 f"finite numbers below {LARGEST:g} for {first}", quoted_words(words)
             )
@@ -51,9 +62,10 @@ class Line(NamedTuple):
 
 
 def lines_of(path: Path, longest: int) -> Iterator[Line]:
-    """Yield the lines of a file that have words, and the one after the last: no file is without a line.
+    """Yield the lines of a file that have words, and an empty one at the end.
 
-    Raises InputError for a line of more than `longest` bytes.
+    Raises:
+        InputError: a line has more than `longest` bytes.
     """
     number = 0
     with path.open("rb") as file:
@@ -68,5 +80,5 @@ def lines_of(path: Path, longest: int) -> Iterator[Line]:
 
 
 def quoted_words(words: Sequence[str]) -> str:
-    """Return words of a file as a message quotes them."""
+    """Return words of a file in the form that messages quote."""
     return repr(cut(" ".join(words)))

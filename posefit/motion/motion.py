@@ -17,38 +17,49 @@ from posefit.geometry.skeleton import ANGLES, INNER, Skeleton, angle_index
 from posefit.limits import RATES
 from posefit.reading import quoted
 
-# Share of a frame within which two times count as the same one.
+# share of a frame within which two times count as the same
 SAME_TIME = 1e-6
-# frames of a file, or of a motion that is made or resampled: 28 minutes at 120 a second
+# most frames of a file, or of a motion that is made or resampled: 28 minutes at 120 Hz
 LONGEST = 200_000
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Poses of one skeleton at a constant rate. Arrays are copied and cannot be written to."""
+    """Poses of one skeleton at a constant rate. Arrays are read-only copies.
+
+    Attributes:
+        name: of the clip.
+        skeleton: the skeleton that the poses are of.
+        poses: angles (T, 66) in radians, unwrapped along time by the readers.
+        translations: root joint (T, 3) in the world, in metres.
+        fps: frames per second.
+        first: number of the first frame, in the footage or in the longer motion that
+            this one was cut from.
+        notes: what was guessed when a file was read.
+
+    Raises:
+        InputError: an array has a wrong shape or is not finite, or the rate is not
+            allowed.
+    """
 
     name: str
     skeleton: Skeleton
-    # (T, 66) radians, unwrapped along time by the readers
     poses: Array = field(repr=False)
-    # (T, 3) metres, the root joint in the world
     translations: Array = field(repr=False)
     fps: float
-    # the number of the first frame, in the footage or the longer motion that it was
-    # taken from
     first: int = 0
-    notes: tuple[str, ...] = ()  # what was guessed where a file was read
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, columns in (("poses", ANGLES), ("translations", 3)):
-            object.__setattr__(
-                self, name, frozen(name, getattr(self, name), ("frames", columns))
-            )
+            array = frozen(name, getattr(self, name), ("frames", columns))
+            object.__setattr__(self, name, array)
         if len(self.poses) < 1:
             raise InputError("poses must hold at least 1 frame, got 0")
         if len(self.translations) != len(self.poses):
             raise InputError(
-                f"translations must have shape {(len(self.poses), 3)}, got {self.translations.shape}"
+                f"translations must have shape {(len(self.poses), 3)}, "
+                f"got {self.translations.shape}"
             )
         object.__setattr__(self, "fps", _rate(self.fps))
 
@@ -61,10 +72,15 @@ class Motion:
         return self.skeleton.joints(self.poses, self.translations)
 
     def frames(self, start: int, stop: int) -> "Motion":
-        """Return frames start to stop - 1 as a motion. Raises InputError where that leaves the clip or is empty."""
+        """Return frames `start` to `stop` - 1 as a motion.
+
+        Raises:
+            InputError: that leaves the clip, or is empty.
+        """
         if not 0 <= start < stop <= len(self):
             raise InputError(
-                f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}"
+                f"frames must be 0 <= start < stop <= {len(self)}, "
+                f"got start {start} and stop {stop}"
             )
         poses = self.poses[start:stop]
         translations = self.translations[start:stop]
@@ -75,15 +91,12 @@ class Motion:
     def turned(self, rotation: Array) -> "Motion":
         """Return the motion in a world that is turned by a rotation (3, 3)."""
         poses = self.poses.copy()
-        poses[:, :3] = unwrapped(
-            root_angles_from_rotation(
-                rotation @ rotation_from_root_angles(poses[:, :3])
-            )
-        )
+        turned = rotation @ rotation_from_root_angles(poses[:, :3])  # (T, 3, 3)
+        poses[:, :3] = unwrapped(root_angles_from_rotation(turned))
         return replace(self, poses=poses, translations=self.translations @ rotation.T)
 
     def about_axes_of(self, skeleton: Skeleton) -> "Motion":
-        """Return the motion with joint angles about another skeleton's axes: in space, each joint turns as before."""
+        """Return the same motion with joint angles about another skeleton's axes."""
         if np.array_equal(self.skeleton.axes, skeleton.axes):
             return self
         own = replace(
@@ -97,23 +110,26 @@ class Motion:
         for joint in INNER:
             start = angle_index(joint)
             axes = skeleton.axes[joint - 1]
-            poses[:, start : start + 3] = joint_angles_from_rotation(
-                axes.T @ turns[joint] @ axes
-            )
+            local = axes.T @ turns[joint] @ axes  # (T, 3, 3)
+            poses[:, start : start + 3] = joint_angles_from_rotation(local)
         return replace(self, skeleton=own, poses=unwrapped(poses))
 
     def reversed(self) -> "Motion":
-        """Return the motion with its last frame first."""
+        """Return the motion backwards."""
         return replace(
             self, poses=self.poses[::-1], translations=self.translations[::-1]
         )
 
     def resampled(self, fps: float) -> "Motion":
-        """Return the motion at another rate, over the times k / fps that lie within it.
+        """Return the motion at another rate, at the times k / fps within it.
 
-        Where the old rate is a whole multiple k of the new one, every k-th frame is taken as it is. Elsewhere joint
-        angles and translations are interpolated linearly, and the root's rotation along the shortest arc. `first` is
-        the nearest whole number at the new rate.
+        If the old rate is a whole multiple k of the new one, every k-th frame is taken.
+        Otherwise joint angles and translations are interpolated linearly, and the
+        root's rotation along the shortest arc. `first` is the nearest whole number at
+        the new rate.
+
+        Raises:
+            InputError: the rate is not allowed, or gives too many frames.
         """
         fps = _rate(fps)
         ratio = self.fps / fps
@@ -129,7 +145,8 @@ class Motion:
         if last / ratio >= LONGEST:
             came = f"{last / ratio:.3g} frames at {fps:g} fps"
             raise InputError(
-                f"{self.name} must have at most {LONGEST} frames when it is resampled, got {came}"
+                f"{self.name} must have at most {LONGEST} frames when it is resampled, "
+                f"got {came}"
             )
         # in frames of this motion; the last time may be off by rounding
         times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
@@ -137,7 +154,7 @@ class Motion:
             return replace(self, fps=fps, first=first)
         poses = at_frames(self.poses, times)
         translations = at_frames(self.translations, times)
-        # a quarter of a second to import
+        # imported here because the import takes a quarter of a second
         from scipy.spatial.transform import Rotation, Slerp
 
         rotations = Rotation.from_matrix(rotation_from_root_angles(self.poses[:, :3]))
@@ -151,7 +168,7 @@ class Motion:
 
 
 def at_frames(series: Array, times: Array | float) -> Array:
-    """Return a series (T, ...) at times in frames, between which it is a straight line."""
+    """Return a series (T, ...) at times in frames, interpolated linearly."""
     times = np.asarray(times, dtype=np.float64)
     before: NDArray[np.int64] = np.clip(
         times.astype(np.int64), 0, max(len(series) - 2, 0)

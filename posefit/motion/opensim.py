@@ -1,8 +1,10 @@
-"""OpenSim's files: a model of the person's bones (.osim) and their motion (.mot).
+"""Writes OpenSim's files: a model of the person's bones (.osim), their motion (.mot).
 
-The model has the skeleton's own kinematics: each bone is a rigid body whose frame stands where the bone starts, and
-turns by the skeleton's angles, so that the joints are where posefit has them. Its masses are those of cones of water;
-it has no muscles. Markers are named as in a track's .trc file, so that OpenSim's own inverse kinematics takes it, too.
+The model has the skeleton's own kinematics. Each bone is a rigid body whose frame is at
+the bone's start and turns by the skeleton's angles, so that the joints are where
+posefit has them. The bodies have the masses of cones of water; there are no muscles.
+Markers have the names of a track's .trc file, so that OpenSim's own inverse kinematics
+accepts that file, too.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,17 +25,17 @@ from posefit.geometry.rotation import (
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Skeleton, channel_angles
 from posefit.motion.motion import Motion
 
-VERSION = "40000"  # of the file's format: OpenSim 4
-DENSITY = 1000.0  # kilograms a cubic metre
-ROOT_KILOGRAMS = 1e-3  # a joint has no volume, and a body has to have a mass
+VERSION = "40000"  # version of the file format: OpenSim 4
+DENSITY = 1000.0  # kilograms per cubic metre
+ROOT_KILOGRAMS = 1e-3  # the root has no volume, but OpenSim demands a mass
 _TURNS = ("rx", "ry", "rz")
 _ROOT = ("root_rx", "root_ry", "root_rz", "root_tx", "root_ty", "root_tz")
 
 
 def coordinates(skeleton: Skeleton) -> dict[str, int]:
-    """Return OpenSim's coordinates, such as `lfemur_rx`, and for each where it stands in a pose (66,).
+    """Return OpenSim's coordinates, such as `lfemur_rx`, as indices into a pose (66,).
 
-    The root's three turns come first; its translations are no angles, and are not among them.
+    The root's three turns come first. Its translations are not included.
     """
     places = dict(zip(_ROOT[:3], (1, 0, 2), strict=True))
     for bone in BONES:
@@ -44,17 +46,15 @@ def coordinates(skeleton: Skeleton) -> dict[str, int]:
 
 
 def write_mot(path: str | Path, motion: Motion) -> None:
-    """Write a motion's coordinates, one row a frame: time in seconds, angles in degrees, the root's place in metres."""
+    """Write a motion's coordinates as a .mot file, one row per frame.
+
+    The columns are time in seconds, angles in degrees, and the root's place in metres.
+    """
     path = Path(path)
     angles = coordinates(motion.skeleton)
     turns = np.degrees(unwrapped(motion.poses[:, list(angles.values())]))
-    table = np.column_stack(
-        [
-            (motion.first + np.arange(len(motion))) / motion.fps,
-            turns,
-            motion.translations,
-        ]
-    )
+    times = (motion.first + np.arange(len(motion))) / motion.fps
+    table = np.column_stack([times, turns, motion.translations])
     head = [
         path.name,
         "version=1",
@@ -70,7 +70,13 @@ def write_mot(path: str | Path, motion: Motion) -> None:
 
 
 def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
-    """Write the model of a body; `markers` are the names (27,) of the markers at its joints."""
+    """Write the model of a body as an .osim file.
+
+    Args:
+        path: the file.
+        body: skeleton and radii.
+        markers: names (27,) of the markers at the joints.
+    """
     skeleton = body.skeleton
     document = Element("OpenSimDocument", Version=VERSION)
     model = SubElement(document, "Model", name=skeleton.name)
@@ -115,19 +121,20 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
 
 
 def _inertia(offset: Array, radii: Array) -> tuple[float, Array, Array]:
-    """Return the mass of a bone's cone, its centre (3,), and its inertia (3, 3) there, as a cylinder's as heavy."""
-    length, (first, last) = float(np.linalg.norm(offset)), radii
+    """Return a bone's mass, its centre (3,), and its inertia (3, 3) there.
+
+    The mass is a cone's, the inertia that of a cylinder of the same mass.
+    """
+    length = float(np.linalg.norm(offset))
+    first, last = radii
     square = float(first * first + first * last + last * last) / 3.0
     mass = max(DENSITY * np.pi * length * square, ROOT_KILOGRAMS)
     along = offset / max(length, 1e-9)
     across = mass * (3.0 * square + length * length) / 12.0
     about = 0.5 * mass * square
     line = np.outer(along, along)
-    return (
-        mass,
-        0.5 * offset,
-        across * (np.eye(3) - line) + about * line + 1e-9 * np.eye(3),
-    )
+    inertia = across * (np.eye(3) - line) + about * line + 1e-9 * np.eye(3)
+    return mass, 0.5 * offset, inertia
 
 
 def _body(
@@ -156,17 +163,23 @@ def _body(
         _text(cylinder, "half_height", [0.5 * length])
     _text(body, "mass", [mass])
     _text(body, "mass_center", centre)
-    _text(
-        body,
-        "inertia",
-        [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]],
-    )
+    products = [inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    _text(body, "inertia", [*np.diag(inertia), *products])
 
 
 def _joint(
     joints: Element, kind: str, name: str, parent: str, at: Array, axes: Array
 ) -> Element:
-    """Return a joint from a point of a parent's frame to a body's origin, whose angles are about some axes (3, 3)."""
+    """Return a joint between a parent's frame and a body's origin.
+
+    Args:
+        joints: where to add it.
+        kind: OpenSim's kind of joint.
+        name: of the body.
+        parent: path of the parent's frame.
+        at: where in the parent's frame it is (3,).
+        axes: axes (3, 3) of its angles.
+    """
     joint = SubElement(joints, kind, name=f"{name}_joint")
     SubElement(joint, "socket_parent_frame").text = f"{name}_parent"
     SubElement(joint, "socket_child_frame").text = f"{name}_child"
@@ -183,7 +196,15 @@ def _mobile(
     moves: Sequence[str],
     skeleton: Skeleton,
 ) -> None:
-    """Give a joint its coordinates: turns about axes (3, 3), the outermost first, and moves; "" is none."""
+    """Give a joint its coordinates.
+
+    Args:
+        joint: the joint.
+        turns: names of its turns, the outermost first; "" for a fixed axis.
+        axes: axes (3, 3) of the turns.
+        moves: names of its translations along x, y, z; "" for a fixed axis.
+        skeleton: has the limits of the angles.
+    """
     listed = SubElement(joint, "coordinates")
     for name in (*turns, *moves):
         if name:
@@ -210,9 +231,11 @@ def _mobile(
 
 def _limits(name: str, skeleton: Skeleton) -> Iterable[float]:
     angle = coordinates(skeleton).get(name, 0)
-    if skeleton.limits is None or angle < 3:
-        return (-10.0, 10.0) if name in _ROOT[3:] else (-2.0 * np.pi, 2.0 * np.pi)
-    return map(float, skeleton.limits[angle - 3])
+    if skeleton.limits is not None and angle >= 3:
+        return map(float, skeleton.limits[angle - 3])
+    if name in _ROOT[3:]:
+        return -10.0, 10.0
+    return -2.0 * np.pi, 2.0 * np.pi
 
 
 def _frame(parent: Element, name: str, of: str, at: Array, axes: Array) -> Element:

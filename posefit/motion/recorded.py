@@ -1,15 +1,16 @@
-"""The library of recorded motions: clips of ten people, so that no motion capture of your own is needed.
+"""The library of recorded motions: clips of ten people, so that you need no recordings.
 
-They walk, run, jump, turn, dance, fight, sweep the floor, and play animals. `docs/studies/make_library.py` made the
-file from clips of the CMU database: a clip keeps the poses between which the others can be interpolated, no joint more
-than about a centimetre off. The data used in this project was obtained from mocap.cs.cmu.edu. The database was created
-with funding from NSF EIA-0196217.
+The people walk, run, jump, turn, dance, fight, sweep the floor, and play animals.
+`docs/studies/make_library.py` made the file from clips of the CMU database. A clip
+keeps only the poses that interpolation needs to place every joint within about a
+centimetre. The data used in this project was obtained from mocap.cs.cmu.edu. The
+database was created with funding from NSF EIA-0196217.
 
     from posefit.motion import recorded
 
-    others = recorded.clips(without=("16",))     # of all people but 16; also recorded.named("library:-16")
+    others = recorded.clips(without=("16",))  # like recorded.named("library:-16")
     print(others[0].name, others[0].poses.shape, others[0].times[:4])
-    walk = recorded.clip("16_15").motion()       # as a motion of 30 frames a second
+    walk = recorded.clip("16_15").motion()  # a motion of 30 frames per second
 """
 
 import json
@@ -29,22 +30,30 @@ from posefit.motion.built_in import stored_skeleton
 from posefit.motion.motion import Motion
 from posefit.reading import quoted
 
-FPS = 30.0  # frames a second that the times of clips count
-LIBRARY = "library"  # the name of all clips where motions are named
-STEP = 0.001  # radians and metres: what a stored number is a whole multiple of
+FPS = 30.0  # frames per second that the times of clips count
+LIBRARY = "library"  # the name of all clips among the names of motions
+STEP = 0.001  # radians or metres: unit of the stored whole numbers
 _NAME = re.compile(r"\d+_\d+")
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedClip:
-    """Poses of one clip, in order, as many as it takes. Arrays cannot be written to."""
+    """The stored poses of one clip, in order. Arrays are read-only.
 
-    name: str  # such as 16_15: the subject and the clip
+    Attributes:
+        name: subject and clip, such as 16_15.
+        subject: the person.
+        skeleton: of the person.
+        poses: angles (K, 66) in radians.
+        translations: root joint (K, 3) in metres.
+        times: frames (K,) since the first pose, at 30 frames per second.
+    """
+
+    name: str
     subject: str
     skeleton: Skeleton = field(repr=False)
-    poses: Array = field(repr=False)  # (K, 66) radians
-    translations: Array = field(repr=False)  # (K, 3) metres
-    # (K,) frames since the first pose, at 30 frames a second
+    poses: Array = field(repr=False)
+    translations: Array = field(repr=False)
     times: NDArray[np.int64] = field(repr=False)
 
     def __len__(self) -> int:
@@ -52,22 +61,27 @@ class RecordedClip:
 
     @property
     def seconds(self) -> float:
-        """How long the clip is."""
+        """The clip's duration."""
         return float(self.times[-1]) / FPS
 
     def motion(self) -> Motion:
-        """Return the whole clip at 30 frames a second."""
+        """Return the whole clip at 30 frames per second."""
         poses, translations = self.at(np.arange(self.times[-1] + 1))
         return Motion(self.name, self.skeleton, poses, translations, FPS)
 
     def at(self, frames: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Return the poses (n, 66) and translations (n, 3) at frames since the first, at 30 frames a second.
+        """Return the poses (n, 66) and translations (n, 3) at some frames.
 
-        Angles and translations between the poses are interpolated; after the last, it is held.
+        Values between the stored poses are interpolated. After the last pose it is
+        held.
+
+        Args:
+            frames: frames (n,) since the first pose, at 30 frames per second.
         """
         frames = np.minimum(frames, self.times[-1])
+        second_last = max(len(self) - 2, 0)
         before = np.minimum(
-            np.searchsorted(self.times, frames, "right") - 1, max(len(self) - 2, 0)
+            np.searchsorted(self.times, frames, "right") - 1, second_last
         )
         after = np.minimum(before + 1, len(self) - 1)
         gap = np.maximum(self.times[after] - self.times[before], 1)
@@ -110,12 +124,12 @@ def _stored() -> dict[str, RecordedClip]:
 
 
 def subjects() -> tuple[str, ...]:
-    """Return the people of the library, numbered as in the CMU database."""
+    """Return the people of the library, with the CMU database's numbers."""
     return tuple(dict.fromkeys(clip.subject for clip in _stored().values()))
 
 
 def is_recorded(name: object) -> bool:
-    """Return whether a name is that of a recorded clip."""
+    """Return whether a name is a recorded clip's."""
     return (
         isinstance(name, str)
         and _NAME.fullmatch(name) is not None
@@ -124,10 +138,15 @@ def is_recorded(name: object) -> bool:
 
 
 def clip(name: str) -> RecordedClip:
-    """Return the clip of a name such as 16_15. Raises InputError where there is none."""
+    """Return the clip with a name such as 16_15.
+
+    Raises:
+        InputError: there is no such clip.
+    """
     if not is_recorded(name):
         raise InputError(
-            f"a recorded motion must be one that posefit motions lists, got {quoted(name)}"
+            "a recorded motion must be one that posefit motions lists, "
+            f"got {quoted(name)}"
         )
     return _stored()[name]
 
@@ -135,9 +154,14 @@ def clip(name: str) -> RecordedClip:
 def clips(
     only: Iterable[str] = (), without: Iterable[str] = ()
 ) -> Sequence[RecordedClip]:
-    """Return the clips of some people, or of all, but not of those `without`.
+    """Return the clips of some people.
 
-    Raises InputError where one of them is not in the library, or where no one is left.
+    Args:
+        only: the people, all by default.
+        without: people to leave out.
+
+    Raises:
+        InputError: a person is not in the library, or nobody is left.
     """
     people = subjects()
     only = tuple(only) or people
@@ -145,7 +169,8 @@ def clips(
     for subject in (*only, *without):
         if subject not in people:
             raise InputError(
-                f"a subject of the library must be one of {', '.join(people)}, got {quoted(subject)}"
+                f"a subject of the library must be one of {', '.join(people)}, "
+                f"got {quoted(subject)}"
             )
     chosen = [
         clip
@@ -158,20 +183,26 @@ def clips(
 
 
 def is_library(name: object) -> bool:
-    """Return whether a name is the library's, or that of some people of it."""
+    """Return whether a name is the library's, with or without people behind it."""
     return isinstance(name, str) and name.partition(":")[0] == LIBRARY
 
 
 def named(name: str) -> Sequence[RecordedClip]:
-    """Return the clips of `library`, of some people as in `library:02,16`, or of all but some as in `library:-16`.
+    """Return the clips that a name of the library means.
 
-    Raises InputError where one of them is not in the library, or where no one is left.
+    Args:
+        name: `library`; `library:02,16` for some people; `library:-16` for all but
+            some.
+
+    Raises:
+        InputError: a person is not in the library, or nobody is left.
     """
     _, colon, listed = name.partition(":")
     people = [person.strip() for person in listed.split(",")] if colon else []
     if not is_library(name) or "" in people or "-" in people:
         raise InputError(
-            f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}"
+            f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, "
+            f"got {quoted(name)}"
         )
     return clips(
         [name for name in people if name[0] != "-"],
@@ -180,7 +211,7 @@ def named(name: str) -> Sequence[RecordedClip]:
 
 
 def leaving_out(name: str, subjects: Iterable[str]) -> str:
-    """Return the name of the same library without some people."""
-    named(name)  # raises where it is none
+    """Return the library's name with more people left out."""
+    named(name)  # raises an error if the name is invalid
     people = [name.partition(":")[2], *(f"-{subject}" for subject in subjects)]
     return f"{LIBRARY}:{','.join(filter(None, people))}"

@@ -1,9 +1,11 @@
-"""A person's motion out of somebody else's skeleton: other names, rest poses, axes and joints than posefit's.
+"""Converts a person's motion from another skeleton: other names, rest, axes and joints.
 
-A rig is a tree whose nodes have places and turns in each frame. Each of posefit's bones goes with one node of it, and
-ends at a place that the node carries. Joint angles are counted from the pose of rest of the CMU database, upright, legs
-apart, arms out, palms down: how a node is turned there is read off the rig's own rest where that is a person's, or else
-off the frame that is most like it, each bone turned the shortest way from the one before.
+A rig is a tree whose nodes have places and turns in each frame. Each of posefit's bones
+is assigned to one node, and ends at a place that the node carries. Joint angles are
+counted from the rest pose of the CMU database: upright, legs apart, arms out, palms
+down. How a node is turned there is taken from the rig's own rest pose if that is a
+standing person, or else from the frame that is most like it. Each bone is then turned
+the shortest way.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -37,16 +39,16 @@ from posefit.geometry.skeleton import (
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.joint_names import Joints
 
-SAME_PLACE = 1e-4  # share of a leg within which two joints are at one point
-# degrees: a foot, a clavicle or a bone of the spine that is so near to CMU's rest stays
-# as it is
+SAME_PLACE = 1e-4  # share of a leg within which two joints are at the same point
+# degrees: a foot, a clavicle or a bone of the spine that is so near to CMU's rest is
+# kept as it is in the file
 AS_IN_FILE = 20.0
-SAME_DIRECTION = 0.5  # degrees: of other bones
-UPRIGHT = 60.0  # degrees that legs and trunk may be off in a pose of rest
-SQUARE = 25.0  # degrees: a root's axes that are so near to left, up and ahead are these
-STANDING = 0.7  # the mean cosine between legs, trunk and the axis that is up
-POSES = 2_000  # frames, the most that are searched for one like the pose of rest
-# radians: a turn about an axis that CMU's joints do not have, which is rounding
+SAME_DIRECTION = 0.5  # degrees: the same for other bones
+UPRIGHT = 60.0  # degrees that legs and trunk may be off in a rest pose
+SQUARE = 25.0  # degrees within which a root's axes are snapped to left, up and ahead
+STANDING = 0.7  # least mean cosine between legs, trunk and the axis that is up
+POSES = 2_000  # most frames that are searched for one like the rest pose
+# radians: a turn below this about an axis that CMU's joints lack is a rounding error
 UNUSED = 1e-5
 _ENDS_OF = {
     "hipjoint": "thigh",
@@ -56,38 +58,48 @@ _ENDS_OF = {
     "humerus": "forearm",
     "radius": "hand",
 }
-# the bone below a hinge, where its ends are, and which way it bends from rest
+# for the bone above a hinge: the joints of the bone below, and which way it bends
 _HINGES = {
     "femur": ("shin", "foot", (0.0, 0.0, -1.0)),
+    # an elbow bends forwards, and 30 degrees up
     "humerus": ("forearm", "hand", (0.0, 0.5, 0.75**0.5)),
-}  # an elbow bends 30 degrees up from forwards
-# the sine of 20 degrees, from which on a knee or an elbow shows about which axis it
-# bends
+}
+# sine of 20 degrees: a knee or an elbow that is bent more shows its axis
 BENT = 0.35
 _STEADY = ("femur", "tibia", "humerus", "radius", "wrist")
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """Which nodes are a person's joints, and where nodes are and how they are turned: at rest, and in the frames."""
+    """A tree with a person's joints, at rest and in motion.
 
-    names: Sequence[str]  # "" where a bone ends that no joint follows
+    Attributes:
+        names: of the nodes, "" for the end of a bone without a further joint.
+        parents: of the nodes, -1 for a root.
+        joints: which nodes are the person's joints.
+        rest: turns (nodes, 3, 3) and places (nodes, 3) at rest.
+        moving: turns (nodes, T, 3, 3) and places (nodes, T, 3) in the frames.
+    """
+
+    names: Sequence[str]
     parents: Sequence[int]
     joints: Joints
-    # turns (nodes, 3, 3) and places (nodes, 3)
     rest: tuple[Array, Array] = field(repr=False)
-    # turns (nodes, T, 3, 3) and places (nodes, T, 3)
     moving: tuple[Array, Array] = field(repr=False)
 
     def of(self, node: int) -> "_Bone":
-        """Return the bone that ends in a node: the one before it carries it."""
+        """Return the bone that ends in a node. The node's parent carries it."""
         return _Bone(self.parents[node], self.moving[1][node], self.rest[1][node])
 
     def ending(self, node: int, tip: Array | None, share: float = 1.0) -> "_Bone":
-        """Return the bone that ends in a point of a node, a share of the way to its tip (3,), if that is known."""
+        """Return the bone that ends in a point of a node.
+
+        The point is a share of the way to the node's tip (3,), if that is known.
+        """
         if tip is None:
             return _Bone(node)
-        (turns, places), (rest_turns, rest_places) = self.moving, self.rest
+        turns, places = self.moving
+        rest_turns, rest_places = self.rest
         at = share * tip
         return _Bone(
             node,
@@ -96,9 +108,10 @@ class Rig:
         )
 
     def tip(self, node: int, least: float) -> Array | None:
-        """Return where a node's bone ends, in the node; None where nothing is so far off.
+        """Return where a node's bone ends, in the node, or None if nothing is far off.
 
-        That is at its farthest End Site, or else at the farthest node that hangs from it.
+        The end is the node's farthest End Site, or else the farthest child. `least` is
+        how far off it must be.
         """
         children = [
             child for child, parent in enumerate(self.parents) if parent == node
@@ -106,40 +119,51 @@ class Rig:
         turns, places = self.rest
         ends = [child for child in children if not self.names[child]] or children
         tips = [turns[node].T @ (places[end] - places[node]) for end in ends]
-        best = max(tips, key=lambda end: float(np.linalg.norm(end)), default=None)
-        return (
-            best if best is not None and float(np.linalg.norm(best)) > least else None
+        best: Array | None = max(
+            tips, key=lambda end: float(np.linalg.norm(end)), default=None
         )
+        if best is None or not float(np.linalg.norm(best)) > least:
+            return None
+        return best
 
     def length(self, side: str) -> float:
-        """Return how long a leg is."""
+        """Return the mean length of a leg."""
         places = self.moving[1]
         thigh, shin, foot = (
             places[self.joints.limbs[side, joint]]
             for joint in ("thigh", "shin", "foot")
         )
-        return float(
-            (
-                np.linalg.norm(shin - thigh, axis=1)
-                + np.linalg.norm(foot - shin, axis=1)
-            ).mean()
-        )
+        lengths = np.linalg.norm(shin - thigh, axis=1)  # (T,)
+        lengths = lengths + np.linalg.norm(foot - shin, axis=1)
+        return float(lengths.mean())
 
 
 @dataclass(frozen=True, eq=False)
 class Retargeted:
-    """A rig's motion of a `Skeleton`, in the rig's unit."""
+    """A rig's motion, converted to a `Skeleton`, in the rig's unit.
+
+    Attributes:
+        skeleton: with the rig's bones.
+        poses: angles (T, 66).
+        places: root joint (T, 3).
+        filled: names of the bones that the rig does not have.
+        off: greatest distance of a joint from its place in the rig.
+    """
 
     skeleton: Skeleton
-    poses: Array = field(repr=False)  # (T, 66)
-    places: Array = field(repr=False)  # (T, 3)
-    filled: Sequence[str]  # bones that the rig does not have
-    off: float  # the farthest that a joint is from its place in the rig
+    poses: Array = field(repr=False)
+    places: Array = field(repr=False)
+    filled: Sequence[str]
+    off: float
 
 
 @dataclass(frozen=True, eq=False)
 class _Bone:
-    """Which node carries a bone's end, and where that is: in the frames (T, 3) and at rest; None where unknown."""
+    """The node that carries a bone's end, and the end's place.
+
+    `at` is the place in the frames (T, 3), `rest` the place at rest (3,); None if it is
+    unknown.
+    """
 
     node: int
     at: Array | None = None
@@ -147,9 +171,10 @@ class _Bone:
 
     @classmethod
     def between(cls, node: int, start: "_Bone", end: "_Bone", share: float) -> Self:
-        """Return the bone that a node carries, and that ends at a share of the way between the ends of two others.
+        """Return the bone that a node carries, with an end between those of two others.
 
-        Where these are unknown, so is its own.
+        The end is a share of the way from the first to the second. If these are
+        unknown, it is unknown, too.
         """
         if start.at is None or start.rest is None or end.at is None or end.rest is None:
             return cls(node)
@@ -160,15 +185,22 @@ class _Bone:
 
 
 class _Rest(NamedTuple):
-    """The pose of a rig that stands for CMU's rest."""
+    """The pose of a rig that corresponds to CMU's rest.
 
-    own: bool  # whether it is the rig's own
-    turns: Array  # (nodes, 3, 3)
-    places: Array  # (nodes, 3)
-    root: Array  # (3, 3) left, up and ahead, in the root's node
+    Attributes:
+        own: whether it is the rig's own rest pose.
+        turns: of the nodes (nodes, 3, 3).
+        places: of the nodes (nodes, 3).
+        root: left, up and ahead as columns (3, 3), in the root's node.
+    """
+
+    own: bool
+    turns: Array
+    places: Array
+    root: Array
 
     def end_of(self, rig: Rig, bone: _Bone) -> Array | None:
-        """Return where a bone ends in this pose."""
+        """Return where a bone ends in this pose, or None if that is unknown."""
         if bone.rest is None:
             return None
         carried = rig.rest[0][bone.node].T @ (bone.rest - rig.rest[1][bone.node])
@@ -176,19 +208,24 @@ class _Rest(NamedTuple):
 
 
 def retargeted(rig: Rig, up: Array) -> Retargeted:
-    """Return a rig's motion of a skeleton with its bones; `up` (3, 3) turns the world so that y is up.
+    """Return a rig's motion on a skeleton with its bones.
 
-    Raises InputError where the rig's legs have no length.
+    Args:
+        rig: the rig.
+        up: turn (3, 3) of the world after which y is up.
+
+    Raises:
+        InputError: the rig's legs have no length.
     """
     average = average_skeleton()
     hips = rig.joints.hips
     turns = up @ rig.moving[0]
     places = rig.moving[1] @ up.T
     rig = replace(rig, moving=(turns, places))
-    leg = average.lengths[[BONES.index("lfemur"), BONES.index("ltibia")]].sum()
-    scale = float(np.mean([rig.length(side) for side in ("left", "right")])) / float(
-        leg
-    )
+    thigh_and_shin = [BONES.index("lfemur"), BONES.index("ltibia")]
+    average_leg = float(average.lengths[thigh_and_shin].sum())
+    legs = [rig.length(side) for side in ("left", "right")]
+    scale = float(np.mean(legs)) / average_leg
     if not scale > 0.0:
         raise InputError("legs with a length, got some without")
     bones = _bones(rig, scale)
@@ -199,7 +236,8 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     poses = np.zeros((count, ANGLES))
     world = np.empty((len(JOINTS), count, 3, 3))
     at = np.empty((len(JOINTS), count, 3))
-    world[0], at[0] = turns[hips] @ rest.root, places[hips]
+    world[0] = turns[hips] @ rest.root
+    at[0] = places[hips]
     poses[:, :3] = root_angles_from_rotation(world[0])
     for joint, bone in enumerate(bones, 1):
         above = PARENTS[joint]
@@ -208,32 +246,25 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
         if joint in ENDS:
             world[joint] = world[above]
         else:
-            carrier = turns[bone.node] @ (
-                rest.turns[bone.node].T @ rest.turns[hips] @ rest.root @ turned[joint]
-            )
+            at_rest = rest.turns[bone.node].T @ rest.turns[hips]  # (3, 3)
+            carrier = turns[bone.node] @ (at_rest @ rest.root @ turned[joint])
             if bone.at is not None and length > 0.0:
-                length = _aim(
-                    carrier, direction, length, bone.at - at[above], 1e-7 * scale
-                )
+                reach = bone.at - at[above]  # (T, 3)
+                length = _aim(carrier, direction, length, reach, 1e-7 * scale)
             world[joint] = carrier
             axes = average.axes[joint - 1]
             start = angle_index(joint)
             local = np.swapaxes(world[above], -1, -2) @ carrier
-            poses[:, start : start + 3] = joint_angles_from_rotation(
-                axes.T @ local @ axes
-            )
+            angles = joint_angles_from_rotation(axes.T @ local @ axes)
+            poses[:, start : start + 3] = angles
         offsets[joint - 1] = direction * length if length else np.zeros(3)
         at[joint] = at[above] + world[joint] @ offsets[joint - 1]
     skeleton = _skeleton(offsets, poses, average)
-    ends = [
-        (bone.at, at[joint])
-        for joint, bone in enumerate(bones, 1)
-        if bone.at is not None and joint not in ENDS
-    ]
-    missed = max(
-        (float(np.linalg.norm(end - place, axis=1).max()) for end, place in ends),
-        default=0.0,
-    )
+    missed = 0.0
+    for joint, bone in enumerate(bones, 1):
+        if bone.at is not None and joint not in ENDS:
+            distances = np.linalg.norm(bone.at - at[joint], axis=1)
+            missed = max(missed, float(distances.max()))
     filled = [BONES[k] for k, bone in enumerate(bones) if bone.at is None]
     return Retargeted(
         skeleton,
@@ -247,11 +278,12 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
 def _bones_at_rest(
     rig: Rig, bones: Sequence[_Bone], rest: _Rest, scale: float
 ) -> tuple[Array, Array, Array]:
-    """Return how joints turn (27, 3, 3) from CMU's rest to the rig's, and bones' directions (26, 3) and lengths (26,).
+    """Return turns (27, 3, 3), directions (26, 3) and lengths (26,) of bones at rest.
 
-    A bone that the rig lacks is an average person's, `scale` times as long.
+    The turns lead from CMU's rest to the rig's. A bone that the rig lacks is an average
+    person's, `scale` times as long.
     """
-    # the root's, where its angles are 0
+    # orientation of the root, for which its angles are 0
     frame = rest.turns[rig.joints.hips] @ rest.root
     turned = np.tile(np.eye(3), (len(JOINTS), 1, 1))
     at = np.zeros((len(JOINTS), 3))
@@ -263,12 +295,16 @@ def _bones_at_rest(
         expected = scale * average_skeleton().offsets[joint - 1]
         before = turned[above]
         end = rest.end_of(rig, bone)
-        vector = expected if end is None else before.T @ frame.T @ (end - at[above])
-        at[joint] = at[above] + frame @ before @ vector if end is None else end
+        if end is None:
+            vector = expected
+            at[joint] = at[above] + frame @ before @ vector
+        else:
+            vector = before.T @ frame.T @ (end - at[above])
+            at[joint] = end
         if joint in ENDS:
             begin = bones[above - 1].rest
             node = bones[above - 1].node
-            # without the end's own turn
+            # an end's own turn is left out: posefit's ends do not turn
             if bone.rest is not None and begin is not None:
                 vector = (
                     before.T
@@ -280,45 +316,51 @@ def _bones_at_rest(
             directions[joint - 1] = vector
             continue
         length = float(np.linalg.norm(vector))
-        off = (
-            np.degrees(geodesic(np.eye(3), shortest_turn(expected, vector)))
-            if length > 0.0
-            else 0.0
-        )
-        aligned = off > (SAME_DIRECTION if name[1:] in _STEADY else AS_IN_FILE)
-        aligned = aligned and not name.endswith("hipjoint")  # which does not turn
+        off = 0.0
+        if length > 0.0:
+            turn = shortest_turn(expected, vector)
+            off = float(np.degrees(geodesic(np.eye(3), turn)))
+        tolerance = SAME_DIRECTION if name[1:] in _STEADY else AS_IN_FILE
+        # a hip bone does not turn
+        aligned = off > tolerance and not name.endswith("hipjoint")
         turned[joint] = before @ shortest_turn(expected, vector) if aligned else before
         if not rest.own and name[1:] in _HINGES:
             turned[joint] = turned[joint] @ _twist(
                 rig, name, bone, turned[joint].T @ frame.T @ rest.turns[bone.node]
             )
         direction = expected if aligned or not length else vector
-        directions[joint - 1], lengths[joint - 1] = (
-            direction / np.linalg.norm(direction),
-            length,
-        )
+        directions[joint - 1] = direction / np.linalg.norm(direction)
+        lengths[joint - 1] = length
     return turned, directions, lengths
 
 
 def _aim(
     carrier: Array, direction: Array, length: float, reach: Array, near: float
 ) -> float:
-    """Turn a carrier (T, 3, 3) so that a direction (3,) in it points along `reach` (T, 3); return the bone's length."""
+    """Turn a carrier (T, 3, 3) so that a bone reaches its end; return its length.
+
+    Args:
+        carrier: turned in place.
+        direction: of the bone in the carrier (3,).
+        length: of the bone.
+        reach: from the bone's start to its wanted end (T, 3).
+        near: distance below which nothing is changed.
+    """
     distances = np.linalg.norm(reach, axis=1)
     pointing = carrier @ direction
-    aim = np.flatnonzero(
-        np.linalg.norm(reach - pointing * distances[:, None], axis=1) > near
-    )
+    missed = np.linalg.norm(reach - pointing * distances[:, None], axis=1)  # (T,)
+    aim = np.flatnonzero(missed > near)
     carrier[aim] = shortest_turn(pointing[aim], reach[aim]) @ carrier[aim]
-    return (
-        length if np.abs(distances - length).max() < near else float(distances.mean())
-    )
+    if np.abs(distances - length).max() < near:
+        return length
+    return float(distances.mean())
 
 
 def _twist(rig: Rig, name: str, bone: _Bone, frame: Array) -> Array:
-    """Return by which turn (3, 3) about a thigh or an upper arm its knee or elbow bends the way that people's do.
+    """Return the turn (3, 3) about a thigh or an upper arm that sets its hinge right.
 
-    `frame` (3, 3) takes what is counted in the bone's node to posefit's rest.
+    With it knee and elbow bend the way that people's do. `frame` (3, 3) leads from the
+    bone's node to posefit's rest.
     """
     side = "left" if name[0] == "l" else "right"
     start, end, way = _HINGES[name[1:]]
@@ -333,15 +375,18 @@ def _twist(rig: Rig, name: str, bone: _Bone, frame: Array) -> Array:
     if not np.linalg.norm(mean) > 0.0:
         return np.eye(3)
     wanted = np.array(way) - (along @ way) * along
-    # about the bone, from where it bends
+    # angle about the bone from the way it bends to the way it should
     angle = np.arctan2(np.cross(mean, wanted) @ along, mean @ wanted)
     axes = along_y(along)
     return np.asarray(axes @ rotation_about(1, -angle) @ axes.T)
 
 
 def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
-    """Return the skeleton whose joints have the freedom of CMU's; those that turn further have all."""
-    # (66,) about axes about which CMU's do not turn
+    """Return the skeleton with the rig's bones and the free axes of CMU's.
+
+    A joint that turns about another axis, too, gets all three.
+    """
+    # (66,) whether there is a turn about an axis that CMU's joints lack
     beyond = (np.abs(poses) > UNUSED).any(axis=0) & ~average.free
     used = {
         BONES[joint - 1] for joint in INNER if beyond[angle_index(joint) :][:3].any()
@@ -358,20 +403,18 @@ def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
 
 
 def _bones(rig: Rig, scale: float) -> list[_Bone]:
-    """Return for each of posefit's bones (26) the node that carries its end."""
+    """Return the bones (26), each with the node that carries its end."""
     average = dict(zip(BONES, scale * average_skeleton().lengths, strict=True))
     chest = _chest(rig)
     bones = _spine(rig, chest) | _neck_and_head(rig, chest, average)
     for side in ("left", "right"):
-        bones |= {
-            f"{side[0]}{bone}": carrier
-            for bone, carrier in _limbs(rig, side, average).items()
-        }
+        for bone, carrier in _limbs(rig, side, average).items():
+            bones[f"{side[0]}{bone}"] = carrier
     return [bones[name] for name in BONES]
 
 
 def _chest(rig: Rig) -> _Bone:
-    """Return the bone that ends where the neck begins, or else in the middle between the shoulders."""
+    """Return the bone that ends at the base of the neck, or between the shoulders."""
     joints = rig.joints
     limbs = rig.joints.limbs
     if joints.neck:
@@ -387,22 +430,24 @@ def _chest(rig: Rig) -> _Bone:
 def _neck_and_head(
     rig: Rig, chest: _Bone, average: Mapping[str, float]
 ) -> dict[str, _Bone]:
-    """Return the two bones of the neck and the head's; `average` has the lengths of an average person's bones."""
+    """Return the two bones of the neck and the head's bone.
+
+    `average` has the lengths of an average person's bones.
+    """
     joints = rig.joints
     necks = [
         rig.of(node) for node in (*joints.neck[1:], joints.head) if node is not None
     ]
     last = (joints.chest, *joints.neck)[-1] if joints.head is None else joints.head
-    tip = (
-        rig.tip(last, 0.3 * (average["upperneck"] + average["head"]))
-        if joints.neck or necks
-        else None
-    )
+    tip = None
+    if joints.neck or necks:
+        tip = rig.tip(last, 0.3 * (average["upperneck"] + average["head"]))
     crown = rig.ending(last, tip)
     if len(necks) > 1:
         lower = necks[0]
         upper = necks[-1]
-    elif necks:  # the skull is two of posefit's bones, and turns as the head does
+    elif necks:
+        # the skull is two of posefit's bones, which turn with the head
         lower = necks[0]
         upper = _Bone.between(last, necks[0], crown, 0.5)
     else:
@@ -413,7 +458,7 @@ def _neck_and_head(
 
 
 def _limbs(rig: Rig, side: str, average: Mapping[str, float]) -> dict[str, _Bone]:
-    """Return the bones of a side's leg and arm by their kind, such as `femur`."""
+    """Return the bones of a side's leg and arm, by kinds such as `femur`."""
     limbs = rig.joints.limbs
     bones = {bone: rig.of(limbs[side, end]) for bone, end in _ENDS_OF.items()}
     foot = limbs[side, "foot"]
@@ -439,7 +484,10 @@ def _limbs(rig: Rig, side: str, average: Mapping[str, float]) -> dict[str, _Bone
 
 
 def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
-    """Return the three bones of the spine, whatever joints it has; of more of them, those of the steadiest lengths."""
+    """Return the three bones of the spine, whatever joints it has.
+
+    Of more than three joints the two with the steadiest distances are taken.
+    """
     joints = rig.joints
     root = _Bone(joints.hips, rig.moving[1][joints.hips], rig.rest[1][joints.hips])
     near = SAME_PLACE * rig.length("left")
@@ -460,18 +508,20 @@ def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
 
         def unsteadiness(pair: Iterable[_Bone]) -> tuple[float, float]:
             ends = np.array([root.at, *(bone.at for bone in pair), chest.at])
-            lengths = np.linalg.norm(np.diff(ends, axis=0), axis=2)
+            lengths = np.linalg.norm(np.diff(ends, axis=0), axis=2)  # (3, T)
             mean = lengths.mean(axis=1)
-            return round(
-                float(lengths.std(axis=1).sum() / max(mean.sum(), 1e-300)), 6
-            ), float(mean.std())
+            spread = float(lengths.std(axis=1).sum() / max(mean.sum(), 1e-300))
+            return round(spread, 6), float(mean.std())
 
         chain = list(min(combinations(chain, 2), key=unsteadiness))
     return dict(zip(("lowerback", "upperback", "thorax"), [*chain, chest], strict=True))
 
 
 def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> _Rest:
-    """Return the pose that stands for CMU's rest: the rig's own where its legs hang down, or the frame most like it."""
+    """Return the pose of a rig that corresponds to CMU's rest.
+
+    It is the rig's own if its legs hang down, or else the frame that is most like it.
+    """
     chest = bones[BONES.index("thorax")]
     hips = rig.joints.hips
     thighs = [rig.joints.limbs[side, "thigh"] for side in ("left", "right")]
@@ -479,30 +529,24 @@ def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> _Rest:
 
     def pose(own: bool, turns: Array, places: Array) -> _Rest:
         end = _Rest(own, turns, places, np.eye(3)).end_of(rig, chest)
-        local = turns[hips].T
-        above = (places[hips] if end is None else end) - places[thighs].mean(axis=0)
-        return _Rest(
-            own,
-            turns,
-            places,
-            _squared(local @ (places[thighs[0]] - places[thighs[1]]), local @ above),
-        )
+        to_root = turns[hips].T
+        top = places[hips] if end is None else end
+        above = top - places[thighs].mean(axis=0)
+        left = places[thighs[0]] - places[thighs[1]]
+        root = _squared(to_root @ left, to_root @ above)
+        return _Rest(own, turns, places, root)
 
     def degrees_off(pose: _Rest, parts: Sequence[tuple[str, str, str]]) -> Array:
         frame = pose.turns[hips] @ pose.root
         off = []
         for side in ("left", "right"):
             for start, stop, kind in parts:
-                first, last = (
-                    pose.places[rig.joints.limbs[side, joint]]
-                    for joint in (start, stop)
-                )
+                limbs = rig.joints.limbs
+                first = pose.places[limbs[side, start]]
+                last = pose.places[limbs[side, stop]]
                 expected = average.offsets[BONES.index(f"{side[0]}{kind}")]
-                off.append(
-                    geodesic(
-                        np.eye(3), shortest_turn(expected, frame.T @ (last - first))
-                    )
-                )
+                turn = shortest_turn(expected, frame.T @ (last - first))
+                off.append(geodesic(np.eye(3), turn))
         return np.degrees(np.array(off))
 
     legs = (("thigh", "shin", "femur"), ("shin", "foot", "tibia"))
@@ -516,16 +560,18 @@ def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> _Rest:
         own,
         *(pose(False, rig.moving[0][:, k], rig.moving[1][:, k]) for k in frames),
     ]
-    off = [
-        (degrees_off(each, legs) ** 2).sum()
-        + (0.5 * degrees_off(each, arms) ** 2).sum()
-        for each in poses
-    ]
+    off = []
+    for each in poses:
+        of_legs = (degrees_off(each, legs) ** 2).sum()
+        off.append(of_legs + (0.5 * degrees_off(each, arms) ** 2).sum())
     return poses[int(np.argmin(off))]
 
 
 def _squared(left: Array, above: Array) -> Array:
-    """Return axes (3, 3), left, up and ahead, by directions (3,): axes of the coordinates where these are near."""
+    """Return left, up and ahead as columns (3, 3), from two directions (3,).
+
+    If they are near the axes of the coordinates, these are returned.
+    """
     if not np.linalg.norm(left) > 0.0:
         left = np.array([1.0, 0.0, 0.0])
     x = left / np.linalg.norm(left)
@@ -535,15 +581,17 @@ def _squared(left: Array, above: Array) -> Array:
     y = y / np.linalg.norm(y)
     axes = np.column_stack([x, y, np.cross(x, y)])
     near = np.zeros((3, 3))
-    near[np.abs(axes).argmax(axis=0), range(3)] = np.sign(
-        axes[np.abs(axes).argmax(axis=0), range(3)]
-    )
+    largest = np.abs(axes).argmax(axis=0)  # (3,)
+    near[largest, range(3)] = np.sign(axes[largest, range(3)])
     square = abs(np.linalg.det(near) - 1.0) < 1e-9
     return near if square and np.degrees(geodesic(axes, near)) <= SQUARE else axes
 
 
 def upward(rig: Rig) -> tuple[int, float]:
-    """Return which axis of the world, 0 to 2, legs and trunk mostly point up along, and how: -1 is straight down."""
+    """Return the world's axis that legs and trunk point up along, and their cosine.
+
+    The axis is 0 to 2. The cosine is that of the worst limb: -1 is straight down.
+    """
     places = rig.moving[1]
     limbs = rig.joints.limbs
     thighs, shins, feet, arms = (
@@ -552,13 +600,9 @@ def upward(rig: Rig) -> tuple[int, float]:
     )
     along = []
     for low, high in ((shins, thighs), (feet, shins), (thighs, arms)):
-        vectors = high - low
-        along.append(
-            (
-                vectors
-                / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
-            ).mean(axis=0)
-        )
+        vectors = high - low  # (T, 3)
+        lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+        along.append((vectors / np.maximum(lengths, 1e-300)).mean(axis=0))
     directions = np.array(along)
     axis = int(np.abs(directions.mean(axis=0)).argmax())
     sign = np.sign(directions.mean(axis=0)[axis])

@@ -1,4 +1,7 @@
-"""How steady a motion is: how its joints accelerate, and how far feet slide while they stand. Joints are (T, 27, 3)."""
+"""How steady a motion is: acceleration of joints, and sliding of feet on the ground.
+
+Joints have shape (T, 27, 3).
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,37 +9,37 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 
-# a second: the rate at which places are compared, so that jitter counts the same at any
-# frame rate
+# rate in Hz at which places are compared: jitter counts the same at any frame rate
 PACE = 30.0
-# of the feet, which stay where they are while a foot rolls off
+# joints of the feet that stay where they are while a foot rolls off
 BALLS = JOINTS.index("lfoot"), JOINTS.index("rfoot")
 MAX_STANDING_HEIGHT = 0.05  # metres above the lowest place of either foot
-MAX_STANDING_SPEED = 0.2  # metres a second
-# about a frame, for that lowest place: the ground may rise, and depth may drift
+MAX_STANDING_SPEED = 0.2  # metres per second
+# time window for that lowest place: the ground may rise, and depth may drift
 WINDOW_SECONDS = 2.0
 MIN_STANDING_SECONDS = 0.1
 
 
 def acceleration(joints: Array, fps: float) -> Array:
-    """Return how fast joints accelerate (T,), the mean over them, in m/s2; NaN at both ends.
+    """Return the mean acceleration of the joints (T,) in m/s2; NaN at both ends.
 
-    It is the second difference of their places in the world, over a thirtieth of a second each.
+    It is the second difference of their places in the world, with steps of a thirtieth
+    of a second.
     """
     step = max(round(fps / PACE), 1)
     accelerations = np.full(len(joints), np.nan)
     if len(joints) > 2 * step:
         change = joints[2 * step :] - 2.0 * joints[step:-step] + joints[: -2 * step]
-        accelerations[step:-step] = (
-            np.linalg.norm(change, axis=2).mean(axis=1) * (fps / step) ** 2
-        )
+        sizes = np.linalg.norm(change, axis=2).mean(axis=1)  # (T - 2 step,)
+        accelerations[step:-step] = sizes * (fps / step) ** 2
     return accelerations
 
 
 def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
-    """Return whether the left and the right foot stand (T, 2): low and slow, for a tenth of a second at least.
+    """Return whether the left and the right foot stand (T, 2).
 
-    y is up. A foot is as low as 5 cm above the lowest place of the two within a second.
+    A foot stands if it is slow and low for at least a tenth of a second. It is low if
+    it is less than 5 cm above the lowest place of both feet within a second. y is up.
     """
     feet = joints[:, BALLS]
     step = max(round(fps / PACE), 1)
@@ -46,14 +49,10 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
     around = np.arange(len(feet))
     before = np.maximum(around - half, 0)
     after = np.minimum(around + half, len(feet) - 1)
-    speed = (
-        np.linalg.norm(feet[after] - feet[before], axis=2)
-        * fps
-        / (after - before)[:, None]
-    )
-    stands = (speed < MAX_STANDING_SPEED) & low(
-        feet, fps, WINDOW_SECONDS, MAX_STANDING_HEIGHT
-    )
+    distances = np.linalg.norm(feet[after] - feet[before], axis=2)  # (T, 2)
+    speed = distances * fps / (after - before)[:, None]
+    is_low = low(feet, fps, WINDOW_SECONDS, MAX_STANDING_HEIGHT)
+    stands = (speed < MAX_STANDING_SPEED) & is_low
     for side in range(2):
         for start, stop in runs(stands[:, side]):
             stands[start:stop, side] &= stop - start >= MIN_STANDING_SECONDS * fps
@@ -61,7 +60,15 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
 
 
 def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bool_]:
-    """Return whether feet (T, n, 3) are less than `height` above the lowest of all (T, n) in so many seconds around."""
+    """Return whether feet (T, n, 3) are low (T, n).
+
+    Args:
+        feet: the feet's places.
+        fps: frames per second.
+        seconds: time window, half of it before and half after each frame.
+        height: a foot is low if it is less than this above the lowest of all feet in
+            the window, in metres.
+    """
     reach = max(round(0.5 * seconds * fps), 1)
     lowest = np.array(
         [feet[max(k - reach, 0) : k + reach + 1, :, 1].min() for k in range(len(feet))]
@@ -70,9 +77,14 @@ def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bo
 
 
 def slides(joints: Array, stands: NDArray[np.bool_]) -> Array:
-    """Return how far a foot slides along the ground from where it first stood (steps,), in metres, step by step.
+    """Return how far a foot slides along the ground in each step (steps,), in metres.
 
-    `stands` (T, 2) is whether the left and the right foot stand: those of `standing`, or of another motion.
+    A slide is the greatest distance from where the foot first stood.
+
+    Args:
+        joints: the joints.
+        stands: whether the left and the right foot stand (T, 2), by `standing`, maybe
+            of another motion.
     """
     slides = []
     for side, ball in enumerate(BALLS):
@@ -83,8 +95,7 @@ def slides(joints: Array, stands: NDArray[np.bool_]) -> Array:
 
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first frame of each run of true flags (T,), and the frame after its last."""
-    edges = np.flatnonzero(
-        np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8))
-    )
+    """Return the start and stop of each run of true flags (T,)."""
+    padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
+    edges = np.flatnonzero(np.diff(padded))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]

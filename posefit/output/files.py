@@ -1,9 +1,9 @@
-"""The files of a track: a format is a line of `write_files`, beside the pictures, which are made frame by frame."""
+"""The files of a track: a format is a line of `WRITERS`; pictures are made frame by frame, after everything else."""
 
 import csv
 import errno
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.evaluation.errors import FRAME
 from posefit.files import opencv_name
 from posefit.footage.scene import Scene
@@ -30,7 +31,7 @@ from posefit.output.page.content import track_data
 from posefit.output.page.stills import Stills
 from posefit.output.picture import Painter
 from posefit.output.text import undetermined
-from posefit.reading import cut
+from posefit.reading import cut, quoted, suggestion
 from posefit.silhouette.foreground import Image
 
 _Made = TypeVar("_Made")
@@ -71,90 +72,162 @@ def _cell(name: str, value: Any) -> Any:
 
 
 VIDEO = "overlay.mp4"
-FILES = (
-    "poses.npz", "skeleton.asf", "track.amc", "track.bvh", "track.glb", "track.trc", "track.c3d", "track.mot",
-    "model.osim", "frames.csv", "angles.csv", "gait.csv", "camera.json", "summary.json",
-    VIDEO, "summary.png", "track.html",
-)  # fmt: skip
+Write = Callable[[Path, Content], None]
+# What a file is called where a user chooses some, its name, and what writes it; pictures are made frame by frame. A
+# format joins by a line.
+WRITERS: Mapping[str, tuple[str, Write | None]] = {
+    "npz": ("poses.npz", _write_npz),
+    "asf": ("skeleton.asf", lambda path, track: write_asf(path, track.motion.skeleton)),
+    "amc": ("track.amc", lambda path, track: write_amc(path, track.motion)),
+    "bvh": ("track.bvh", lambda path, track: write_bvh(path, track.motion)),
+    "glb": (
+        "track.glb",
+        lambda path, track: write_glb(path, track.motion, track.scene.body.radii),
+    ),
+    "trc": (
+        "track.trc",
+        lambda path, track: write_trc(path, track.motion, track.blank),
+    ),
+    "c3d": (
+        "track.c3d",
+        lambda path, track: write_c3d(path, track.motion, track.blank, track.gait),
+    ),
+    "mot": ("track.mot", lambda path, track: write_mot(path, track.motion)),
+    "osim": (
+        "model.osim",
+        lambda path, track: write_osim(path, track.scene.body, PLACES),
+    ),
+    "frames": ("frames.csv", _write_table),
+    "angles": (
+        "angles.csv",
+        lambda path, track: write_angles(path, track.motion, track.blank),
+    ),
+    "gait": ("gait.csv", lambda path, track: write_gait(path, track.gait)),
+    "camera": (
+        "camera.json",
+        lambda path, track: _write_text(path, track.scene.cameras[0].to_json()),
+    ),
+    "summary": (
+        "summary.json",
+        lambda path, track: _write_text(
+            path, json.dumps(track.summary, indent=1) + "\n"
+        ),
+    ),
+    "mp4": (VIDEO, None),
+    "png": ("summary.png", None),
+    "html": ("track.html", None),
+}
+FILES = tuple(name for name, _ in WRITERS.values())
+# it says that a folder is a track's, and may be replaced by another
+ALWAYS = "summary"
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the kinds of files that a track writes, in the order of `WRITERS`.
+
+    Args:
+        write: Kinds such as `bvh`, or names of files such as `track.bvh`; a text may have several, with commas between.
+            None of them are all.
+
+    Returns:
+        Kinds; `summary` is among them.
+
+    Raises:
+        InputError: A kind is not known.
+
+    """
+    parts = [write] if isinstance(write, str) else list(write)
+    if not all(isinstance(part, str) for part in parts):
+        raise InputError(f"write must be names of files, got {quoted(write)}")
+    named = {file: kind for kind, (file, _) in WRITERS.items()}
+    words = [word.strip() for part in parts for word in part.split(",")]
+    kinds = {named.get(word, word) for word in words if word}
+    for kind in kinds:
+        if kind not in WRITERS:
+            hint = suggestion(kind, [*WRITERS, *named])
+            raise InputError(
+                f"write must be some of {', '.join(WRITERS)}, got {quoted(kind)}{hint}"
+            )
+    return tuple(kind for kind in WRITERS if not kinds or kind in kinds | {ALWAYS})
 
 
 class _Attempt:
-    """Makes a file that the poses do not depend on, step by step; after a step that fails it does nothing.
+    """Makes something that the poses do not depend on, step by step; after a step that fails it does nothing."""
 
-    A failure of the disk is raised, as it concerns every file.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self.warning = ""
+    def __init__(self, *, wanted: bool = True) -> None:
+        self._wanted = wanted
+        self.failure = ""  # of the step that failed
 
     def run(self, step: Callable[..., _Made], *arguments: Any) -> _Made | None:
-        """Return what a step returns, or None if it or an earlier one failed."""
-        if self.warning:
+        """Return what a step returns, or None if it or an earlier one failed, or nothing is wanted."""
+        if self.failure or not self._wanted:
             return None
         try:
             return step(*arguments)
-        except OSError:
-            raise
         except Exception as error:
-            words = cut(" ".join(str(error).split())) or type(error).__name__
-            self.warning = f"{self._path.name} is missing: {words}"
+            cause = error.strerror if isinstance(error, OSError) else str(error)
+            words = cut(" ".join((cause or "").split()))
+            self.failure = words or type(error).__name__
             return None
 
-    def finish(self) -> str:
-        """Return why the file is missing, empty where it is not; nothing half-written is left."""
-        if self.warning:
-            self._path.unlink(missing_ok=True)
-        return self.warning
+    def finish(self, path: Path) -> str:
+        """Return why a file is missing, empty where it is not; nothing half-written is left."""
+        if not self.failure:
+            return ""
+        path.unlink(missing_ok=True)
+        return f"{path.name} is missing: {self.failure}"
 
 
 def video_warning(folder: Path, scene: Scene) -> str:
     """Return why there will be no video of a scene's track, as far as writing one frame to the folder shows."""
     path = folder / VIDEO
     width, height = Painter(scene).size
-    attempt = _Attempt(path)
+    attempt = _Attempt()
     try:
         writer = attempt.run(VideoWriter, path, scene.fps, (width, height))
         attempt.run(_write_frame, writer, np.zeros((height, width, 3), np.uint8))
         attempt.run(VideoWriter.close, writer)
     finally:
         path.unlink(missing_ok=True)
-    return attempt.warning
+    return attempt.finish(path)
 
 
-def write_files(folder: Path, content: Content) -> list[str]:
-    """Write all `FILES` of a track to a folder, and return a warning for each picture that could not be made."""
-    scene = content.scene
-    motion = content.motion
-    blank = content.blank
-    _write_npz(folder / "poses.npz", content)
-    write_asf(folder / "skeleton.asf", motion.skeleton)
-    write_amc(folder / "track.amc", motion)
-    write_bvh(folder / "track.bvh", motion)
-    write_glb(folder / "track.glb", motion, scene.body.radii)
-    write_trc(folder / "track.trc", motion, blank)
-    write_c3d(folder / "track.c3d", motion, blank, content.gait)
-    write_mot(folder / "track.mot", motion)
-    write_osim(folder / "model.osim", scene.body, PLACES)
-    _write_table(folder / "frames.csv", content)
-    write_angles(folder / "angles.csv", motion, blank)
-    write_gait(folder / "gait.csv", content.gait)
-    (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
-    (folder / "summary.json").write_text(
-        json.dumps(content.summary, indent=1) + "\n", encoding="utf-8"
-    )
-    return _write_pictures(folder, content)
+def write_files(
+    folder: Path, content: Content, kinds: Sequence[str] = tuple(WRITERS)
+) -> list[str]:
+    """Write files of a track to a folder, the pictures last.
+
+    Args:
+        folder: That exists.
+        content: What the files are made of.
+        kinds: Of `chosen_kinds`.
+
+    Returns:
+        A warning for each picture that could not be made.
+
+    """
+    for kind in kinds:
+        name, write = WRITERS[kind]
+        if write is not None:
+            write(folder / name, content)
+    pictures = [kind for kind in kinds if WRITERS[kind][1] is None]
+    return _write_pictures(folder, content, pictures) if pictures else []
 
 
-def _write_pictures(folder: Path, content: Content) -> list[str]:
+def _write_pictures(folder: Path, content: Content, kinds: Sequence[str]) -> list[str]:
     """Write the video, the summary and the page in one pass through the footage; return a warning for each missing."""
     scene = content.scene
     table = content.table
     stills = Stills(scene)
     painter = Painter(scene, table["usable"] == 1.0)
-    video = _Attempt(folder / VIDEO)
-    summary = _Attempt(folder / "summary.png")
-    page = _Attempt(folder / "track.html")
+    video = _Attempt(wanted="mp4" in kinds)
+    summary = _Attempt(wanted="png" in kinds)
+    page = _Attempt(wanted="html" in kinds)
+    painting = _Attempt(wanted="mp4" in kinds or "png" in kinds)
     warnings: list[str] = []
     writer = video.run(VideoWriter, folder / VIDEO, scene.fps, painter.size)
     radii = content.intervals.get("joint_radii", repeat(None))
@@ -168,21 +241,25 @@ def _write_pictures(folder: Path, content: Content) -> list[str]:
     for k, (frame, observation, picture, spread) in enumerate(filmed):
         row = {name: float(values[k]) for name, values in table.items()}
         page.run(stills.add, frame, observation, picture)
-        image = summary.run(painter.add, frame, observation, row, picture, spread)
+        image = painting.run(painter.add, frame, observation, row, picture, spread)
         video.run(_write_frame, writer, image)
     video.run(VideoWriter.close, writer)
+    summary.failure = painting.failure
     notes = (
         "" if content.trust is None else content.trust.sentence,
         undetermined(content),
     )
     image = summary.run(painter.summary, table, [*filter(None, notes)])
-    if image is not None:
-        summary.run(_write_png, folder / "summary.png", image)
+    summary.run(_write_png, folder / "summary.png", image)
     document = page.run(lambda: track_document(track_data(content, stills)))
-    if document is not None:
-        path = folder / "track.html"
-        path.write_text(document, encoding="utf-8", newline="\n")
-    missing = [attempt.finish() for attempt in (video, summary, page)]
+    page.run(_write_page, folder / "track.html", document)
+    missing = [
+        attempt.finish(folder / WRITERS[kind][0])
+        for kind, attempt in zip(
+            ("mp4", "png", "html"), (video, summary, page), strict=True
+        )
+        if kind in kinds
+    ]
     return [*warnings, *filter(None, missing)]
 
 
@@ -195,6 +272,10 @@ def _write_frame(writer: VideoWriter, image: Image | None) -> None:
 def _write_png(path: Path, image: Image) -> None:
     if not cv2.imwrite(opencv_name(path), image):
         raise OSError(errno.ENOSPC, f"no room for {path.name}")
+
+
+def _write_page(path: Path, document: str) -> None:
+    path.write_text(document, encoding="utf-8", newline="\n")
 
 
 def page_of(content: Content) -> str:

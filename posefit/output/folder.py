@@ -5,7 +5,7 @@ early, because a disk is full or it is stopped, those frames are kept, and the s
 """
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,7 +15,7 @@ from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.output.content import Content
-from posefit.output.files import FILES, video_warning, write_files
+from posefit.output.files import FILES, WRITERS, video_warning, write_files
 from posefit.output.identity import Digest, difference
 from posefit.output.record import (
     append_frame,
@@ -63,7 +63,7 @@ class Recorder:
 class OutputFolder(Recorder):
     """Writes beside the target and renames at the end. Raises InputError where the target may not be written.
 
-    `spec` is what a track has to have in common with the one that it resumes.
+    `spec` is what a track has to have in common with the one that it resumes, and `kinds` are those of `chosen_kinds`.
     """
 
     def __init__(
@@ -73,8 +73,10 @@ class OutputFolder(Recorder):
         resume: bool,
         spec: Mapping[str, Digest],
         log: Callable[[str], None],
+        kinds: Sequence[str] = tuple(WRITERS),
     ) -> None:
         self.path, self._spec, self._log = Path(path), dict(spec), log
+        self._kinds = kinds
         self._recorded = 0
         self._slot = 0  # of the carried files, the one that is written next
         self._force = force
@@ -160,12 +162,14 @@ class OutputFolder(Recorder):
 
     def begin(self, scene: Scene) -> None:
         """Say before the work what of a scene's track cannot be written."""
+        if "mp4" not in self._kinds:
+            return
         if warning := video_warning(self.building, scene):
             self._log(f"{WARNING}{warning}")
 
     def finish(self, content: Content) -> None:
         """Write everything, but for pictures that cannot be made: the poses do not depend on them."""
-        for warning in write_files(self.building, content):
+        for warning in write_files(self.building, content, self._kinds):
             self._log(f"{WARNING}{warning}")
 
 

@@ -1,12 +1,13 @@
-"""Pages in one file without network requests: what the report and a track's page share.
+"""Pages in one file without network requests: the parts that all pages share.
 
 | looking for | file |
 |---|---|
-| markup, style, data and scripts as one document; JSON that is safe in it | document.py |
-| the head of every page, and its look: colours for light and dark, type, buttons, tables | head.html, base.css |
-| elements, and numbers in words | base.js |
-| charts: axes, curves, bands, texts; drawings that follow the width of their box | chart.js |
+| one document of markup, style, data and scripts; JSON for it | document.py |
+| head of every page; colours, type, buttons, tables | head.html, base.css |
+| elements, and numbers as text | base.js |
+| charts: axes, curves, bands, texts; drawings as wide as their box | chart.js |
 
-A page's scripts run as one, these first, and share the constant `D`: its data. Text reaches a page as
-text alone, never as markup. oxlint and oxfmt (`pip install 'posefit[dev]'`) check the scripts as `.ci/run` does.
+A page's scripts run as one script, these first, and share the page's data, the constant
+`D`. Text is inserted only as text, never as markup. oxlint and oxfmt (`pip install
+'posefit[dev]'`) check the scripts as `.ci/run` does.
 """

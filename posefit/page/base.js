@@ -1,4 +1,4 @@
-// What every page uses. Text reaches the page as text alone, never as markup.
+// Shared by all pages. Text is inserted only as text, never as markup.
 const D = JSON.parse(document.getElementById("data").textContent);
 const $ = (id) => document.getElementById(id);
 const given = (value) => value !== null && value !== undefined;
@@ -22,7 +22,7 @@ const counted = (count, noun) => `${whole(count)} ${noun}${count === 1 ? "" : "s
 const between = (low, high, value) => Math.max(low, Math.min(high, value));
 const range = (count) => Array.from({ length: count }, (_, k) => k);
 
-// A figure with its digits and without its unit, as D.columns has them.
+// A figure with the digits of its column and without its unit.
 function shownAs(name, value) {
   const { factor, digits } = D.columns[name];
   return given(value) && !digits ? whole(factor * value) : number(given(value) ? factor * value : null, digits);
@@ -34,7 +34,7 @@ function choose(select, names, chosen, act) {
   select.onchange = act;
 }
 
-// The facts in the box that opens, and the notes.
+// Fills the box of facts, the notes and the foot.
 function details({ facts, notes, version }) {
   $("facts").append(...facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
   $("notes").append(...notes.map((text) => make("p", { class: "note" }, text)));

@@ -2,7 +2,7 @@
 const redraws = [];
 const redraw = () => redraws.forEach((act) => act());
 
-// Draws into a box, again whenever its width changes.
+// Draws into a box, and again whenever its width changes.
 function drawn(box, picture) {
   let last = 0;
   const repaint = () => {
@@ -23,7 +23,7 @@ const END = { "text-anchor": "end", class: "soft" };
 const drawing = (width, height, name) =>
   draw("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": name });
 
-// Round values from low to high, about so many.
+// Round values from low to high, about `count` of them.
 function steps(low, high, count) {
   const rough = (high - low) / count || 1;
   const size = 10 ** Math.floor(Math.log10(rough));
@@ -31,8 +31,9 @@ function steps(low, high, count) {
   return range(Math.floor(high / step) - Math.ceil(low / step) + 1).map((k) => (Math.ceil(low / step) + k) * step);
 }
 
-// A chart with its axes, {from, to, marks, show, label}: an axis may be logarithmic, and that across may have rules
-// instead of ticks. Returns the drawing, and the functions from values to its pixels.
+// Draws a chart with its axes, {from, to, marks, show, label}. Either axis may be
+// logarithmic; the horizontal one may have rules instead of ticks. Returns the drawing,
+// and the functions from values to its pixels.
 function axes({ width, height, left, right, top, bottom, name }, x, y) {
   const svg = drawing(width, height, name);
   const [last, base] = [width - right, height - bottom];

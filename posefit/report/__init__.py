@@ -1,4 +1,4 @@
-r"""The report of a ledger: a page that any browser opens, figures for papers, rows for other tools.
+r"""The report of a ledger: a page for any browser, figures for papers, and tables.
 
     from posefit.report.leaderboard import contest_of, leaderboard
     from posefit.report.runs import runs_of
@@ -12,19 +12,20 @@ r"""The report of a ledger: a page that any browser opens, figures for papers, r
 
 | looking for | file |
 |---|---|
-| what the command does, in order, and what it refuses | write.py |
-| a table of runs, and what a kind of runs has to say of them | kind.py |
-| the rows of a ledger as that table | runs.py |
-| the two kinds: tracks, with the error with losses, and single searches | tracks.py, searches.py |
+| the steps of the command, and its checks | write.py |
+| the table of runs, and the protocol of a kind of runs | kind.py |
+| reading the rows of a ledger into that table | runs.py |
+| tracks, with the error with losses | tracks.py |
+| single searches | searches.py |
 | figures and the score: names, digits, averages, texts | columns.py |
-| the methods compared on the runs that they share; the leaderboard and its order | leaderboard.py |
+| the comparison on shared runs; the leaderboard and its order | leaderboard.py |
 | the leaderboard as printed lines, CSV and LaTeX | table.py |
 | charts of the page and for papers, as numbers | charts.py |
 | the sentences of the first screen | summary.py |
 | the data of the page | content.py |
 | the page: markup, style and scripts as one document | page/ |
 | charts by matplotlib, and the folder of a paper's figures | figures.py |
-| one row run again: `posefit rerun`, or a command that needs no ledger | repeat.py |
+| running a row again, with or without a ledger | repeat.py |
 
 Statistics are in `posefit.statistics`.
 """

@@ -1,4 +1,7 @@
-"""The charts of a report, for its page and for papers: lines of the methods of a contest. Those of tracks are here."""
+"""The charts of a report, for its page and for papers, with a line for each method.
+
+The charts of tracks are here. `posefit.report.searches` has the charts of searches.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +18,21 @@ from posefit.uncertainty.calibration import LEVELS
 
 POINTS = 41  # of a curve
 PROFILE = 200  # points of a performance profile
-# of intervals, as rows have them
+# the levels of intervals in percent, as they are named in rows
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A method's line: points from left to right, and the ends of their intervals, nan where unknown."""
+    """A method's line: points from left to right, with an interval of each.
+
+    Attributes:
+        x: Of each point (n,), rising.
+        y: Of each point (n,).
+        low: The lower ends of the intervals (n,), nan if unknown; None without
+            intervals.
+        high: The upper ends (n,).
+    """
 
     x: Array
     y: Array
@@ -31,23 +42,33 @@ class Line:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Chart:
-    """A chart with a line for each method that takes part, None for those without one. Lines are steps."""
+    """A chart with a line for each method that takes part. Lines are drawn as steps.
+
+    Attributes:
+        name: Its name, also of its file.
+        title: Its title on the page.
+        x_label: The label of the x axis.
+        y_label: The label of the y axis.
+        lines: The line of each method, or None for a method without one.
+        log: Whether x has a logarithmic scale.
+        most: The upper end of y, or None to fit it to the lines.
+    """
 
     name: str
     title: str
     x_label: str
     y_label: str
     lines: Sequence[Line | None]
-    log: bool = False  # the scale of x
-    most: float | None = None  # the end of y
+    log: bool = False
+    most: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what the page draws."""
+        """Return the data from which the page draws the chart."""
         return {**vars(self), "lines": [line and vars(line) for line in self.lines]}
 
 
 def track_charts(contest: Contest) -> list[Chart]:
-    """Return the charts of tracks: convergence, and how many runs are within an error."""
+    """Return the charts of tracks: convergence, and shares of runs within an error."""
     charts = []
     evaluations = grid(contest)
     if len(evaluations):
@@ -76,7 +97,10 @@ def track_charts(contest: Contest) -> list[Chart]:
 
 
 def grid(contest: Contest) -> Array:
-    """Return numbers of evaluations (up to 41,), evenly on a log scale, over all traces of a contest."""
+    """Return numbers of evaluations (up to 41,), spaced evenly on a log scale.
+
+    They span all traces of the contest.
+    """
     used = [used for used, _ in _traces(contest, contest.blocks) if len(used)]
     if not used:
         return np.empty(0)
@@ -86,9 +110,16 @@ def grid(contest: Contest) -> Array:
 
 
 def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
-    """Return each method's mean best cost after each number of evaluations, with its interval.
+    """Return each method's mean best cost after each number of evaluations.
 
-    It begins when all its runs have one, and ends when the last has ended; None if a run has no trace.
+    Args:
+        contest: The methods and the runs that they share.
+        evaluations: The numbers of evaluations (n,), rising.
+
+    Returns:
+        For each method a line with intervals, or None if one of its runs has no trace.
+        It begins where all of the method's runs have a cost, and ends where the last
+        run ends.
     """
 
     def line(rows: Array) -> Line | None:
@@ -100,20 +131,22 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         points = evaluations[(evaluations >= first) & (evaluations <= last)]
         if not len(points):
             return None
-        costs = np.array(
-            [
-                best[np.searchsorted(used, points, side="right") - 1]
-                for used, best in traces
-            ]
-        )
-        means = block_means(costs.T, contest.instance)
+        costs = []
+        for used, best in traces:
+            # the last improvement at or before each point
+            places = np.searchsorted(used, points, side="right") - 1
+            costs.append(best[places])
+        means = block_means(np.array(costs).T, contest.instance)  # of (points, runs)
         return Line(points, means.values, means.low, means.high)
 
     return [line(rows) for rows in contest.blocks]
 
 
 def joint_errors(contest: Contest) -> list[Intervals]:
-    """Return each method's mean of every joint's error (27,) in mm, with its interval."""
+    """Return each method's mean error of every joint (27,) in mm, with its interval.
+
+    The list is empty if a run lacks the error of a joint.
+    """
     joints = contest.runs.data["joint_errors"][contest.blocks]  # (methods, blocks, 27)
     if not np.isfinite(joints).all():
         return []
@@ -124,14 +157,22 @@ def joint_errors(contest: Contest) -> list[Intervals]:
 
 
 def certainty(contest: Contest) -> dict[str, Any] | None:
-    """Return the methods' uncertainty compared with the truth; None if no run has any.
+    """Return how well the methods' uncertainty agrees with the truth.
 
-    `levels` are those of intervals. `methods` has an entry for each method that takes part, None if its runs have no
-    uncertainty: at each level the `coverage` and the `width` in mm, plain means over its runs; and the expected
-    calibration error `ece` of its likeliest modes, by bins of their probability, None if no run has modes.
+    Args:
+        contest: The methods and the runs that they share.
+
+    Returns:
+        None if no run has an uncertainty. Otherwise `levels`, the levels of intervals,
+        and `methods` with an entry for each method, which is None if its runs have no
+        uncertainty. An entry has `coverage` and `width` (mm) at each level, as means
+        over the method's runs, and `ece`, the expected calibration error of its
+        likeliest modes by bins of their probability, which is None if no run has modes.
     """
     methods = [_certainty_of(contest, rows) for rows in contest.blocks]
-    return {"levels": list(LEVELS), "methods": methods} if any(methods) else None
+    if not any(methods):
+        return None
+    return {"levels": list(LEVELS), "methods": methods}
 
 
 def _certainty_of(contest: Contest, rows: Array) -> dict[str, Any] | None:

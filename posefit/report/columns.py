@@ -1,4 +1,4 @@
-"""The figures of a run that a report shows, and the one that methods are ordered by; their words."""
+"""The figures of a run in a report, the score that orders methods, and their texts."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -11,12 +11,15 @@ from posefit.arrays import Array
 from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 
-NAMED = 4  # names that a sentence lists; of more it gives the number
-_SYMBOLS = {"degrees": "°"}  # of units, where there is little room
+NAMED = 4  # the most names that a sentence lists; of others it gives the number
+_SYMBOLS = {"degrees": "°"}  # short forms of units, for titles of columns
 
 
 def average_by(function: Callable[[Array], Any]) -> Callable[[Array], float | None]:
-    """Return the function of finite values alone, None without any."""
+    """Return a function that applies another to the finite values of an array.
+
+    Its result is None if no value is finite.
+    """
 
     def average(values: Array) -> float | None:
         finite = values[np.isfinite(values)]
@@ -33,8 +36,16 @@ median = average_by(np.median)
 class Column:
     """A figure of a run.
 
-    Its name is the same in a row of a ledger, in the CSV, in the report's data and on the page: `coverage.80` is the
-    entry `80` of the row's `coverage`. A figure that no row has is computed from the row by `compute`.
+    Attributes:
+        name: Its name in a row of a ledger, in the CSV, in the report's data and on the
+            page. `coverage.80` is the entry `80` of the row's `coverage`.
+        measure: Its label, unit, digits and meaning.
+        compute: Computes it from a row, if rows do not have it.
+        higher_is_better: Whether a higher value is better.
+        in_tables: Whether tables show it.
+        optional: Whether tables show it only if some row has it. Only methods with an
+            uncertainty have such figures.
+        average: Returns the average of several runs.
     """
 
     name: str
@@ -42,12 +53,11 @@ class Column:
     compute: Callable[[Mapping[str, Any]], float] | None = None
     higher_is_better: bool = False
     in_tables: bool = True
-    # only methods with an uncertainty have it: tables show it if some row has it
     optional: bool = False
     average: Callable[[Array], float | None] = mean
 
     def value(self, row: Mapping[str, Any]) -> float:
-        """Return the figure of a row, nan if it has none."""
+        """Return the figure of a row, or nan if the row does not have it."""
         if self.compute is not None:
             return self.compute(row)
         value: Any = row
@@ -56,7 +66,7 @@ class Column:
         return math.nan if value is None else float(value)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what the page needs to show the figure."""
+        """Return the data with which the page shows the figure."""
         measure = self.measure
         symbol = _SYMBOLS.get(measure.unit, measure.unit)
         return {
@@ -70,18 +80,32 @@ class Column:
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """The figure by which methods are ordered, and the texts that depend on it."""
+    """The figure by which methods are ordered, and the texts that depend on it.
+
+    Attributes:
+        name: The figure's name.
+        title: The title of its column in a printed table.
+        axis: The label of its axis.
+        sentence: A part of a sentence, with `{}` for the value.
+        unit: The unit of its values.
+        points: The unit of differences between values.
+        digits: Its digits after the point.
+        down: Whether a higher value is better.
+        paired: What the tests pair, in the plural: runs or instances.
+        caption: The caption of the first figure.
+        leaderboard: The text above the leaderboard.
+    """
 
     name: str
-    title: str  # of its column in a printed table
+    title: str
     axis: str
-    sentence: str  # with a place for the value
+    sentence: str
     unit: str
-    points: str  # the unit of differences
+    points: str
     digits: int
-    down: bool  # more is better
-    paired: str  # what has differences
-    caption: str  # of the first figure
+    down: bool
+    paired: str
+    caption: str
     leaderboard: str
 
     def text(self, value: float) -> str:
@@ -98,19 +122,28 @@ class Score:
 
 
 def p_text(p: float) -> str:
-    """Return a p as a sentence has it: `p = 0.034`, or `p < 0.001`."""
+    """Return the text of a p, such as `p = 0.034` or `p < 0.001`."""
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
 def listed(values: Sequence[Any], most: int = NAMED) -> str:
-    """Return values as a list in a sentence, of many the first and how many others.
+    """Return values as a list in a sentence, such as `a, b and 3 others`.
 
-    Where they have commas themselves, semicolons separate them.
+    Semicolons separate values that contain commas.
+
+    Args:
+        values: The values.
+        most: The most items of the list, the number of others included.
+
+    Returns:
+        The text, empty without values.
     """
     texts = [*map(str, values)]
     if len(texts) > most:
-        texts = [*texts[: most - 1], counted(len(texts) - most + 1, "other")]
+        others = counted(len(texts) - most + 1, "other")
+        texts = [*texts[: most - 1], others]
     if len(texts) < 2:
         return "".join(texts)
-    comma = "; " if any(", " in text for text in texts) else ", "
-    return f"{comma.join(texts[:-1])}{';' if comma == '; ' else ''} and {texts[-1]}"
+    if any(", " in text for text in texts):
+        return f"{'; '.join(texts[:-1])}; and {texts[-1]}"
+    return f"{', '.join(texts[:-1])} and {texts[-1]}"

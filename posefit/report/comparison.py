@@ -1,4 +1,4 @@
-"""`posefit.compare`: a small sweep from Python, and its results as a table or a report."""
+"""`posefit.compare`: a small sweep from Python, with a table or a report of it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,10 +28,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The results of a small sweep, in the ledger of a folder.
+    """The results of `posefit.compare`.
 
-    A comparison without `out` has a temporary folder, which lasts as long as this object. Pickled it holds the ledger,
-    and has another temporary folder where it is read.
+    Without `out`, the ledger is in a temporary folder that is removed with this object.
+    The pickle of such an object contains the ledger; unpickling writes it to a new
+    temporary folder.
+
+    Attributes:
+        folder: The folder of the ledger.
+        tally: How many cells are done, failed and quarantined.
     """
 
     folder: Path
@@ -48,12 +53,26 @@ class Comparison:
             return list(ledger.rows())
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Return a table of one row a cell. Raises ImportError where pandas is not installed."""
+        """Return a table with one row per cell.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
         with Ledger(self.folder) as ledger:
             return ledger.frame()
 
     def report(self, path: str | Path) -> dict[str, Any]:
-        """Write the report, one page, and return what it says as a mapping."""
+        """Write the report as one page.
+
+        Args:
+            path: The page, a file that ends in .html.
+
+        Returns:
+            The report's data, as `posefit.report.write.write_report` returns them.
+
+        Raises:
+            ValueError: The page cannot be written.
+        """
         return write_report(str(self.folder), str(path))
 
     def __str__(self) -> str:
@@ -66,7 +85,7 @@ class Comparison:
 
 
 def _unpickled(tally: Tally, ledger: bytes) -> Comparison:
-    """Return a comparison whose temporary folder holds a ledger."""
+    """Return a comparison with a ledger, given as bytes, in a new temporary folder."""
     folder = _temporary_folder()
     folder.mkdir()
     (folder / FILE).write_bytes(ledger)
@@ -74,7 +93,7 @@ def _unpickled(tally: Tally, ledger: bytes) -> Comparison:
 
 
 def _temporary_folder() -> Path:
-    """Return a folder that is not there yet, in a new temporary one."""
+    """Return the path of a folder, not made yet, in a new temporary folder."""
     return Path(mkdtemp(prefix="posefit-")) / "results"
 
 
@@ -87,29 +106,37 @@ def compare(
     workers: int | None = None,
     **lists: Any,
 ) -> Comparison:
-    """Return how methods compare on motions, each pair run with so many seeds in `workers` processes.
+    """Compare methods: track each motion with each method and each seed.
 
-    A method is named as it is registered, or an optimiser's factory, which is named by its `__name__` and searches the
-    prior `pca`; or a table of a `method`, the `name` that reports call it, and `settings`. `lists` are the other fields
-    of a plan: `views`, `corruptions`, `instances` and `grid`, and the defaults `frames`, `evaluations` and so on.
+    Args:
+        methods: Each is the name of a registered method; or an optimiser's factory,
+            which gets its `__name__` as its name and searches the prior `pca`; or a
+            mapping with a `method`, its `name` in reports, and its `settings`.
+        motions: Names or files of motions.
+        seeds: The seeds, or how many.
+        out: The folder of the ledger. If it has one, finished cells of registered
+            methods do not run again. Cells of a factory always do, because its result
+            may depend on a closure, a helper or a file, which is not part of a key. By
+            default the folder is temporary.
+        workers: Number of processes, by default one per processor.
+        lists: Other fields of a plan: `views`, `corruptions`, `instances` and `grid`,
+            and defaults such as `frames` and `evaluations`.
 
-    With `out` the ledger is kept in that folder, and a comparison with the same goes on there: rows of registered
-    methods are not run again. Those of a factory always are, since what it does may follow from a closure, a helper or
-    a file, which no key can hold.
+    Returns:
+        The results.
 
-    Raises InputError for every mistake.
+    Raises:
+        InputError: An argument is wrong.
     """
     factories: dict[str, tuple[Callable[..., Any], str]] = {}
-    # of this call alone, so that no earlier row counts as one of the same factory
+    # makes the keys of this call differ from all earlier ones of the same factories
     call = token_hex(4)
     entries = [_named(entry, call, factories) for entry in methods]
     register(factories)
     crossed = {"methods": entries, "motions": list(motions), "seeds": seeds}
-    crossed |= {
-        name: lists.pop(name)
-        for name in ("views", "corruptions", "instances")
-        if name in lists
-    }
+    for name in ("views", "corruptions", "instances"):
+        if name in lists:
+            crossed[name] = lists.pop(name)
     grid = {"grid": lists.pop("grid")} if "grid" in lists else {}
     plan = Plan.of({"product": crossed, "defaults": lists, **grid})
     folder = _temporary_folder() if out is None else Path(out)
@@ -138,13 +165,16 @@ def compare(
 def _named(
     entry: Any, call: str, factories: dict[str, tuple[Callable[..., Any], str]]
 ) -> Any:
-    """Return an entry of methods by names, and add its factory, if it is one, to others, with a word for this call."""
+    """Return an entry of methods with a name instead of a factory.
+
+    Adds the factory and the word for this call to `factories`.
+    """
     if isinstance(entry, Mapping):
         return {**entry, "method": _named(entry.get("method"), call, factories)}
     if not callable(entry):
         return entry
     name = getattr(entry, "__name__", type(entry).__name__)
     if name in factories and factories[name][0] is not entry:
-        raise InputError(f"factories must have names of their own, got {name} twice")
+        raise InputError(f"factories must have different names, got {name} twice")
     factories[name] = entry, call
     return name

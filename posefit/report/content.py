@@ -1,4 +1,4 @@
-"""The data of a report's page: what was run, the leader, how certain that is, and every run."""
+"""The data of a report's page: the facts, the leader and its certainty, all runs."""
 
 import shlex
 import time
@@ -14,28 +14,37 @@ from posefit.report.page import COLOUR_COUNT
 from posefit.report.summary import leader_sentences, unpaired_sentence
 from posefit.sweep.ledger import Ledger
 
-# of failures and warnings, the most frequent ones, that the first screen names
+# How many the first screen names: the most frequent failures and warnings, and the
+# instances that are not compared.
 REASONS = 5
-MAX_MISSING = 20  # instances that it names if they are not compared
+MAX_MISSING = 20
 
 
 def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
-    """Return the data of the page about a ledger's runs; `sections` names the parts that it has."""
+    """Return the data of the page about a ledger's runs.
+
+    Args:
+        ledger: The ledger, open.
+        runs: Its runs.
+
+    Returns:
+        The data by name. `sections` lists the sections of the page.
+    """
     contest = contest_of(runs)
     kind = runs.kind
     date = time.strftime("%d %B %Y", time.localtime(ledger.changed))
+    # each text once, as many runs have the same
     warnings = list(
         dict.fromkeys(text for texts in runs.warnings.values() for text in texts)
     )
+    answer = "No run has an error: nothing can be compared."
+    if runs.failures:
+        answer = "Every cell failed."
     data: dict[str, Any] = {
         "title": kind.title,
         "made": f"{printable(ledger.path.resolve().name)}, {date}",
         "ledger": printable(shlex.quote(ledger.path.name or str(ledger.path))),
-        "answer": [
-            "Every cell failed."
-            if runs.failures
-            else "No run has an error: nothing can be compared."
-        ],
+        "answer": [answer],
         "header": _header(runs, contest),
         "methods": [
             {"name": n, "settings": v["settings"]}
@@ -69,15 +78,14 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
 
 
 def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
-    dropped = [
-        {"instance": runs.instances[i], "missing": [runs.methods[m] for m in methods]}
-        for i, methods in (contest.missing if contest else ())
-    ]
-    failed = (
-        f"{counted(len(runs.failures), 'cell')} failed"
-        if runs.failures
-        else "no cell failed"
-    )
+    """Return the first screen's data: the facts, and everything that limits them."""
+    dropped = []
+    for i, methods in contest.missing if contest else ():
+        missing = [runs.methods[m] for m in methods]
+        dropped.append({"instance": runs.instances[i], "missing": missing})
+    failed = "no cell failed"
+    if runs.failures:
+        failed = f"{counted(len(runs.failures), 'cell')} failed"
     facts = {
         "methods": runs.methods,
         **runs.kind.facts(runs),
@@ -87,11 +95,10 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         name: fact if isinstance(fact, str) else "; ".join(map(str, fact))
         for name, fact in facts.items()
     }
-    runs_words = (
-        counted(len(runs), runs.kind.name)
-        if len(runs) == 1
-        else f"{len(runs):,} {runs.kind.noun}"
-    )
+    runs_words = f"{len(runs):,} {runs.kind.noun}"
+    if len(runs) == 1:
+        runs_words = counted(1, runs.kind.name)
+    unpaired = unpaired_sentence(contest) if contest else ""
     return {
         "version": runs.version,
         "summary": f"{runs_words} by {counted(len(runs.methods), 'method')}; {failed}.",
@@ -100,28 +107,32 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "done": len(runs),
         "failed": len(runs.failures),
         "dropped": dropped,
-        "problems": _problems(
-            runs, dropped, unpaired_sentence(contest) if contest else ""
-        ),
+        "problems": _problems(runs, dropped, unpaired),
     }
 
 
 def _problems(
     runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str
 ) -> list[tuple[str, list[str]]]:
-    """Return what failed, what is therefore not compared, and what warned: sentences with the most frequent details."""
+    """Return a sentence for each problem, with its most frequent details.
+
+    Problems are failures, runs that are not compared, and warnings.
+    """
     problems = []
 
     def add(text: str, details: Sequence[str], most: int) -> None:
+        """Add a problem with at most `most` details."""
         more = [f"and {len(details) - most:,} more"] if len(details) > most else []
         problems.append((text, [*details[:most], *more]))
 
     if runs.failures:
-        by = Counter(failure["method"] for failure in runs.failures)
+        failures_by_method = Counter(failure["method"] for failure in runs.failures)
         reasons = Counter(
             reason for failure in runs.failures for reason in failure["reasons"]
         ).most_common()
-        text = "; ".join(f"{method} {count}" for method, count in by.items())
+        text = "; ".join(
+            f"{name} {count}" for name, count in failures_by_method.items()
+        )
         failed = counted(len(runs.failures), "cell")
         add(
             f"{failed} failed, left out of all figures: {text}",
@@ -129,28 +140,20 @@ def _problems(
             REASONS,
         )
     if runs.unfinished:
-        add(
-            f"no cell finished, so not on the leaderboard: {'; '.join(runs.unfinished)}",
-            [],
-            0,
-        )
+        names = "; ".join(runs.unfinished)
+        add(f"no cell finished, so not on the leaderboard: {names}", [], 0)
     if unpaired:
         add(unpaired, [], 0)
     if dropped:
-        whys = [
-            f"no run of {'; '.join(gap['missing'])}"
-            if gap["missing"]
-            else "no seed in common"
-            for gap in dropped
-        ]
-        details = [
-            f"{gap['instance']}: {why}" for gap, why in zip(dropped, whys, strict=True)
-        ]
-        add(
-            f"left out of the comparison, for every method: {counted(len(dropped), 'instance')}",
-            details,
-            MAX_MISSING,
-        )
+        details = []
+        for gap in dropped:
+            why = "no seed in common"
+            if gap["missing"]:
+                why = f"no run of {'; '.join(gap['missing'])}"
+            details.append(f"{gap['instance']}: {why}")
+        instances = counted(len(dropped), "instance")
+        text = f"left out of the comparison, for every method: {instances}"
+        add(text, details, MAX_MISSING)
     if runs.warnings:
         texts = Counter(
             text for texts in runs.warnings.values() for text in texts
@@ -164,28 +167,41 @@ def _problems(
 
 
 def _notes(runs: Runs, contest: Contest | None) -> list[str]:
+    """Return sentences about how to read the comparison."""
     notes = []
     if contest is not None:
         size = contest.blocks.size
         if size < len(runs):
-            each = f"{counted(len(contest.instances), 'instance')} with {contest.seed_words}"
+            instances = counted(len(contest.instances), "instance")
             notes.append(
-                f"Methods are compared on the {size:,} of {len(runs):,} runs that all of them share: {each}."
+                f"Methods are compared on the {size:,} of {len(runs):,} runs that all "
+                f"of them share: {instances} with {contest.seed_words}."
             )
-        apart = [
+        others = [
             name for m, name in enumerate(runs.methods) if m not in contest.methods
         ]
-        if apart:
+        if others:
             notes.append(
-                f"Too few runs in common with the others, so not compared: {'; '.join(apart)}. "
+                "Too few runs in common with the others, so not compared: "
+                f"{'; '.join(others)}. "
                 "Their rows of the leaderboard use their own runs."
             )
-    budget = "Budgets differ: compare methods of one budget only, as a longer search has lower costs."
-    for field, advice in {
+    budget = (
+        "Budgets differ: compare methods of one budget only, as a longer search has "
+        "lower costs."
+    )
+    infeasible = (
+        "Infeasible proposals are treated differently: compare methods that treat them "
+        "in the same way."
+    )
+    version = "Commands run rows again if the same versions are installed."
+    advice_of_field = {
         "evaluations": budget,
         "budget": budget,
-        "infeasible": "Infeasible proposals are treated differently: compare methods that treat them in the same way.",
-        "version": "Commands run rows again if the same versions are installed.",
-    }.items():
-        notes += [advice] if len(runs.values(field)) > 1 else []
+        "infeasible": infeasible,
+        "version": version,
+    }
+    for field, advice in advice_of_field.items():
+        if len(runs.values(field)) > 1:
+            notes.append(advice)
     return notes

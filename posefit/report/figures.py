@@ -1,4 +1,4 @@
-"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures."""
+"""Figures for papers, drawn by matplotlib (posefit[figures]), and their folder."""
 
 import importlib
 import os
@@ -19,10 +19,11 @@ from posefit.sweep.table import write_csv
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# A method has the colour that it has on the page; lines of the first seven methods, the next, ...
+# A method has the same colour and marker as on the page. The first seven methods have
+# lines of the first style, the next seven of the second, and so on.
 COLOURS = tuple(LIGHT.values())
 STYLES = ("-", "--", ":", "-.")
-MARKERS = ("o", "s", "^", "D", "v", "X", "*", "h")  # as the page's, in this order
+MARKERS = ("o", "s", "^", "D", "v", "X", "*", "h")
 TABLE = "leaderboard.csv"
 TABLE_MARK = b"method,settings,"
 CHARTS = ("leaderboard", "convergence", "profile")
@@ -31,23 +32,29 @@ _SIZE = (6.4, 3.6)  # inches
 
 
 def save(figure: "Figure", path: Path) -> None:
-    """Write a figure as a new .png or .pdf; the same figure gives the same bytes."""
+    """Write a figure as a new .png or .pdf file. Equal figures have the same bytes."""
     metadata = {"CreationDate": None} if path.suffix == ".pdf" else {}
-    # long names too
+    # a tight box leaves room for long names
     figure.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)
 
 
 def chart_figure(
     names: Sequence[str], chart: Chart, numbers: Sequence[int], order: Sequence[int]
 ) -> "Figure":
-    """Return a chart as the page has it: a line for each method, with its band.
+    """Return a chart of the page as a figure: a line with its band for each method.
 
     Args:
-        names: What each method of the chart is called.
+        names: The names of the chart's methods.
         chart: The chart.
-        numbers: Which method of the report each is: it has the same colour in every figure and on the page.
-        order: The places of the methods in the legend.
+        numbers: The number of each of these methods in the report, which decides its
+            colour.
+        order: The methods in the order of the legend, by their places in `names`.
 
+    Returns:
+        The figure.
+
+    Raises:
+        ImportError: matplotlib is not installed.
     """
     figure: Figure = library("figure").Figure(figsize=_SIZE, layout="constrained")
     axes = figure.add_subplot(xlabel=chart.x_label, ylabel=chart.y_label)
@@ -89,7 +96,19 @@ def chart_figure(
 def board_figure(
     score: Score, board: Sequence[Row], baselines: Sequence[tuple[str, float]]
 ) -> "Figure":
-    """Return the leaderboard as a picture: a row a method with its interval, and a line a baseline."""
+    """Return a figure of the leaderboard.
+
+    Args:
+        score: The figure that orders the methods.
+        board: The rows of the leaderboard. Each has a marker and an interval.
+        baselines: The name and value of each baseline, drawn as vertical lines.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
     rows = [row for row in board if row[score.name] is not None]
     height = 0.9 + 0.3 * len(rows)
     figure: Figure = library("figure").Figure(
@@ -121,7 +140,10 @@ def board_figure(
 
 
 def library(name: str) -> Any:
-    """Return a module of matplotlib, or matplotlib itself. Raises ImportError without it."""
+    """Return a module of matplotlib, or matplotlib itself for an empty name.
+
+    Raises ImportError if matplotlib is not installed.
+    """
     try:
         return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
     except ImportError as error:
@@ -131,7 +153,7 @@ def library(name: str) -> Any:
 
 
 def check_folder(path: str | Path) -> None:
-    """Raise InputError unless a name is free, or an earlier folder of figures has it and nothing else is in there."""
+    """Raise InputError if a path exists and is not an earlier folder of figures."""
     folder = Path(path)
     if not os.path.lexists(folder):
         return
@@ -145,15 +167,24 @@ def check_folder(path: str | Path) -> None:
     )
     if not is_earlier:
         raise InputError(
-            f"{path}: expected a new name or an earlier folder of figures, got something else"
+            f"{path}: expected a new name or an earlier folder of figures, "
+            "got something else"
         )
 
 
 def write_figures(runs: Runs, path: str | Path) -> None:
-    """Write a folder of figures, as PNG and PDF, and the leaderboard as CSV; an earlier one is replaced.
+    """Write a folder of figures, as PNG and PDF, and of the leaderboard, as CSV.
 
-    Figures are left out if the runs do not have the data. Raises ValueError if no run has an error, or if something
-    else has the name or the folder cannot be written.
+    An earlier folder of figures is replaced. Figures without data are left out.
+
+    Args:
+        runs: The runs of a ledger.
+        path: The folder.
+
+    Raises:
+        ValueError: No run has an error, the path exists and is not a folder of figures,
+            or it cannot be written.
+        ImportError: matplotlib is not installed.
     """
     contest = contest_of(runs)
     if contest is None:
@@ -186,10 +217,10 @@ def write_figures(runs: Runs, path: str | Path) -> None:
             raise
     except OSError as error:
         raise InputError(
-            f"{path}: expected a place to write to, got {error.strerror or error}"
+            f"{path}: cannot write the figures: {error.strerror or error}"
         ) from error
 
 
 def _plain(name: str) -> str:
-    """Return a name that matplotlib does not take for mathematics."""
+    """Return a name in which matplotlib does not read `$` as the start of a formula."""
     return name.replace("$", r"\$")

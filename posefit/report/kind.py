@@ -1,4 +1,4 @@
-"""What a report knows of runs: their table, what their kind says of it, and the contest of methods that share them."""
+"""The table of a report's runs, the protocol of their kind, and their contest."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,30 +13,44 @@ from posefit.report.columns import Column, Score
 from posefit.statistics.paired import PairedTest, paired_tests
 from posefit.statistics.pairing import Shared
 
-Place = Mapping[str, Any]  # the fields of a plan that make an instance
+Place = Mapping[str, Any]  # the fields of a plan that define an instance
 Row = Mapping[str, Any]
 
 
 class Kind(Protocol):
-    """A kind of runs, tracks or single searches: the figures, names and words that a report has of them."""
+    """A kind of runs, tracks or single searches: its figures, names and texts.
+
+    Attributes:
+        name: The kind's name, in the singular.
+        noun: Its runs, in the plural.
+        title: The title of the page.
+        columns: Its figures by name.
+        score: The figure that orders the methods.
+        named: The fields that an instance's name contains.
+        data: The names of a row's other data.
+        baselines: The label of each baseline by name.
+    """
 
     name: str
     noun: str
     title: str
     columns: Mapping[str, Column]
     score: Score
-    named: tuple[str, ...]  # the fields that an instance's name says
-    data: tuple[str, ...]  # what a row has besides its figures
+    named: tuple[str, ...]
+    data: tuple[str, ...]
     baselines: Mapping[str, str]
 
     def read(
         self, row: Row, shared: dict[bytes, Any], /
     ) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data, given a table for arrays that many rows have."""
+        """Return the figures of a row and its other data.
+
+        `shared` holds arrays that many rows have in common, to save memory.
+        """
         ...
 
     def rank(self, place: Place) -> tuple[Any, ...]:
-        """Return what instances are sorted by."""
+        """Return the key by which instances are sorted."""
         ...
 
     def place_name(self, place: Place) -> str:
@@ -44,15 +58,15 @@ class Kind(Protocol):
         ...
 
     def facts(self, runs: "Runs") -> dict[str, Any]:
-        """Return what was run."""
+        """Return the facts about the runs by their titles."""
         ...
 
     def tested_errors(self, contest: "Contest") -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare; lower is better."""
+        """Return the errors (methods, blocks, 1) for tests. Lower is better."""
         ...
 
     def board(self, contest: "Contest") -> dict[int, dict[str, Any]]:
-        """Return what each method's row has besides averages."""
+        """Return the entries of each method's leaderboard row besides averages."""
         ...
 
     def baseline_rows(self, contest: "Contest") -> list[dict[str, Any]]:
@@ -60,81 +74,99 @@ class Kind(Protocol):
         ...
 
     def place_words(self, contest: "Contest") -> str:
-        """Return what a contest was on."""
+        """Return the instances of a contest in words."""
         ...
 
     def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
-        """Return how the best baseline compares with the first method, given their rows."""
+        """Return sentences that compare the best baseline with the first method.
+
+        The rows of both are given.
+        """
         ...
 
     def page(self, runs: "Runs", contest: "Contest | None", /) -> dict[str, Any]:
-        """Return what the page has of this kind alone, and its list of `sections`."""
+        """Return the data that only pages of this kind have, with their `sections`."""
         ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Runs:
-    """All rows of a ledger, sorted by instance, method and seed. Names are distinct, and printable on one line.
+    """All n finished rows of a ledger, sorted by instance, method and seed.
 
-    Methods differ in name, settings, budget and version, and in what else a method chooses; instances differ in all
-    other fields but the seed.
+    Names are distinct, and printable on one line. The name, settings, budget, version
+    and other choices of a method distinguish methods. All other fields except the seed
+    distinguish instances.
+
+    Attributes:
+        kind: The kind of the runs.
+        version: The versions of posefit that ran them.
+        methods: The names of methods, the best mean score first.
+        variants: The fields that define each method.
+        instances: The names of instances.
+        places: The fields that define each instance.
+        method: The index (n,) of each row's method.
+        instance: The index (n,) of each row's instance.
+        seed: The index (n,) of each row's seed.
+        seeds: The seeds, rising.
+        keys: The key of each row.
+        figures: Each figure (n,) by name, nan if a row does not have it.
+        data: The other data of each row, an array or a tuple, by the names of
+            `Kind.data`.
+        warnings: The warnings of each row that has some, by its index.
+        failures: The name, method, key, reasons and command of each quarantined cell.
+        failed: The number of each method's quarantined cells.
+        unfinished: The names of methods that have only quarantined cells.
+        heads: The beginnings of the commands that run rows again.
+        head: The index (n,) of each row's beginning.
     """
 
     kind: Kind
     version: str
-    methods: tuple[str, ...]  # the lowest mean error first
-    variants: tuple[dict[str, Any], ...]  # the fields that make each method
+    methods: tuple[str, ...]
+    variants: tuple[dict[str, Any], ...]
     instances: tuple[str, ...]
-    places: tuple[dict[str, Any], ...]  # the fields that make each instance
-    method: Array  # (n,) index of each row, as the next two
-    instance: Array  # (n,)
-    seed: Array  # (n,)
-    seeds: tuple[int, ...]  # rising
+    places: tuple[dict[str, Any], ...]
+    method: Array
+    instance: Array
+    seed: Array
+    seeds: tuple[int, ...]
     keys: tuple[str, ...]
-    # name -> (n,), nan where a row has none
     figures: dict[str, Array]
-    # what else each row has, by the names of `kind.data`: an array, or a tuple
     data: dict[str, Any]
-    warnings: Mapping[int, tuple[str, ...]]  # row -> its warnings, if any
-    # quarantined cells: name, method, reasons, command
+    warnings: Mapping[int, tuple[str, ...]]
     failures: tuple[dict[str, Any], ...]
-    failed: tuple[int, ...]  # quarantined cells of each method
-    unfinished: tuple[str, ...]  # names of methods whose every cell is in quarantine
-    heads: tuple[str, ...]  # the beginnings of the commands that run rows again
-    head: Array  # (n,)
+    failed: tuple[int, ...]
+    unfinished: tuple[str, ...]
+    heads: tuple[str, ...]
+    head: Array
 
     def __len__(self) -> int:
         return len(self.keys)
 
     @property
     def table_figures(self) -> list[str]:
-        """The figures that tables show: optional ones only if a row has them."""
-        return [
-            name
-            for name, column in self.kind.columns.items()
-            if column.in_tables
-            and not (column.optional and np.isnan(self.figures[name]).all())
-        ]
+        """The figures in tables. Optional ones are there only if a row has them."""
+        names = []
+        for name, column in self.kind.columns.items():
+            is_missing = column.optional and np.isnan(self.figures[name]).all()
+            if column.in_tables and not is_missing:
+                names.append(name)
+        return names
 
     @property
     def scores(self) -> Array:
-        """The figure (n,) that methods are ordered by."""
+        """The figure (n,) that orders the methods."""
         return self.figures[self.kind.score.name]
 
     def values(self, field: str) -> list[Any]:
-        """Return the values of a field of methods or instances, rising."""
-        return sorted(
-            {
-                fields[field]
-                for fields in (*self.variants, *self.places)
-                if field in fields
-            }
-        )
+        """Return the distinct values of a field of methods or instances, rising."""
+        definitions = (*self.variants, *self.places)
+        return sorted({fields[field] for fields in definitions if field in fields})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Contest(Shared):
-    """The runs that some methods share: `blocks` are indices of `runs`, a row a method."""
+    """The runs that some methods share, whose indices are `blocks`."""
 
     runs: Runs
 
@@ -144,18 +176,21 @@ class Contest(Shared):
 
     @property
     def scores(self) -> Array:
-        """The figure (methods, blocks) that methods are ordered by."""
+        """The figure (methods, blocks) that orders the methods."""
         return self.of(self.runs.kind.score.name)
 
     def rows_of(self, method: int) -> NDArray[np.int64]:
-        """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
+        """Return the indices (k,) of the runs on which a method's figures are averaged.
+
+        They are the shared runs, or all its runs if the method does not take part.
+        """
         if method in self.methods:
             return np.asarray(self.blocks[self.methods.index(method)])
         return np.flatnonzero(self.runs.method == method).astype(np.int64)
 
     @cached_property
     def instances(self) -> tuple[int, ...]:
-        """The instances that are shared, rising."""
+        """The indices of the shared instances, rising."""
         return tuple(np.unique(self.instance).tolist())
 
     def place_field(self, name: str) -> Array:
@@ -165,7 +200,7 @@ class Contest(Shared):
 
     @property
     def seed_words(self) -> str:
-        """How many seeds the instances have."""
+        """The number of seeds of an instance, in words."""
         counts = np.unique(self.instance, return_counts=True)[1]
         least = int(counts.min())
         most = int(counts.max())
@@ -180,7 +215,10 @@ class Contest(Shared):
 
     @cached_property
     def comparisons(self) -> list[PairedTest]:
-        """The paired tests of all methods, by their places in `methods`; none without two methods and two blocks."""
+        """The paired tests of all pairs of methods, given by their places in `methods`.
+
+        There are none without two methods and two blocks.
+        """
         if min(self.tested_errors.shape[:2]) < 2:
             return []
         return paired_tests(self.tested_errors)

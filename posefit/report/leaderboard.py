@@ -12,24 +12,42 @@ EFFECT = ("behind", "behind_low", "behind_high", "p", "blocks_needed")
 
 
 def contest_of(runs: Runs) -> Contest | None:
-    """Return the contest of as many methods as share enough runs; None if no run has an error.
+    """Return the contest of the methods that share enough runs.
 
-    A method that would leave less than half of the runs that the others share does not take part.
+    A method does not take part if it would leave less than half of the runs that the
+    others share.
+
+    Args:
+        runs: All runs of a ledger.
+
+    Returns:
+        The contest, or None if no run has an error.
     """
     shared = most_shared(runs.method, runs.instance, runs.seed, runs.scores)
     return None if shared is None else Contest(**vars(shared), runs=runs)
 
 
 def leaderboard(contest: Contest) -> list[dict[str, Any]]:
-    """Return a row for each method, best first; those that do not take part come last, with their own runs.
+    """Return a row for each method, best first.
 
-    First come the methods that are not worse than the one of the best score: p of the paired test is not below 0.05.
-    Of these, those that lost the fewest tracks come first, because no difference of their errors is shown; the others
-    follow by their score. So a method that loses tracks is never ahead of one that is as good and loses none.
+    The order has three groups:
 
-    Figures are averages, the score has an interval, and the kind of runs adds its own by `Kind.board`. `behind` is the
-    mean difference from the first method in paired runs with its interval, `p` that of the paired test after Holm, and
-    `blocks_needed` how many paired runs would show such a difference.
+    1. Methods that are not shown to be worse than the method of the best score, with p
+       of the paired test not below 0.05. They are sorted by the number of lost tracks,
+       because no difference of their errors is shown. So no method that loses tracks is
+       ahead of one that is as good and loses none.
+    2. The other methods that take part, by their score.
+    3. Methods that do not take part, with the averages of all their own runs.
+
+    Args:
+        contest: The methods and the runs that they share.
+
+    Returns:
+        The rows. A figure is the average over the method's runs, the score has an
+        interval, and `Kind.board` adds entries. `behind` is the mean difference from
+        the first method in paired runs, with its interval; `p` is the paired test's p
+        after Holm's correction; `blocks_needed` is how many paired runs would show such
+        a difference.
     """
     runs = contest.runs
     score = runs.kind.score
@@ -51,21 +69,23 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
         board.append({**row, **more[m]})
 
     def badness(row: dict[str, Any]) -> tuple[float, float]:
+        """Return a key that is lower for better rows; rows without a score are last."""
         value = row[score.name]
         if value is None:
             return math.inf, 0.0
         return (-value if score.down else value), row.get("above", 0.0)
 
     best = min((row for row in board if row["taking_part"]), key=badness)
-    unlike_best = {
-        contest.methods[pair.second if pair.first == place else pair.first]
-        for place in [contest.methods.index(best["method"])]
-        for pair in contest.comparisons
-        if place in (pair.first, pair.second) and pair.p_value < SIGNIFICANCE
-    }
+    best_place = contest.methods.index(best["method"])
+    worse_methods = set()
+    for pair in contest.comparisons:
+        places = (pair.first, pair.second)
+        if best_place in places and pair.p_value < SIGNIFICANCE:
+            other = pair.second if pair.first == best_place else pair.first
+            worse_methods.add(contest.methods[other])
 
     def order(row: dict[str, Any]) -> tuple[Any, ...]:
-        worse = not row["taking_part"] or row["method"] in unlike_best
+        worse = not row["taking_part"] or row["method"] in worse_methods
         lost = 0 if worse else row.get("lost_tracks", 0)
         return not row["taking_part"], worse, lost, badness(row)
 
@@ -75,7 +95,10 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
 
 
 def _effects(contest: Contest, first: int) -> dict[int, dict[str, float | None]]:
-    """Return how far each method is behind the first, with p and the seeds needed; None without a test."""
+    """Return the entries of `EFFECT` for each method, compared with the first.
+
+    They are None for a method without a test.
+    """
     place = contest.methods.index(first)
     effects: dict[int, dict[str, float | None]] = {
         m: dict.fromkeys(EFFECT) for m in range(len(contest.runs.methods))
@@ -83,6 +106,7 @@ def _effects(contest: Contest, first: int) -> dict[int, dict[str, float | None]]
     for pair in contest.comparisons:
         if place not in (pair.first, pair.second):
             continue
+        # positive if the other method is worse
         ends = (pair.difference, pair.low, pair.high)
         if place == pair.first:
             ends = (-pair.difference, -pair.high, -pair.low)
@@ -93,10 +117,15 @@ def _effects(contest: Contest, first: int) -> dict[int, dict[str, float | None]]
 
 
 def paired_tests_of(contest: Contest) -> dict[str, Any] | None:
-    """Return the paired tests of a contest; None without two methods and two blocks.
+    """Return the paired tests of a contest, as the page needs them.
 
-    `pairs` lists first, second, mean difference of errors and its interval, p, p after Holm, and the blocks needed: a
-    difference below 0 is in favour of the first.
+    Args:
+        contest: The methods and the runs that they share.
+
+    Returns:
+        The methods, the number of blocks, and for each pair the fields of a
+        `posefit.statistics.paired.PairedTest`. A difference below 0 is in favour of the
+        first method. None if there are not two methods and two blocks.
     """
     if not contest.comparisons:
         return None

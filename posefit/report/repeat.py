@@ -1,4 +1,4 @@
-"""Rows of a ledger run again: by the key of a row, or by a command that needs no ledger."""
+"""Running a cell again: by the key of its row, or by a command that needs no ledger."""
 
 import json
 from collections.abc import Mapping
@@ -17,28 +17,30 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.table import flat
 
-LAST_FIELDS = ("instance", "seed")  # the fields that rows with the same head differ in
+# These fields come last in a command. Rows that differ only in them share its head.
+LAST_FIELDS = ("instance", "seed")
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
-MAX_SHOWN = 12  # figures that differ
+MAX_SHOWN = 12  # the most differing figures that are listed
 _BEGIN = "posefit sweep - --out rerun <<'END'\n"
-# beyond those of JSON
+# characters that TOML or a terminal does not allow, beyond those that JSON escapes
 _ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x2029)}
 
 
 def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[str]:
-    """Run a row of a ledger again, and return what differs from it.
+    """Run the cell of a ledger's row again, and return the differences.
 
     Args:
-        ledger: A folder of ledgers, or one.
-        key: The row's key, or as many of its first digits as only this row has.
-        out: The folder of a ledger for the new row; without it the row is not stored.
+        ledger: A folder of ledgers, or a ledger.
+        key: The row's key, or enough of its first digits to distinguish it.
+        out: The folder of a ledger for the new row. By default it is not stored.
 
     Returns:
-        Lines about what ran and which figures differ, none if all are equal but the times.
+        Lines about the versions and the figures that differ. Times may differ. There
+        are no lines if all else is equal.
 
     Raises:
-        ValueError: If no row or several have the key, or if the cell cannot be planned today.
-
+        ValueError: No row or several have the key, or the cell cannot be planned with
+            this version of posefit.
     """
     earlier = _row_of(ledger, key)
     plan = Plan.of(plan_tables(earlier["spec"]))
@@ -53,7 +55,7 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
 
 
 def _row_of(ledger: str | Path, key: str) -> dict[str, Any]:
-    """Return the row of a ledger whose key begins with some digits."""
+    """Return the one row of a ledger whose key begins with the given digits."""
     if not key:
         raise InputError("KEY must be the first digits of a row's key, got none")
     with Ledger(ledger) as results:
@@ -65,19 +67,21 @@ def _row_of(ledger: str | Path, key: str) -> dict[str, Any]:
         )
     if len(rows) > 1:
         raise InputError(
-            f"{ledger}: expected one row whose key begins with {quoted(key)}, got {len(rows):,}: give more digits"
+            f"{ledger}: expected one row whose key begins with {quoted(key)}, "
+            f"got {len(rows):,}: give more digits"
         )
     return rows[0]
 
 
 def _differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """Return the figures that differ between two rows of a cell, and why they may."""
+    """Return lines about the differences between two rows of a cell."""
     before = flat(earlier)
     after = flat(now)
     lines = []
     if before["version"] != after["version"]:
         lines.append(
-            f"it was run by {cut(before['version'])}, and now by {cut(after['version'])}"
+            f"it was run by {cut(before['version'])}, "
+            f"and now by {cut(after['version'])}"
         )
     if now["status"] != "done":
         return [*lines, f"it failed: {'; '.join(now['reasons'])}"]
@@ -94,15 +98,14 @@ def _differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str
 
 
 def plan_tables(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables of a plan of one cell, which a spec describes."""
+    """Return the tables of a plan whose only cell has this spec."""
     if spec["kind"] == "track":
         last = {name: spec[name] for name in LAST_FIELDS}
         return {"cells": [{**_track_fields(spec), **last}]}
-    method = {
-        name: spec[name]
-        for name in ("method", "name", "settings")
-        if name != "name" or spec[name]
-    }
+    method = {"method": spec["method"]}
+    if spec["name"]:
+        method["name"] = spec["name"]
+    method["settings"] = spec["settings"]
     lists = {
         f"{name}s": [spec[name]]
         for name in ("function", "dimension", "instance", "seed")
@@ -117,9 +120,10 @@ def plan_tables(spec: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def repeat_command(spec: Mapping[str, Any]) -> str:
-    """Return a shell command that runs the cell of a spec again, with the ledger `rerun`.
+    """Return a shell command that runs a spec's cell again, into the folder `rerun`.
 
-    The shell does not interpret the plan, whatever names it holds: each of its lines begins with a field's name.
+    The plan is a quoted here-document, which the shell does not interpret. Each of its
+    lines begins with a field's name, so no value can end it.
     """
     if spec["kind"] == "track":
         last = {name: spec[name] for name in LAST_FIELDS}
@@ -128,18 +132,18 @@ def repeat_command(spec: Mapping[str, Any]) -> str:
 
 
 def command_head(spec: Mapping[str, Any]) -> str:
-    """Return a track's command up to the lines of instance and seed; the line END follows these."""
+    """Return a track's command before the lines of `LAST_FIELDS` and `END`."""
     return f"{_BEGIN}[[cells]]\n{_lines(_track_fields(spec))}"
 
 
 def _track_fields(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a track's cell in a plan, but the last ones."""
+    """Return the fields of a track's cell in a plan, except `LAST_FIELDS`."""
     fields = {
         name: spec[name] for name in FIELDS if name in spec and name not in LAST_FIELDS
     }
     if not fields.get("name", True):
         del fields["name"]
-    # TOML has no null: settings are parsed from their text
+    # TOML has no null, so write settings as texts, which are parsed when they are read
     fields["settings"] = {
         name: setting_text(value) for name, value in spec["settings"].items()
     }

@@ -1,4 +1,4 @@
-"""The finished rows of a ledger as one table, small enough for a hundred thousand of them."""
+"""Reads the finished rows of a ledger into a table, which holds a hundred thousand."""
 
 import json
 from collections import Counter
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (TRACKS, SEARCHES)}
-# what a method chooses; all else but the seed makes an instance
+# the fields that define a method; all others except the seed define an instance
 _METHOD_FIELDS = (
     "method",
     "name",
@@ -36,14 +36,14 @@ _METHOD_FIELDS = (
 
 
 class _Distinct:
-    """Distinct values, numbered as they come."""
+    """Distinct values, numbered in the order in which they are added."""
 
     def __init__(self) -> None:
         self.values: list[dict[str, Any]] = []
         self._numbers: dict[Hashable, int] = {}
 
     def number(self, value: dict[str, Any]) -> int:
-        """Return the number of a value."""
+        """Return the number of a value, and add it if it is new."""
         if (key := _frozen(value)) not in self._numbers:
             self._numbers[key] = len(self.values)
             self.values.append(value)
@@ -51,83 +51,102 @@ class _Distinct:
 
 
 def _frozen(value: Any) -> Hashable:
-    """Return a key that two values of JSON share if they are the same: 1, 1.0 and true are not."""
+    """Return a hashable key of a JSON value. The keys of 1, 1.0 and true differ."""
     if isinstance(value, dict):
         return tuple(sorted((name, _frozen(inner)) for name, inner in value.items()))
     if isinstance(value, list):
         return tuple(map(_frozen, value))
-    return value if isinstance(value, str) else (type(value), value)
+    if isinstance(value, str):
+        return value
+    # as 1 == 1.0 == True in Python
+    return type(value), value
 
 
 class _Rows:
-    """The finished rows of a ledger as they come, with their methods, instances and heads of commands numbered.
+    """The finished rows of a ledger in its order.
 
-    Raises InputError where there is no row, finished or quarantined, and where there are both tracks and searches.
+    Their methods, instances and heads of commands are numbered.
+
+    Raises InputError if the ledger has no row, finished or quarantined, or has both
+    tracks and searches.
     """
 
     def __init__(
         self, ledger: "Ledger", quarantined: Sequence[Mapping[str, Any]]
     ) -> None:
-        self.methods, self.places, self.heads = _Distinct(), _Distinct(), _Distinct()
-        # of instance, method and head of each row
+        self.methods = _Distinct()
+        self.places = _Distinct()
+        self.heads = _Distinct()
+        # the numbers of each row's instance, method and head
         self.numbers: list[tuple[int, int, int]] = []
-        self.seeds: list[int] = []  # of any size
+        self.seeds: list[int] = []  # of any size, so not an array
         self.keys: list[str] = []
         self.warnings: list[tuple[str, ...]] = []
         self.measured: list[tuple[Array, tuple[Any, ...]]] = []
-        shared: dict[bytes, Any] = {}  # arrays that many rows have
-        kinds: dict[str, None] = {}
+        shared: dict[bytes, Any] = {}  # arrays that many rows have in common
+        kinds = set[str]()
         for row in chain(ledger.rows(), quarantined):
-            kinds[row["spec"]["kind"]] = None
+            kinds.add(row["spec"]["kind"])
             if len(kinds) > 1:
                 raise InputError(
-                    f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one"
+                    f"{ledger.path}: expected a ledger of tracks or one of single "
+                    "searches, got both in one"
                 )
             if row["status"] == "done":
-                self._add(row, shared)
+                try:
+                    self._add(row, shared)
+                # raised if a figure is missing or has another type
+                except (ValueError, TypeError, LookupError, AttributeError) as error:
+                    raise ledger.damaged_row(row["key"], error) from None
         if not kinds:
             raise InputError(
-                f"{ledger.path}: expected a ledger with finished rows, got one with none"
+                f"{ledger.path}: expected a ledger with finished rows, "
+                "got one with none"
             )
-        (self.kind,) = map(KINDS.__getitem__, kinds)
+        self.kind = KINDS[kinds.pop()]
 
     def _add(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> None:
         spec = row["spec"]
         place = self.places.number(_place(spec))
         method = self.methods.number(_variant(spec))
-        head = self.heads.number(
-            {name: value for name, value in spec.items() if name not in LAST_FIELDS}
-        )
+        first_fields = {
+            name: value for name, value in spec.items() if name not in LAST_FIELDS
+        }
+        head = self.heads.number(first_fields)
         self.numbers.append((place, method, head))
-        self.seeds.append(spec["seed"])
+        self.seeds.append(int(spec["seed"]))
         self.keys.append(row["key"])
         self.warnings.append(tuple(row["warnings"]))
-        self.measured.append(KINDS[spec["kind"]].read(row, shared))
+        figures, data = KINDS[spec["kind"]].read(row, shared)
+        self.measured.append((figures.astype(float), data))
 
 
 def runs_of(
     ledger: "Ledger", methods: Sequence[str] = (), *, latest: bool = False
 ) -> Runs:
-    """Return the finished rows of a ledger, in an order that does not depend on which of them finished first.
+    """Return the finished rows of a ledger.
 
-    If every cell failed there are no rows, but failures.
+    Their order does not depend on which of them finished first.
 
     Args:
-        ledger: Ledgers of tracks, or of single searches.
-        methods: Names of methods that the runs are cut down to: as a report has them, or as the plan has them. All if
-            there is none.
-        latest: Whether methods that differ only in version are cut down to one of them, the one installed or else the
-            one that was planned last.
+        ledger: An open ledger, of tracks or of single searches.
+        methods: The methods whose runs are returned, by their names in the report or in
+            the plan. All if empty.
+        latest: Whether to return only one version of each method: the installed one, or
+            else the one that was planned last.
+
+    Returns:
+        The runs, and the failures. If every cell failed, there are no runs.
 
     Raises:
-        ValueError: If there is neither a row nor a failure, if the ledgers hold both tracks and single searches, or if
-            no method has one of the names.
-
+        ValueError: The ledger has neither a row nor a failure, or both tracks and
+            single searches, or no method has one of the names.
     """
     quarantined = ledger.quarantined()
     rows = _Rows(ledger, quarantined)
     kind = rows.kind
-    count = len(rows.methods.values)  # those that only failed come after them
+    # methods that only failed have the numbers from here on
+    count = len(rows.methods.values)
     failed_method = [
         rows.methods.number(_variant(cell["spec"])) for cell in quarantined
     ]
@@ -139,10 +158,8 @@ def runs_of(
     chosen = _latest(variants) if latest else range(len(variants))
     scores = figures[:, list(kind.columns).index(kind.score.name)]
     badness = np.nan_to_num(-scores if kind.score.down else scores, nan=np.inf)
-    means = [
-        badness[numbers[:, 1] == m].mean() if m < count else np.inf
-        for m in range(len(variants))
-    ]
+    means = [badness[numbers[:, 1] == m].mean() for m in range(count)]
+    means += [np.inf] * (len(variants) - count)
     best_first = sorted(
         chosen, key=lambda m: (m >= count, means[m], _text(variants[m]))
     )
@@ -156,6 +173,7 @@ def runs_of(
     finished = [m for m in best_first if m < count]
     place_of_method = {m: k for k, m in enumerate(finished)}
 
+    # the rows and the quarantined cells of these methods
     retained = [k for k, row in enumerate(rows.numbers) if row[1] in place_of_method]
     cells = [
         (cell, label_of[m])
@@ -164,20 +182,22 @@ def runs_of(
     ]
     failed = Counter(name for _, name in cells)
 
+    # their instances, in order, with the details that may distinguish equal names
     present = sorted({rows.numbers[k][0] for k in retained})
     values = rows.places.values
     place_order = sorted(
         present, key=lambda i: (kind.rank(values[i]), _text(values[i]))
     )
     places = [values[i] for i in place_order]
-    details = [
-        {
+    details = []
+    for place in places:
+        unnamed = {
             name: _text(value).strip('"')
             for name, value in place.items()
             if name not in kind.named
         }
-        for place in places
-    ]
+        details.append(unnamed)
+
     commands = {
         head: command_head(rows.heads.values[head])
         for head in {rows.numbers[k][2] for k in retained}
@@ -201,20 +221,20 @@ def runs_of(
     indices = {k: index(k) for k in retained}
     order = sorted(retained, key=indices.__getitem__)
     table = np.array([indices[k] for k in order], dtype=int).reshape(-1, 4).T
-    data = zip(*(rows.measured[k][1] for k in order), strict=True)
+    finished_variants = []
+    for m in finished:
+        settings = printable(", ".join(settings_text(variants[m]["settings"])))
+        finished_variants.append({**variants[m], "settings": settings})
+    columns = zip(*(rows.measured[k][1] for k in order), strict=True)
+    data: dict[str, Any] = {}
+    # without rows there are no columns
+    for name, column in zip(kind.data, columns, strict=False):
+        data[name] = np.array(column) if isinstance(column[0], np.ndarray) else column
     return Runs(
         kind=kind,
         version=ledger.version,
         methods=tuple(label_of[m] for m in finished),
-        variants=tuple(
-            {
-                **variants[m],
-                "settings": printable(
-                    ", ".join(settings_text(variants[m]["settings"]))
-                ),
-            }
-            for m in finished
-        ),
+        variants=tuple(finished_variants),
         instances=distinct([kind.place_name(place) for place in places], details),
         places=tuple(places),
         instance=table[0],
@@ -224,10 +244,7 @@ def runs_of(
         seeds=tuple(rising),
         keys=tuple(rows.keys[k] for k in order),
         figures=dict(zip(kind.columns, figures[order].T, strict=True)),
-        data={
-            name: np.array(values) if isinstance(values[0], np.ndarray) else values
-            for name, values in zip(kind.data, data, strict=False)  # none without rows
-        },
+        data=data,
         warnings={
             k: tuple(map(printable, rows.warnings[row]))
             for k, row in enumerate(order)
@@ -241,9 +258,9 @@ def runs_of(
 
 
 def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
-    """Return the methods that are left if of those that differ only in version one counts.
+    """Return one version of each method, by their indices.
 
-    It is the one whose versions are those installed, or else the one that was planned last.
+    It is the installed version, or else the one that was planned last.
     """
     best: dict[Hashable, tuple[bool, int]] = {}
     for m, variant in enumerate(variants):
@@ -261,7 +278,10 @@ def _named(
     variants: Sequence[Mapping[str, Any]],
     label_of: Mapping[int, str],
 ) -> list[int]:
-    """Return the methods that have one of some names. Raises InputError if a name is nobody's."""
+    """Return the methods with the given names.
+
+    Raises InputError if no method has one of the names.
+    """
     names_of = {
         m: {label_of[m], variants[m]["name"] or variants[m]["method"]} for m in numbers
     }
@@ -269,13 +289,14 @@ def _named(
     for name in names:
         if name not in known:
             raise InputError(
-                f"--methods must be of {listed(sorted(label_of.values()), 12)}, got {quoted(name)}"
-                f"{suggestion(name, known)}"
+                f"--methods must be of {listed(sorted(label_of.values()), 12)}, "
+                f"got {quoted(name)}{suggestion(name, known)}"
             )
     return [m for m in numbers if names_of[m] & set(names)]
 
 
 def _failure(cell: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return the page's data of a quarantined cell of a method with this name."""
     return {
         "name": printable(str(cell_from({**cell["spec"], "name": name}))),
         "method": name,
@@ -286,7 +307,10 @@ def _failure(cell: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what makes a method; the budget of a search is that of each dimension."""
+    """Return the fields that define a method.
+
+    Searches have a budget per dimension instead of their evaluations.
+    """
     fields = {name: spec[name] for name in _METHOD_FIELDS if name in spec}
     fields["settings"] = dict(sorted(spec["settings"].items()))
     if "dimension" in spec:
@@ -295,24 +319,22 @@ def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
-    """Return what may distinguish a method from others of the same name: values by the names of what is chosen."""
-    chosen = {name: setting_text(value) for name, value in variant["settings"].items()}
+    """Return the texts that may distinguish a method from others of the same name."""
+    texts = {name: setting_text(value) for name, value in variant["settings"].items()}
     for name in ("method", "evaluations", "budget", "hypotheses", "infeasible"):
         if name in variant:
-            chosen[name] = (
-                variant[name]
-                if isinstance(variant[name], str)
-                else f"{variant[name]:.12g}"
-            )
+            value = variant[name]
+            texts[name] = value if isinstance(value, str) else f"{value:.12g}"
     posefit, *plugins = variant["version"].split(", ")
-    return {
-        **chosen,
-        "posefit": posefit,
-        **{name: version for name, _, version in (p.partition(" ") for p in plugins)},
-    }
+    texts["posefit"] = posefit
+    for plugin in plugins:
+        name, _, version = plugin.partition(" ")
+        texts[name] = version
+    return texts
 
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields that define an instance."""
     return {
         name: value
         for name, value in spec.items()
@@ -323,16 +345,25 @@ def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
 def distinct(
     names: Sequence[str], details: Iterable[Mapping[str, str]]
 ) -> tuple[str, ...]:
-    """Return distinct names; those that occur twice have in brackets what differs: `sapso@pca (cooling 0.9)`.
+    """Return distinct names.
 
-    A setting stands without its plugin, `sapso.cooling`, where no other that differs has the same name; a number tells
-    apart what no detail does.
+    If a name occurs several times, the details that differ follow in brackets:
+    `sapso@pca (cooling 0.9)`. The setting `sapso.cooling` is shortened to `cooling` if
+    no other differing setting has that name. If no detail differs, a number is added.
+
+    Args:
+        names: The names.
+        details: The details of each by their names.
+
+    Returns:
+        The distinct names in the same order.
     """
+    details = list(details)
     by_name: dict[str, list[Mapping[str, str]]] = {}
-    for name, values in zip(names, details := list(details), strict=True):
+    for name, values in zip(names, details, strict=True):
         by_name.setdefault(name, []).append(values)
     differing = {name: _differing(several) for name, several in by_name.items()}
-    longer: dict[str, None] = {}
+    longer: dict[str, None] = {}  # an ordered set
     for name, values in zip(names, details, strict=True):
         words = [
             f"{short} {values[field]}"
@@ -349,17 +380,19 @@ def distinct(
 
 
 def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """Return the fields whose values are not the same in all mappings, with the short names of these fields."""
-    fields = dict.fromkeys(
-        field for values in sorted(several, key=len, reverse=True) for field in values
-    )
-    differ = [
-        field for field in fields if len({values.get(field) for values in several}) > 1
-    ]
-    plain = [field.rpartition(".")[2] for field in differ]
+    """Return the fields whose values differ between the mappings, with short names."""
+    fields: dict[str, None] = {}  # an ordered set
+    # the mapping with the most fields decides their order
+    for values in sorted(several, key=len, reverse=True):
+        fields |= dict.fromkeys(values)
+    differing = []
+    for field in fields:
+        if len({values.get(field) for values in several}) > 1:
+            differing.append(field)
+    short_names = [field.rpartition(".")[2] for field in differing]
     return {
-        field: short if plain.count(short) == 1 else field
-        for field, short in zip(differ, plain, strict=True)
+        field: short if short_names.count(short) == 1 else field
+        for field, short in zip(differing, short_names, strict=True)
     }
 
 

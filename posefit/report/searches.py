@@ -1,4 +1,4 @@
-"""Single searches in a report: their figures, names, intervals and baseline, and what the page has of them alone."""
+"""Single searches in a report: their figures, names, intervals, baseline and page."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -19,12 +19,15 @@ from posefit.suites.problem import TARGETS
 from posefit.suites.running import ALL, SHOWN, SuiteRun, suite_scores
 from posefit.sweep.table import search_run
 
-RANDOM = "random"  # the method that is the baseline
+RANDOM = "random"  # the baseline method
 POINTS = 61  # of a curve
 
 
 def _hits(run: SuiteRun) -> Array:
-    """Return after how many evaluations (targets,) a run reached each target, inf for never."""
+    """Return the evaluations (targets,) after which a run reached each target.
+
+    They are inf for targets that it never reached.
+    """
     return hits((run.evaluations, run.costs), run.targets)
 
 
@@ -60,15 +63,16 @@ SCORE = Score(
     digits=1,
     down=True,
     paired="instances",
-    caption="Share of all runs and targets that a method reached, with the 95 % interval that other instances "
-    "would give, if a function has several; a dashed line is random search.",
-    leaderboard="Shares of targets are means over all runs and targets. Above is the median of the best costs "
-    "above the true pose's. ",
+    caption="Share of all runs and targets that a method reached, with the 95 % "
+    "interval that other instances would give, if a function has several; a dashed "
+    "line is random search.",
+    leaderboard="Shares of targets are means over all runs and targets. Above is the "
+    "median of the best costs above the true pose's. ",
 )
 
 
 class Searches:
-    """What a report knows of single searches."""
+    """The kind of runs of single searches."""
 
     name = "search"
     noun = "searches"
@@ -76,20 +80,18 @@ class Searches:
     columns: Mapping[str, Column] = COLUMNS
     score = SCORE
     named: tuple[str, ...] = ("function", "dimension", "instance")
-    data: tuple[str, ...] = (
-        "runs",
-        "hits",
-    )  # `SuiteRun`; evaluations (targets,), inf for never
+    # a `SuiteRun`, and the result of `_hits`
+    data: tuple[str, ...] = ("runs", "hits")
     baselines: Mapping[str, str] = {RANDOM: "random search"}
 
     def read(self, row: Row, _: dict[bytes, Any], /) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row, its run, and when it reached each target."""
+        """Return the figures of a row, its run, and its evaluations to each target."""
         run = search_run(row)
         figures = np.array([column.value(row) for column in COLUMNS.values()])
         return figures, (run, _hits(run))
 
     def rank(self, place: Place) -> tuple[Any, ...]:
-        """Return what instances are sorted by."""
+        """Return the key by which instances are sorted."""
         return place["function"], place["dimension"], place["instance"], place["suite"]
 
     def place_name(self, place: Place) -> str:
@@ -98,8 +100,11 @@ class Searches:
         return f"{problem}, instance {place['instance']}"
 
     def facts(self, runs: Runs) -> dict[str, Any]:
-        """Return what was run."""
-        targets = f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} above the true pose's"
+        """Return the facts about the runs by their titles."""
+        targets = (
+            f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} "
+            "above the true pose's"
+        )
         return {
             "instances": f"{len(runs.instances):,}",
             "suite": runs.values("suite"),
@@ -114,20 +119,25 @@ class Searches:
         }
 
     def tested_errors(self, contest: Contest) -> Array:
-        """Return the shares of targets that were missed (methods, blocks, 1), in percent.
+        """Return the shares of missed targets (methods, blocks, 1), in percent.
 
-        A block is an instance of a function, the same pose in every dimension: the mean over seeds and dimensions.
+        A block is an instance of a function, which has the same pose in every
+        dimension. Its share is the mean over seeds and dimensions.
         """
         fields = [contest.place_field(n) for n in ("function", "instance", "suite")]
         poses = [*zip(*(field.tolist() for field in fields), strict=True)]
         index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
-        block = np.array([index[pose] for pose in poses])
-        missed = 100.0 - contest.scores
+        block = np.array([index[pose] for pose in poses])  # (runs,)
+        missed = 100.0 - contest.scores  # (methods, runs)
         sums = np.array([np.bincount(block, row) for row in missed])
-        return np.asarray((sums / np.bincount(block))[:, :, None])
+        means = sums / np.bincount(block)  # (methods, blocks)
+        return np.asarray(means[:, :, None])
 
     def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
-        """Return the interval of each method's share of targets that other instances would give."""
+        """Return the interval of each method's share of targets.
+
+        It is the interval that other instances would give.
+        """
         functions = contest.place_field("function")
         instances = contest.place_field("instance")
         board: dict[int, dict[str, Any]] = {
@@ -142,7 +152,7 @@ class Searches:
         return board
 
     def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
-        """Return a row for random search, the best of its variants that take part; none without it."""
+        """Return a row for random search, if it takes part: its best variant."""
         shares = [
             float(shares_of_runs.mean())
             for m, shares_of_runs in zip(contest.methods, contest.scores, strict=True)
@@ -151,7 +161,7 @@ class Searches:
         return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
 
     def place_words(self, contest: Contest) -> str:
-        """Return what a contest was on."""
+        """Return the functions, dimensions and instances of a contest in words."""
         functions = sorted(set(contest.place_field("function").tolist()))
         dimensions = sorted(set(contest.place_field("dimension").tolist()))
         problems = {
@@ -164,7 +174,7 @@ class Searches:
         return f"{words}, {counted(len(problems), 'instance')} in all"
 
     def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
-        """Return what random search reached."""
+        """Return a sentence about the share of targets that random search reached."""
         if first["is_random"]:
             return ["That is random search: no method does better."]
         return [
@@ -172,7 +182,7 @@ class Searches:
         ]
 
     def page(self, _: Runs, contest: Contest | None, /) -> dict[str, Any]:
-        """Return the curves and the running times, and the list of sections."""
+        """Return the curves, the running times and the list of sections."""
         if contest is None:
             return {"sections": []}
         return {
@@ -184,9 +194,10 @@ class Searches:
 
 
 def search_charts(contest: Contest) -> list[Chart]:
-    """Return the shares of targets reached over evaluations, of all functions and of each, with their intervals.
+    """Return charts of the share of targets reached over evaluations.
 
-    Intervals are those that other instances would give.
+    There is one of all functions, and one of each. Intervals show what other instances
+    would give.
     """
     functions = contest.place_field("function")
     dimensions = contest.place_field("dimension")
@@ -225,9 +236,11 @@ def search_charts(contest: Contest) -> list[Chart]:
 
 
 def running_times(contest: Contest) -> list[dict[str, Any]]:
-    """Return the scores of each method's shared runs, a row for each dimension and function: see `suite_scores`.
+    """Return the scores of each method's shared runs.
 
-    There are none of all functions together, whose mean would be that of the hardest.
+    They have a row for each dimension and function, as `suite_scores` returns them.
+    There is no row for all functions together, because the hardest function would
+    decide its mean running time.
     """
     runs = contest.runs.data["runs"]
     return [

@@ -1,4 +1,4 @@
-"""The sentences of a report's first screen: what leads what, by how much, and how certain that is."""
+"""The sentences of a report's first screen: which method leads, and how certainly."""
 
 import math
 from collections.abc import Sequence
@@ -9,17 +9,27 @@ from posefit.report.columns import listed, p_text
 from posefit.report.kind import Contest, Row
 from posefit.statistics.paired import POWER, SIGNIFICANCE
 
-MAX_NEEDED = 1000  # seeds or instances; of more the methods are as good as equal
+# If a difference would take more seeds or instances, the methods are practically equal.
+MAX_NEEDED = 1000
 
 
 def leader_sentences(
     contest: Contest, board: Sequence[Row], baselines: Sequence[Row]
 ) -> list[str]:
-    """Return the sentences of a report, given the leaderboard and the baselines' rows.
+    """Return the sentences about the leader.
 
-    The first has the losses and the error of the first method, and which methods it leads: those that a test shows to
-    be worse, by how much, with interval and p. The next ones have the methods from which no difference is shown, and
-    how many seeds would show one.
+    The first sentence names the first method with its losses and its error, and the
+    methods that a test shows to be worse, with the difference, its interval and p. The
+    next ones name the methods from which no difference is shown, and how many seeds
+    would show one.
+
+    Args:
+        contest: The methods and the runs that they share.
+        board: The rows of the leaderboard.
+        baselines: The rows of the baselines.
+
+    Returns:
+        The sentences.
     """
     first, *others = (row for row in board if row["taking_part"])
     kind = contest.runs.kind
@@ -54,7 +64,7 @@ def leader_sentences(
 
 
 def _value(contest: Contest, row: Row) -> str:
-    """Return the losses and the score of a method, with its interval, as the end of a sentence."""
+    """Return the end of a sentence: a method's losses, and its score with interval."""
     score = contest.runs.kind.score
     value = score.sentence.format(score.text(row[score.name]))
     if row["low"] is not None:
@@ -67,7 +77,7 @@ def _value(contest: Contest, row: Row) -> str:
 
 
 def _led(contest: Contest, worse: Sequence[Row], others: Sequence[Row]) -> str:
-    """Return the methods that are shown to be worse, the nearest one with its effect."""
+    """Return the methods that are shown to be worse; the nearest has its difference."""
     score = contest.runs.kind.score
     rising = sorted(worse, key=lambda row: float(row["behind"]))
     nearest = rising[0]
@@ -86,7 +96,7 @@ def _led(contest: Contest, worse: Sequence[Row], others: Sequence[Row]) -> str:
 
 
 def _effect(contest: Contest, row: Row) -> str:
-    """Return a method with how far it is behind the first, the interval of that, p, and its losses."""
+    """Return a method's name, difference from the first, interval, p and losses."""
     score = contest.runs.kind.score
     details = [score.difference(row["behind"])]
     if math.isfinite(row["behind_low"]):
@@ -99,7 +109,7 @@ def _effect(contest: Contest, row: Row) -> str:
 
 
 def _power(contest: Contest, unclear: Sequence[Row]) -> str:
-    """Return how many seeds would show the differences that are not shown."""
+    """Return a sentence about how many runs would show the differences."""
     score = contest.runs.kind.score
     nearest = min(unclear, key=lambda row: float(row["blocks_needed"]))
     needed = nearest["blocks_needed"]
@@ -112,13 +122,14 @@ def _power(contest: Contest, unclear: Sequence[Row]) -> str:
             f"Not even {MAX_NEEDED:,} {unit} would show differences as small as these."
         )
     return (
-        f"If the difference from {nearest['name']} is real, about {math.ceil(needed):,} {unit} would show it, "
+        f"If the difference from {nearest['name']} is real, about "
+        f"{math.ceil(needed):,} {unit} would show it, "
         f"with a probability of {100 * POWER:.0f} %."
     )
 
 
 def unpaired_sentence(contest: Contest) -> str:
-    """Return how many finished runs are compared with nothing; "" if all are compared."""
+    """Return a sentence about finished runs that are not compared, "" if all are."""
     if not contest.left_out:
         return ""
     has, them = ("run is", "it") if contest.left_out == 1 else ("runs are", "them")

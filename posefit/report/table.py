@@ -1,4 +1,4 @@
-"""The leaderboard as a table: as the command prints it, as CSV, and as LaTeX."""
+"""The leaderboard as a table: printed by the command, as CSV, and as LaTeX."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -24,16 +24,16 @@ _LATEX = {
 
 
 def board_cells(score: Score, row: Row) -> dict[str, str]:
-    """Return what the command prints of a method, by the titles of the columns."""
+    """Return the printed texts of a method's row, by the titles of the columns."""
 
     def number(value: float | None, digits: int) -> str:
         return "-" if value is None else f"{value:z.{digits}f}"
 
     ends = "-"
     if row["low"] is not None:
-        ends = (
-            f"{number(row['low'], score.digits)} to {number(row['high'], score.digits)}"
-        )
+        low = number(row["low"], score.digits)
+        high = number(row["high"], score.digits)
+        ends = f"{low} to {high}"
     p = number(row["p"], 3)
     if row["p"] is not None and row["p"] < 0.001:
         p = "< 0.001"
@@ -57,7 +57,10 @@ def board_cells(score: Score, row: Row) -> dict[str, str]:
 def board_lines(
     score: Score, board: Sequence[Row], baselines: Sequence[Row]
 ) -> list[str]:
-    """Return the leaderboard as lines, and below it the baseline that skills compare with."""
+    """Return the lines of the printed leaderboard.
+
+    The last line is the baseline with which skills compare.
+    """
     cells = [board_cells(score, row) for row in board]
     names = [row["name"] for row in board]
     for baseline in baselines:
@@ -65,20 +68,24 @@ def board_lines(
         if is_shown and baseline[score.name] is not None:
             names.append(BASELINES[LOSS_BASELINE])
             cells.append({score.title: f"{baseline[score.name]:.{score.digits}f}"})
-    widths = {
-        title: max(len(title), *(len(row.get(title, "")) for row in cells))
-        for title in cells[0]
-    }
-    first = max(map(len, names))
-    lines = ["  ".join([" " * first, *(f"{t:>{w}}" for t, w in widths.items())])]
+    widths = {}
+    for title in cells[0]:
+        lengths = [len(row.get(title, "")) for row in cells]
+        widths[title] = max(len(title), *lengths)
+    name_width = max(map(len, names))
+    titles = [f"{title:>{width}}" for title, width in widths.items()]
+    lines = ["  ".join([" " * name_width, *titles])]
     for name, row in zip(names, cells, strict=True):
         texts = [f"{row.get(title, ''):>{width}}" for title, width in widths.items()]
-        lines.append("  ".join([f"{name:{first}}", *texts]).rstrip())
+        lines.append("  ".join([f"{name:{name_width}}", *texts]).rstrip())
     return lines
 
 
 def board_rows(runs: Runs, board: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the leaderboard as rows of a CSV: every figure under its name, and what the page has of a method."""
+    """Return the rows of the leaderboard's CSV file.
+
+    They have every figure under its name, and all else that the page has of a method.
+    """
     score, *others = runs.table_figures
     names = ["name", "settings", score, "low", "high", *EFFECT]
     if "lost_tracks" in board[0]:
@@ -110,6 +117,6 @@ def _latex_row(texts: Sequence[str]) -> str:
         if text == "-":
             cells.append("--")
         else:
-            # a number's sign is no hyphen
+            # the sign of a number is a minus, not a hyphen
             cells.append(re.sub(r"^-(?=\d)", "−", text).translate(escapes))
     return " & ".join(cells) + r" \\"

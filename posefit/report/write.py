@@ -1,4 +1,4 @@
-"""What `posefit report` does: a page, and on request figures, tables and files for other tools."""
+"""The command `posefit report`: a page, and on request figures, a CSV and a table."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -30,26 +30,28 @@ def write_report(
     methods: Sequence[str] = (),
     latest: bool = False,
 ) -> dict[str, Any]:
-    """Write the report of a ledger, or of several together, to a file, and return what the command prints.
+    """Write the report of a ledger, or of several together.
 
-    What an earlier report wrote is replaced, nothing else is.
+    Files of an earlier report are replaced. Other files never are.
 
     Args:
-        path: A folder of ledgers, or a ledger, or several.
-        out: The page; without it no page is written.
+        path: A ledger, a folder of ledgers, or several of these.
+        out: The page. With None no page is written.
         figures: A folder for figures (PNG, PDF) and the leaderboard (CSV).
         csv: A file of all rows.
         latex: A file of the leaderboard as a LaTeX table.
-        methods: The methods that are compared, by their names in the report or in the plan; all if there is none.
-        latest: Whether of methods that differ only in version the latest alone is compared.
+        methods: The methods to compare, by their names in the report or in the plan.
+            All if empty.
+        latest: Whether to compare only the latest version of each method.
 
     Returns:
-        The header, the answer, the leaderboard, the baselines, and the running times of single searches.
+        The data that the command prints: the header, the answer, the leaderboard, the
+        baselines, and the running times of single searches.
 
     Raises:
-        ValueError: If the ledger has no finished row, or something cannot be written: before anything is, if possible.
-        ImportError: If figures need matplotlib.
-
+        ValueError: The ledger has no finished row, or a file cannot be written. As far
+            as possible, this is checked before anything is written.
+        ImportError: Figures are asked for, and matplotlib is not installed.
     """
     paths = [path] if isinstance(path, str | Path) else path
     files = [(out, MARK), (csv, CSV_MARK), (latex, LATEX_MARK)]
@@ -64,7 +66,8 @@ def write_report(
         runs = runs_of(ledger, methods, latest=latest)
         if runs.kind.name == "search" and figures is not None:
             raise InputError(
-                "--figures must be given with a sweep of tracks, got one of single searches"
+                "--figures must be given with a sweep of tracks, "
+                "got one of single searches"
             )
         data = data_of(ledger, runs)
         if latex is not None and "leaderboard" not in data:
@@ -91,7 +94,16 @@ def write_report(
 
 
 def leaderboard_lines(report: dict[str, Any]) -> list[str]:
-    """Return the lines that the command prints: the leader, what is left out, the leaderboard, and the page's place."""
+    """Return the lines that the command prints.
+
+    They have the leader, the problems, the leaderboard, and the path of the page.
+
+    Args:
+        report: The data that `write_report` returns.
+
+    Returns:
+        The lines.
+    """
     lines = [*report["answer"]] if "leaderboard" in report else []
     for text, details in report["header"]["problems"]:
         lines += [text, *(f"  {detail}" for detail in details)]
@@ -104,7 +116,7 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
 
 
 def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the CSV, with the figures that are computed of a row."""
+    """Yield the rows of the CSV file, with the figures that are computed from a row."""
     for row in ledger.all_rows():
         columns = flat(row)
         if row["status"] == "done":
@@ -115,7 +127,10 @@ def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
 
 
 def _check_files(files: Sequence[tuple[str | None, str]]) -> None:
-    """Raise InputError if a file cannot be written: each may replace an earlier one that begins with its mark."""
+    """Raise InputError if a path exists and is not an earlier file of the same kind.
+
+    An earlier file begins with the mark of its kind.
+    """
     for place, mark in files:
         if place is None:
             continue
@@ -132,7 +147,7 @@ def _check_files(files: Sequence[tuple[str | None, str]]) -> None:
 
 
 def _check_distinct(ledger: Path, places: Sequence[str | None]) -> None:
-    """Raise InputError if two outputs, or an output and the ledger, have one path, or a path is in no folder."""
+    """Raise InputError if a path is used twice, or its folder does not exist."""
     paths = [place for place in places if place is not None]
     resolved = [Path(place).resolve() for place in paths]
     for place, path in zip(paths, resolved, strict=True):

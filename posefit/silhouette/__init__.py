@@ -8,5 +8,6 @@
 | a body drawn as spans of bits, compiled | rasteriser.py |
 | its pixels counted against silhouettes, and what it leaves of them, compiled | kernels.py |
 | a person separated from a background, pixel by pixel | foreground.py |
+| which pieces of a mask are one person | pieces.py |
 | what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |
 """

@@ -98,6 +98,18 @@ def _check_finite(name: str, values: Array) -> None:
         )
 
 
+def check_square(cameras: Sequence[Camera]) -> None:
+    """Raise InputError where the pixels of a camera are not square: discs are drawn where ellipses are seen."""
+    for camera in cameras:
+        if camera.square:
+            continue
+        across, down = camera.focal
+        raise InputError(
+            f"camera must have square pixels, focal lengths that are equal, got {across:g} and {down:g}: "
+            "`posefit.track` resamples masks for that, and Camera.squared() is the camera of such masks"
+        )
+
+
 def pose_costs(
     body: Body,
     cameras: Sequence[Camera],
@@ -110,7 +122,9 @@ def pose_costs(
     """Return the cost (n,) of poses (n, 66) at translations (n, 3), and their R, B, Y (views, n, 3). SAPSO (3), (4).
 
     The cost is the mean over the views of which something is known. Each view is counted on its silhouette's device.
+    Raises InputError where the pixels of a camera are not square.
     """
+    check_square(cameras)
     views = zip(cameras, silhouettes, strict=True)
     counts = [areas(body, *view, poses, translations, threads) for view in views]
     costs = [mismatch(view, beta) for view in known_views(counts, silhouettes)]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from posefit.errors import InputError
 from posefit.silhouette.mask import Mask, padded_box, touches_border
+from posefit.silhouette.pieces import people_in
 
 Image = NDArray[np.uint8]  # (height, width, 3)
 
@@ -23,15 +24,12 @@ TINT = 14.0  # and its colour, to within so many grey levels after scaling
 NOISE = 3  # pixels to a side, of which the majority decides
 SPECK = 0.004  # of the image's height: what an opening takes away
 GAP = 0.012  # of the image's height: what a closing joins
-# of the largest piece's height: pieces as near as that belong to the person
-PIECE_REACH = 0.06
-MIN_PIECE_AREA = 0.05  # of the largest piece's area: smaller pieces are noise
-RIVAL_AREA = 0.25  # of the largest person's area: a smaller one is none
 # of the person's height: shadow between parts of the person that are no farther apart
 # is clothing
 BRIDGE = 0.15
+BRIGHT = 127  # a pixel of a mask that is brighter belongs to the person
 MAX_HOLE_AREA = 0.02  # of the person's area: a hole that is smaller is filled
-SAMPLES = 40  # frames that a median background looks at
+SAMPLES = 40  # frames that a median looks at, spread over a film
 HISTORY = 500  # frames that a mixture remembers
 # squared standard deviations from its nearest Gaussian, from which on a pixel is
 # foreground
@@ -166,7 +164,7 @@ class GivenMasks:
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return which pixels are bright, and that nothing is a shadow."""
-        bright = np.asarray(image.max(axis=2) > 127)
+        bright = np.asarray(image.max(axis=2) > BRIGHT)
         return bright, np.zeros_like(bright)
 
 
@@ -211,59 +209,26 @@ def people(
     changed = (
         np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
     )
-    mask, pieces, _ = _largest(_cleaned(changed, height) & inside)
-    if not pieces:
-        return [Person(mask, known, 0, 0, 0.0, False)]
-    size = int(np.ptp(np.flatnonzero(mask.any(axis=1)))) + 1
+    largest = people_in(_cleaned(changed, height) & inside)
+    if not largest:
+        return [Person(np.zeros_like(changed), known, 0, 0, 0.0, False)]
+    size = int(np.ptp(np.flatnonzero(largest[0].mask.any(axis=1)))) + 1
     dark = (
         _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
     )
-    rest = _cleaned(changed | dark, height) & inside
     result = list[Person]()
-    while True:
-        mask, pieces, rival = _largest(rest)
-        rest &= ~mask
-        mask = without_holes(mask)
+    for part in people_in(_cleaned(changed | dark, height) & inside):
+        mask = without_holes(part.mask)
+        border = touches_border(mask)
         area = int(mask.sum())
-        if result and area < RIVAL_AREA * result[0].area:
-            return result
-        result.append(
-            Person(mask, known | mask, area, pieces, rival, touches_border(mask))
-        )
-        if rival * area < RIVAL_AREA * result[0].area:
-            return result
+        result.append(Person(mask, known | mask, area, part.pieces, part.rival, border))
+    return result
 
 
 def _cleaned(mask: Mask, height: int) -> Mask:
     return _morphed(
         _morphed(mask, cv2.MORPH_CLOSE, GAP * height), cv2.MORPH_OPEN, SPECK * height
     )
-
-
-def _largest(mask: Mask) -> tuple[Mask, int, float]:
-    """Return the largest piece with those near it, how many pieces count, and the share of the largest other."""
-    box = padded_box(mask, 0)
-    person = np.zeros_like(mask)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        mask[box].astype(np.uint8), connectivity=8
-    )
-    if count < 2:
-        return person, 0, 0.0
-    areas = stats[1:, cv2.CC_STAT_AREA]
-    largest = 1 + int(areas.argmax())
-    reach = _morphed(
-        labels == largest,
-        cv2.MORPH_DILATE,
-        2.0 * PIECE_REACH * stats[largest, cv2.CC_STAT_HEIGHT],
-    )
-    belongs_to_person = np.zeros(count, dtype=bool)
-    belongs_to_person[labels[reach & mask[box]]] = True
-    rival = float(
-        areas[~belongs_to_person[1:]].max(initial=0)
-        / areas[belongs_to_person[1:]].sum()
-    )
-    person[box] = belongs_to_person[labels]
-    return person, int(np.count_nonzero(areas > MIN_PIECE_AREA * areas.max())), rival
 
 
 def _morphed(mask: Mask, operation: int, size: float) -> Mask:

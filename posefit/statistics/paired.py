@@ -1,8 +1,9 @@
-"""Which of several methods has the lower mean error, judged by paired runs.
+"""Paired tests of which of several methods has the lower mean error.
 
-A block is what methods are compared on. With errors (methods, instances, seeds) it is an instance with a seed, and a
-result holds for these instances. For a claim about instances like these, make each instance one block: give
-`errors.mean(axis=2, keepdims=True)`, because seeds of one instance are not independent of each other.
+Methods are compared on blocks. With errors (methods, instances, seeds) a block is an
+instance with a seed, and the result holds for these instances. For a claim about other
+instances of the same kind, each instance must be one block, because seeds of one
+instance are not independent of each other: pass `errors.mean(axis=2, keepdims=True)`.
 """
 
 import math
@@ -23,40 +24,54 @@ _SHAPE = ("methods", "instances", "seeds")
 
 @dataclass(frozen=True)
 class PairedTest:
-    """Two methods, compared by a paired t test."""
+    """Two methods, compared by a paired t test.
+
+    Attributes:
+        first: The index of a method.
+        second: The index of another.
+        difference: The mean of first - second: below 0 if the first is better.
+        low: The lower end of the difference's 95 % interval, adjusted like p. It is nan
+            if there are too few blocks to show any difference.
+        high: The upper end.
+        p_value: The p of the test.
+        adjusted: The p after Holm's correction for all comparisons.
+        blocks_needed: How many blocks would show a difference of this size, inf if the
+            difference is 0.
+    """
 
     first: int
     second: int
-    difference: float  # mean of first - second, below 0 where the first is better
-    # of the difference's 95 % interval, adjusted as p is; nan where so few blocks can show nothing
+    difference: float
     low: float
     high: float
     p_value: float
-    adjusted: float  # Holm's, for all comparisons made together
-    # blocks that would show a difference of this size, infinite without one
+    adjusted: float
     blocks_needed: float
 
 
 def paired_tests(errors: ArrayLike) -> list[PairedTest]:
     """Return two-sided paired t tests of all pairs of methods.
 
-    The test is of the mean, so a lost run counts by what it costs. A test of ranks counts it as one run among many: of
-    two methods with the same mean, one of which loses 15 % of its 24 runs, Wilcoxon's test calls one better in 29 % of
-    simulated studies, this one in 7 %.
+    The test compares means, so a lost run counts as much as its error. A test of ranks
+    counts it as one run among many. For two methods with the same mean, one of which
+    loses 15 % of its 24 runs, Wilcoxon's test calls one better in 29 % of simulated
+    studies, and this test in 7 %.
 
-    p is at least 2 / 2^n for n blocks, which is the least that signs alone can give: so fewer than 6 blocks show
-    nothing, however equal their differences are. Holm's adjustment (1979) is over all pairs. Intervals are adjusted in
-    the same way, so that one excludes 0 just where the adjusted p is below 0.05. `blocks_needed` is for
-    a power of 80 % at Bonferroni's level, with the difference and the spread that were found.
+    p is at least 2 / 2^n for n blocks, the lowest p that a test of signs can give. So
+    fewer than 6 blocks show nothing, however similar their differences are. Holm's
+    adjustment (1979) is over all pairs. Intervals are adjusted in the same way, so that
+    an interval excludes 0 exactly if the adjusted p is below 0.05. `blocks_needed` is
+    for a power of 80 % at Bonferroni's level, given the observed difference and spread.
 
     Args:
-        errors: Finite numbers (methods, instances, seeds), of at least two methods and two blocks.
+        errors: Finite numbers (methods, instances, seeds), of at least two methods and
+            two blocks.
 
     Returns:
         A test for each pair of methods, in the order of `itertools.combinations`.
 
     Raises:
-        ValueError: If errors are not finite or have another shape.
+        ValueError: Errors are not finite or have another shape.
 
     >>> (pair,) = paired_tests([[[1.0], [2.0], [3.0]], [[2.0], [3.5], [3.5]]])
     >>> pair.difference, round(pair.p_value, 2)
@@ -75,7 +90,7 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
         p_values = np.ones(len(pairs))
     else:
         spreads = differences.std(axis=1, ddof=1)
-        # a difference that is the same in every block up to rounding has no spread
+        # rounding gives equal differences a small spread
         scale = np.abs(runs).max(initial=0.0)
         spreads[spreads < 1e-12 * scale] = 0.0
         p_values = np.maximum(_p_values(means, spreads, blocks), least_p)
@@ -83,7 +98,7 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
     adjusted = np.minimum(1.0, accumulated)
     reach = np.full(len(pairs), np.nan)
     if least_p * len(pairs) < SIGNIFICANCE:
-        # as Holm judges each difference at a level of its own, which is stricter than 5 %
+        # Holm's method judges each difference at a different level, stricter than 5 %
         levels = SIGNIFICANCE * p_values / accumulated
         t = stats.t.ppf(1.0 - levels / 2.0, blocks - 1)
         reach = t * spreads / math.sqrt(blocks)
@@ -102,7 +117,10 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
 
 
 def _p_values(means: Array, spreads: Array, blocks: int) -> Array:
-    """Return the p of a paired t test (pairs,); without spread it is 0, or 1 where there is no difference either."""
+    """Return the p of a paired t test (pairs,).
+
+    Without spread it is 0, or 1 if the mean difference is 0 as well.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.abs(means) * math.sqrt(blocks) / spreads
     p = 2.0 * stats.t.sf(t, blocks - 1)
@@ -110,23 +128,23 @@ def _p_values(means: Array, spreads: Array, blocks: int) -> Array:
 
 
 def _blocks_needed(means: Array, spreads: Array) -> Array:
-    """Return how many blocks would show each of the differences (pairs,)."""
+    """Return how many blocks would show each difference (pairs,)."""
     level = SIGNIFICANCE / len(means)
     reach = stats.norm.ppf(1.0 - level / 2.0) + stats.norm.ppf(POWER)
     with np.errstate(divide="ignore", invalid="ignore"):
         by_spread = np.ceil((reach * spreads / means) ** 2)
-    # the least p of so few blocks, 2 / 2^n, has to be below the level, too
+    # the lowest p of n blocks, 2 / 2^n, must be below the level, too
     by_signs = math.ceil(1.0 - math.log2(level))
     return np.where(means == 0.0, np.inf, np.maximum(by_spread, by_signs))
 
 
 def holm(p_values: ArrayLike) -> Array:
-    """Return p-values (m,) adjusted so that all m may be judged at one level. Holm, 1979."""
+    """Return p-values (m,) adjusted so that one level serves all m. Holm, 1979."""
     return np.minimum(1.0, _accumulated(np.asarray(p_values, dtype=np.float64)))
 
 
 def _accumulated(p_values: Array) -> Array:
-    """Return Holm's products of p-values (m,) and the numbers of comparisons that are left, not cut at 1."""
+    """Return Holm's products (m,) of p-values and remaining tests, not cut at 1."""
     order = np.argsort(p_values, kind="stable")
     factors = np.arange(len(p_values), 0, -1)
     products = np.empty_like(p_values)

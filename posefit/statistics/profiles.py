@@ -1,6 +1,7 @@
-"""What shares of runs and targets are reached: by a number of evaluations, or within an error.
+"""Shares of runs and targets that are reached within some evaluations or an error.
 
-An anytime trace is evaluations (k,), rising, and the best cost so far (k,) at each, never rising.
+An anytime trace consists of evaluations (k,), rising, and the best cost so far (k,) at
+each, which never rises.
 """
 
 import numpy as np
@@ -14,31 +15,64 @@ Trace = tuple[Array, Array]
 
 
 def hits(run: Trace, targets: ArrayLike) -> Array:
-    """Return after how many evaluations (targets,) a run had a cost as low as each target; inf where it never had."""
+    """Return the evaluations (targets,) after which a run first reached each target.
+
+    Args:
+        run: The anytime trace of the run.
+        targets: Costs (targets,). A target is reached by a cost as low.
+
+    Returns:
+        The evaluations, inf for a target that was never reached.
+
+    Raises:
+        ValueError: Targets are not finite or have another shape.
+    """
     levels = finite("targets", targets, ("targets",))
     first = np.searchsorted(-run[1], -levels, side="left")
     return np.append(run[0], np.inf)[first]
 
 
 def attained(hits: ArrayLike, evaluations: ArrayLike) -> Array:
-    """Return the share (p,) of hits, of any shape, that are within each of some numbers of evaluations (p,).
+    """Return the share of hits within each of some numbers of evaluations.
 
-    The empirical distribution of running times over runs and targets: Hansen et al., COCO, 2021.
+    It is the empirical distribution of running times over runs and targets: Hansen et
+    al., COCO, 2021.
+
+    Args:
+        hits: Evaluations of any shape, inf for never, as `hits` returns them.
+        evaluations: Numbers of evaluations (p,).
+
+    Returns:
+        The shares (p,).
+
+    Raises:
+        ValueError: There are no hits, one is nan, or `evaluations` are not finite.
     """
     times = np.sort(np.asarray(hits, dtype=np.float64), axis=None)
     grid = finite("evaluations", evaluations, ("p",))
     if not len(times) or np.isnan(times).any():
+        unknown = np.count_nonzero(np.isnan(times))
         raise InputError(
-            f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(times))} nan of {len(times)}"
+            f"hits must be numbers or inf, got {unknown} nan of {len(times)}"
         )
     return np.searchsorted(times, grid, side="right") / len(times)
 
 
 def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
-    """Return the expected evaluations (targets,) to a target by a method that restarts until it gets there.
+    """Return the expected evaluations of restarts until a run reaches a target.
 
-    `hits` (runs, targets) as of `hits`, `evaluations` (runs,) what each run used in all. It is what all runs used up
-    to their hit, or in all, over the number of runs that hit; inf where none did. Auger and Hansen, 2005.
+    They are the evaluations of all runs until their hit, or until their end if they
+    have none, divided by the number of runs with a hit. Auger and Hansen, 2005.
+
+    Args:
+        hits: Evaluations (runs, targets), inf for never, as `hits` returns them.
+        evaluations: All evaluations of each run (runs,).
+
+    Returns:
+        The expected evaluations (targets,), inf for a target that no run reached.
+
+    Raises:
+        ValueError: The shapes do not agree, or a hit is nan or after the run's end.
     """
     times = np.asarray(hits, dtype=np.float64)
     used = finite("evaluations", evaluations, ("runs",))
@@ -52,26 +86,35 @@ def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
             "hits must be within a run's evaluations or inf, got "
             + ("a later one" if late.any() else "nan")
         )
-    reached = np.isfinite(times)
-    used_in_all = np.where(reached, times, used[:, None]).sum(axis=0)
-    return np.asarray(
-        np.divide(
-            used_in_all,
-            reached.sum(axis=0),
-            out=np.full(len(used_in_all), np.inf),
-            where=reached.any(axis=0),
-        )
+    reached = np.isfinite(times)  # (runs, targets)
+    total = np.where(reached, times, used[:, None]).sum(axis=0)  # (targets,)
+    expected = np.divide(
+        total,
+        reached.sum(axis=0),
+        out=np.full(len(total), np.inf),
+        where=reached.any(axis=0),
     )
+    return np.asarray(expected)
 
 
 def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
-    """Return the share (methods, levels) of each method's runs with an error of at most each level.
+    """Return the share of each method's runs with an error of at most each level.
 
-    `errors` (methods, instances, seeds), which mean the same on every instance: Agarwal et al., 2021.
+    Errors must have the same meaning on every instance. Agarwal et al., 2021.
+
+    Args:
+        errors: Finite numbers (methods, instances, seeds).
+        levels: Errors (levels,).
+
+    Returns:
+        The shares (methods, levels).
+
+    Raises:
+        ValueError: Errors or levels are not finite or have another shape.
     """
     array = finite("errors", errors, ("methods", "instances", "seeds"))
     edges = finite("levels", levels, ("levels",))
-    runs = np.sort(array.reshape(len(array), -1), axis=1)
+    runs = np.sort(array.reshape(len(array), -1), axis=1)  # (methods, runs)
     return np.array(
         [np.searchsorted(row, edges, side="right") / len(row) for row in runs]
     )

@@ -1,4 +1,4 @@
-"""A numbered black-box benchmark: problems in [-1, 1]^d that never change under one name.
+"""A numbered black-box benchmark of problems in [-1, 1]^d, which never change.
 
     import posefit
 
@@ -7,9 +7,10 @@
 
 | looking for | file |
 |---|---|
-| one problem by its numbers, many to go through; calls, counts, budgets, targets | problem.py |
-| which functions, dimensions and instances there are | functions.py |
+| one problem by its numbers, and an iterator over many | problem.py |
+| the functions and their dimensions | functions.py |
 | the instances of each function | instances.py |
-| the boxes that are searched, made by `docs/studies/make_boxes.py` | boxes.py |
-| an optimiser on a problem; the run of any loop; scores of runs | running.py |
+| the search boxes, made by `docs/studies/make_boxes.py` | boxes.py |
+| runs of an optimiser or of any loop, and their scores | running.py |
+| the suite in the form of IOHexperimenter's registry | registry.py |
 """

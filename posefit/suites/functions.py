@@ -1,4 +1,4 @@
-"""The functions of a suite, and its numbers and dimensions. None of this changes under one name."""
+"""The functions of a suite and their dimensions, which never change under one name."""
 
 from dataclasses import dataclass
 
@@ -14,16 +14,23 @@ DIMENSIONS = (9, 10, 16, 20, 24, 40, 66)
 
 @dataclass(frozen=True)
 class SuiteFunction:
-    """One kind of problem, in some dimensions."""
+    """One kind of problem, in some dimensions.
+
+    Attributes:
+        number: Its number.
+        name: Its name.
+        summary: A description in half a sentence.
+        exact: Whether some proposal has the cost 0, as the silhouette is one of the
+            box's poses.
+        dimensions: The dimensions in which it exists.
+        noisy: Whether the cost of a proposal differs when it is evaluated again.
+    """
 
     number: int
     name: str
     summary: str
-    # whether the box holds a proposal of cost 0, as the silhouette is of one of its
-    # poses
     exact: bool
     dimensions: tuple[int, ...] = (9, 10, 16, 20, 24, 40)
-    # whether a proposal costs something else when it is evaluated again
     noisy: bool = False
 
 
@@ -76,16 +83,20 @@ FUNCTIONS = (
 
 
 def suite_function(number: object) -> SuiteFunction:
-    """Return the function of a number. Raises ValueError where there is none."""
+    """Return the function with a number. Raises ValueError if there is none."""
     known = {function.number: function for function in FUNCTIONS}
-    one_of("function", chosen := whole("function", number, 1), known)
+    chosen = whole("function", number, 1)
+    one_of("function", chosen, known)
     return known[chosen]
 
 
 def checked_address(
     name: object, function: object, instance: object, dimension: object
 ) -> tuple[int, int, int]:
-    """Return function, instance and dimension as ints. Raises ValueError where a suite has no such problem."""
+    """Return the function, instance and dimension of a problem as integers.
+
+    Raises ValueError if the suite has no such problem.
+    """
     one_of("suite", name, SUITES)
     chosen = suite_function(function)
     number = instance_number(instance)

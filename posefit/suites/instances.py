@@ -1,7 +1,9 @@
-"""The instances of a suite's functions: a person of the library, a pose, cameras, and their silhouettes.
+"""The instances of a suite's functions: a person, a pose, cameras and silhouettes.
 
-A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose; see
-`posefit.motion.instances`. Training instances are of seven people, the others of three who are in no training data.
+An instance's number means the same person, pose and view in every dimension of a
+function, as far as its box holds the pose; see `posefit.motion.instances`. The people
+are from the library: seven in training instances, and in the others three who are in no
+training data.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,53 +39,69 @@ from posefit.suites.boxes import (
 )
 
 SIZE = (120, 160)  # pixels
-PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and cameras aim
-# metres to a camera; radians it sees across the larger side
-AWAY = 3.5
-FIELD = np.radians(40.0)
-ROOT_RANGE = np.radians([45.0, 20.0, 20.0])  # radians to either side: yaw, pitch, roll
-YAW_OFF = np.radians(20.0)  # from the box's middle to the true yaw, at most
-STEP = 6  # frames, at 30 a second, from one pose of a track to the next
-# of a start, beside how far the last two poses are apart: in half-sides of the box
+PLACE = np.array([0.0, 0.9, 0.0])  # metres; the place of the root, where cameras aim
+AWAY = 3.5  # metres from a camera to the place
+FIELD = np.radians(40.0)  # field of view across the larger side
+ROOT_RANGE = np.radians([45.0, 20.0, 20.0])  # to either side: yaw, pitch, roll
+YAW_OFF = np.radians(20.0)  # the largest distance of the true yaw from the box's middle
+STEP = 6  # frames, at 30 per second, from one pose of a track to the next
+# Half-sides of the box that are added to a start's spread, which is otherwise the
+# distance of the last two poses.
 SPREAD = 0.05
-# of each silhouette of a noisy instance; how strong they are at most
+# Kinds of damage to each silhouette of a noisy instance, and their greatest strength.
 DAMAGES = ("blobs", "holes")
 STRENGTH = 0.6
-POOL = 32  # how many of these an instance has
-# they come in, again and again; a prime
+POOL = 32  # damaged silhouettes of a noisy instance
+# The order of the damaged silhouettes, which repeats. Its length is a prime.
 ORDER = generator("suite").integers(POOL, size=10_007)
-ANCHOR_OFF = 0.3  # metres along each axis that the anchor of an alignment is off
-DIGITS = 4  # of a truth in the box, so that every machine has the same one
+ANCHOR_OFF = 0.3  # metres; the largest error of an alignment's anchor along each axis
+DIGITS = 4  # of a true proposal, so that it is the same on every machine
 
 
 @dataclass(frozen=True, eq=False)
 class SuiteInstance:
-    """The person, the silhouettes and the box of a problem."""
+    """The person, the silhouettes and the box of a problem.
+
+    Attributes:
+        function: The function's number.
+        number: The instance's number.
+        subject: The person in the library.
+        frames: The cost of each frame. There is one frame, or several in a sequence,
+            all with the same box.
+        box: The box of joint angles.
+        truth: The proposal of the true pose (d,), for tests. A search that reads it
+            cheats.
+        truth_cost: The cost of that proposal, 0 if the function is exact.
+        noisy: Of function 4, a cost with each damaged silhouette.
+    """
 
     function: int
     number: int
     subject: str
-    # one, or those of a sequence: they have a box in common
     frames: Sequence[SilhouetteCost] = field(repr=False)
     box: SuiteBox = field(repr=False)
-    # (d,) the proposal of the true pose, for tests: a search that reads it cheats
     truth: Array = field(repr=False)
-    truth_cost: float  # of that proposal; 0 where the function is exact
-    # of function 4: each with a damaged silhouette
+    truth_cost: float
     noisy: Sequence[SilhouetteCost] = field(default=(), repr=False)
 
     @property
     def space(self) -> SearchSpace:
-        """The box, as optimisers take it."""
+        """The search space of optimisers."""
         return self.frames[0].space
 
     def evaluate(self, proposals: Array) -> Array:
-        """Return the costs (n,) of feasible proposals (n, d) without noise: the means over the frames."""
+        """Return the costs (n,) of feasible proposals (n, d) without noise.
+
+        A cost is the mean over the frames.
+        """
         costs = [frame(proposals) for frame in self.frames]
         return np.asarray(np.mean(costs, axis=0))
 
     def evaluate_noisy(self, proposals: Array, first: int) -> Array:
-        """Return the costs (n,) of feasible proposals (n, d) with noise: the evaluations from number `first` on."""
+        """Return the costs (n,) of feasible proposals (n, d) with noise.
+
+        `first` is the number of earlier evaluations, on which the noise depends.
+        """
         costs = np.empty(len(proposals))
         drawn = ORDER[(first + np.arange(len(proposals))) % len(ORDER)]
         for k in np.unique(drawn):
@@ -91,37 +109,41 @@ class SuiteInstance:
         return costs
 
     def repaired(self, proposals: Array) -> Array:
-        """Return proposals (n, d), those that are not feasible moved: into the box, then towards its middle."""
+        """Return feasible proposals (n, d).
+
+        Infeasible ones are moved into the box, and then towards its middle.
+        """
         space = self.space
         allowed = space.feasible(proposals)
         inside = np.clip(proposals, -1.0, 1.0)
         if isinstance(self.box, ComponentBox):
-            latents = space.centre[3:] + space.half[3:] * inside[:, 3:]
-            inside[:, 3:] = np.clip(
-                (self.box.within_reach(latents) - space.centre[3:]) / space.half[3:],
-                -1.0,
-                1.0,
-            )
+            # the first three coordinates are the root's
+            centre = space.centre[3:]
+            half = space.half[3:]
+            latents = self.box.within_reach(centre + half * inside[:, 3:])
+            inside[:, 3:] = np.clip((latents - centre) / half, -1.0, 1.0)
         return np.where(allowed[:, None], proposals, inside)
 
 
 @lru_cache(maxsize=256)
 def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
-    """Return an instance; the same for the same numbers everywhere, which `checked_address` has checked."""
+    """Return an instance, which is the same for the same numbers everywhere.
+
+    The numbers must have been checked by `checked_address`.
+    """
     rng = generator("suite", function, number)
     people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
     subject = people[int(rng.integers(len(people)))]
-    # the root has three
     learned = learned_without(subject)
-    count = dimension - 3
+    count = dimension - 3  # the root has three coordinates
     box: SuiteBox
     if function == 5:
         box = SequenceBox(learned, count)
-    elif function in (7, 9):
-        rotated = (
-            generator("suite", function, number, dimension) if function == 9 else None
-        )
-        box = AngleBox(learned, count, rotated)
+    elif function == 7:
+        box = AngleBox(learned, count)
+    elif function == 9:
+        rotation_rng = generator("suite", function, number, dimension)
+        box = AngleBox(learned, count, rotation_rng)
     else:
         box = ComponentBox(learned, count, mixed=function == 6)
     return _MAKERS[function](_Draft(function, number, subject, box, rng))
@@ -129,7 +151,7 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
 
 @dataclass(frozen=True, eq=False)
 class _Draft:
-    """An instance that is being made: its person, its box and its random numbers."""
+    """The person, the box and the random numbers from which an instance is made."""
 
     function: int
     number: int
@@ -140,35 +162,33 @@ class _Draft:
     def poses(self, count: int = 1) -> Array:
         """Return poses (count, 66) of the person, `STEP` frames apart."""
         clips = recorded.clips([self.subject])
-        last = np.zeros(66)
         while True:
             clip = clips[int(self.rng.integers(len(clips)))]
-            first = int(
-                self.rng.integers(max(int(clip.times[-1]) + 1 - STEP * (count - 1), 1))
-            )
-            poses = wrapped(clip.at(first + STEP * np.arange(count, dtype=np.int64))[0])
-            last = poses[-1]
-            if (
-                is_upright(last)
-                and np.abs(np.diff(poses, axis=0)).max(initial=0.0) < 1.0
-            ):
+            starts = max(int(clip.times[-1]) + 1 - STEP * (count - 1), 1)
+            first = int(self.rng.integers(starts))
+            frames = first + STEP * np.arange(count, dtype=np.int64)
+            poses = wrapped(clip.at(frames)[0])
+            # reject poses that jump, as when an angle passes half a turn
+            largest_change = np.abs(np.diff(poses, axis=0)).max(initial=0.0)
+            if is_upright(poses[-1]) and largest_change < 1.0:
                 return np.asarray(poses)
 
     def space(self, yaw: float) -> SearchSpace:
-        """Return the box around a yaw in radians."""
+        """Return the search space around a yaw in radians."""
         return SearchSpace(self.box, np.array([yaw, 0.0, 0.0]), ROOT_RANGE, PLACE)
 
     def nearest(self, space: SearchSpace, poses: Array) -> Array:
-        """Return the proposals (n, d) nearest to poses (n, 66), feasible, of few digits; of a sequence it is one."""
+        """Return the feasible proposals (n, d) nearest to poses (n, 66), rounded.
+
+        For a sequence there is one proposal of all its poses.
+        """
         latents = self.box.transform(poses[:, 3:])
         if isinstance(self.box, ComponentBox):
             latents = self.box.within_reach(latents)
-        proposals = np.round(
-            space.proposals(np.column_stack([poses[: len(latents), :3], latents])),
-            DIGITS,
-        )
+        coordinates = np.column_stack([poses[: len(latents), :3], latents])
+        proposals = np.round(space.proposals(coordinates), DIGITS)
+        # rounding may move a proposal out of the ellipsoid
         bad = ~space.feasible(proposals)
-        # rounding moved it out of the ellipsoid
         proposals[bad] = np.round(0.999 * proposals[bad], DIGITS)
         return np.asarray(proposals)
 
@@ -178,12 +198,15 @@ class _Draft:
         return _body(recorded.clips([self.subject])[0].skeleton)
 
     def camera(self, azimuth: float) -> Camera:
+        """Return a camera at an azimuth in radians."""
         return Camera.around(PLACE, azimuth, AWAY, SIZE, FIELD)
 
     def silhouette(self, camera: Camera, pose: Array) -> Silhouette:
+        """Return the silhouette of the true body in a pose (66,)."""
         return Silhouette.of(project(self.body, camera, pose, PLACE))
 
     def made(self, truth: Array, *frames: SilhouetteCost) -> SuiteInstance:
+        """Return the instance with a true proposal (d,) and the cost of each frame."""
         truth = truth.copy()
         truth.setflags(write=False)
         made = SuiteInstance(
@@ -198,7 +221,10 @@ def _body(skeleton: Skeleton) -> Body:
 
 
 def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
-    """Return a pose of the box, seen from anywhere by one camera or more at right angles."""
+    """Return an instance of one pose, seen from a random direction.
+
+    More cameras are at right angles to each other.
+    """
     pose = draft.poses()[0]
     rng = draft.rng
     space = draft.space(pose[0] + YAW_OFF * rng.uniform(-1.0, 1.0))
@@ -212,16 +238,23 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
 
 
 def _still(draft: _Draft, pose: Array) -> Array:
-    """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
+    """Return a pose (66,) with random values of angles that are constant in the data.
+
+    The truth would otherwise be in the middle of the box along these angles.
+    """
     moved = pose.copy()
-    offs = draft.rng.uniform(-0.5, 0.5, 66)
+    offsets = draft.rng.uniform(-0.5, 0.5, 66)
     if isinstance(draft.box, AngleBox):
-        moved[3 + draft.box.constant] += CONSTANT * offs[3 + draft.box.constant]
+        constant = 3 + draft.box.constant
+        moved[constant] += CONSTANT * offsets[constant]
     return moved
 
 
 def _next_frame(draft: _Draft) -> SuiteInstance:
-    """Return the third of three poses of a track, as the box holds them, with a start where the first two lead."""
+    """Return an instance of the third of three poses of a track.
+
+    Its start is the prediction from the first two.
+    """
     poses = draft.poses(3)
     rng = draft.rng
     space = draft.space(float(poses[1, 0]) + 0.25 * YAW_OFF * rng.uniform(-1.0, 1.0))
@@ -229,28 +262,27 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
     before, last, truth = draft.nearest(space, poses)
     step = last - before
     pose = space.decode(truth[None])[0][0]
-    mean = draft.nearest(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[
-        0
-    ]
+    predicted = np.clip(last + step, -1.0, 1.0)
+    mean = draft.nearest(space, space.decode(predicted[None])[0])[0]
     space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
-    return draft.made(
-        truth,
-        SilhouetteCost(draft.body, [camera], [draft.silhouette(camera, pose)], space),
-    )
+    silhouette = draft.silhouette(camera, pose)
+    cost = SilhouetteCost(draft.body, [camera], [silhouette], space)
+    return draft.made(truth, cost)
 
 
 def _noisy(draft: _Draft) -> SuiteInstance:
-    """Return a pose of the box whose silhouette is damaged again at each evaluation."""
+    """Return an instance whose silhouette has another damage at each evaluation."""
     made = _single(draft)
     rng = draft.rng
     mask = made.frames[0].silhouettes[0].mask
     noisy = []
     for _ in range(POOL):
+        strengths = rng.uniform(0.0, STRENGTH, len(DAMAGES))
         damaged = corrupted(
             mask,
-            dict(zip(DAMAGES, rng.uniform(0.0, STRENGTH, len(DAMAGES)), strict=True)),
+            dict(zip(DAMAGES, strengths, strict=True)),
             rng,
-            # the instances of a published suite stay as they are
+            # the instances of a published suite must not change
             shows=False,
         )
         noisy.append(replace(made.frames[0], silhouettes=[Silhouette.of(damaged)]))
@@ -258,7 +290,10 @@ def _noisy(draft: _Draft) -> SuiteInstance:
 
 
 def _sequence(draft: _Draft) -> SuiteInstance:
-    """Return `FRAMES` poses of a motion as the box holds them, before one camera; the root turns in none of them."""
+    """Return an instance of `FRAMES` poses of a motion, seen by one camera.
+
+    The root has the same direction in all of them.
+    """
     poses = draft.poses(FRAMES)
     rng = draft.rng
     box = draft.box
@@ -266,19 +301,17 @@ def _sequence(draft: _Draft) -> SuiteInstance:
     space = draft.space(float(poses[0, 0]) + YAW_OFF * rng.uniform(-1.0, 1.0))
     camera = draft.camera(rng.uniform(-np.pi, np.pi))
     truth = draft.nearest(space, poses)
-    spaces = [replace(space, prior=frame) for frame in box.frames]
-    silhouettes = [
-        draft.silhouette(camera, frame.decode(truth)[0][0]) for frame in spaces
-    ]
-    costs = [
-        SilhouetteCost(draft.body, [camera], [silhouette], frame)
-        for silhouette, frame in zip(silhouettes, spaces, strict=True)
-    ]
+    costs = []
+    for prior in box.frames:
+        frame_space = replace(space, prior=prior)
+        silhouette = draft.silhouette(camera, frame_space.decode(truth)[0][0])
+        cost = SilhouetteCost(draft.body, [camera], [silhouette], frame_space)
+        costs.append(cost)
     return draft.made(truth[0], *costs)
 
 
 def _aligned(draft: _Draft) -> SuiteInstance:
-    """Return a pose of the box whose place is taken from the silhouette's borders."""
+    """Return an instance whose place is estimated from the silhouette's borders."""
     made = _single(draft)
     anchor = PLACE + ANCHOR_OFF * draft.rng.uniform(-1.0, 1.0, 3)
     space = replace(made.space, anchor=anchor, translation="aligned")

@@ -1,9 +1,9 @@
-"""Problems of a suite, by their numbers: `suite` returns one, `Suite` goes through many.
+"""Problems of a suite by number: `suite` returns one, `Suite` iterates over many.
 
-Each is a `posefit.Problem`, whose cost function is a `SuiteCost`. Its attributes have the names of COCO's problems, so
-that loops written for those run on it as they are.
+Each is a `posefit.Problem` with a `SuiteCost` as its cost function. Its attributes have
+the same names as in COCO, so loops written for COCO run on it unchanged.
 
-Problems may be added to a suite; nothing else of one ever changes.
+A suite may get more problems, but nothing else about it ever changes.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -34,21 +34,43 @@ from posefit.suites.instances import SuiteInstance, suite_instance
 Infeasible = Literal["repair", "reject", "penalise"]
 INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
 
-# above the true pose's cost, 32 to 0.25: a pixel is about 0.03
+# above the true pose's cost, from 32 to 0.25; a pixel costs about 0.03
 TARGETS = 2.0 ** np.arange(5.0, -2.25, -0.25)
-# cost of a half-side of the box between a penalised proposal and its repair
+# of a penalised proposal, for each half-side of the box from its repaired one
 PENALTY = 100.0
-EVALUATIONS = 100  # of the usual budget, for each dimension
+EVALUATIONS = 100  # the default budget per dimension
 
 
 @final
 class SuiteCost:
-    """The cost function of a numbered problem, and what is known of it: `problem.targets`, `problem.look()`.
+    """The cost function of a numbered problem.
 
-    A proposal is infeasible outside the box, and outside the ellipsoid of `posefit.suites.boxes`, which holds the poses
-    that people take. With `infeasible="repair"` it costs as much as the proposal that `repaired` returns for it; with
-    "reject" its cost is infinite; with "penalise" it is the cost of the repaired one, and 100 for each half-side of the
-    box between the two.
+    A problem of a suite has these attributes as well.
+
+    A proposal is infeasible outside the box, and outside the ellipsoid of
+    `posefit.suites.boxes`, which contains the poses that people take. `infeasible`
+    decides its cost:
+
+    - "repair": the cost of the proposal that `repaired` returns for it
+    - "reject": infinite
+    - "penalise": the cost of the repaired proposal, plus 100 for each half-side of the
+      box between the two
+
+    Args:
+        suite: The suite's name.
+        function: The function.
+        made: The instance.
+        infeasible: The treatment of infeasible proposals.
+
+    Attributes:
+        id_function: The function's number.
+        instance: The instance's number, also `id_instance`.
+        name: The problem in words.
+        start: The predicted start of the search with its spread, or None.
+        optimum: The lowest cost: 0 if the silhouette is of a pose of the box, or None
+            if it is unknown.
+        truth_cost: The cost of the true pose, which is feasible.
+        looked: Whether `look` was called, so that the method does not search blind.
     """
 
     def __init__(
@@ -66,14 +88,13 @@ class SuiteCost:
         self.instance = made.number
         self.id_instance = made.number
         d = len(made.truth)
-        self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"
-        # the predicted start of the search, with its spread; None without a prediction
+        self.name = (
+            f"{suite} f{function.number} {function.name}, "
+            f"instance {made.number} in {d}D"
+        )
         self.start = made.space.start
-        # the lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown
         self.optimum = 0.0 if function.exact else None
-        # of the true pose, which is in the box and feasible
         self.truth_cost = made.truth_cost
-        # whether `look` was called: then a run is one of a method that looks
         self.looked = False
 
     def __call__(self, proposals: Array) -> Array:
@@ -81,44 +102,50 @@ class SuiteCost:
         return self.made.evaluate(self.repaired(proposals)) + self._penalties(proposals)
 
     def noisy(self, proposals: Array, first: int) -> Array:
-        """Return the costs (n,) of proposals (n, d) with noise: the evaluations from number `first` on."""
+        """Return the costs (n,) of proposals (n, d) with noise.
+
+        `first` is the number of earlier evaluations, on which the noise depends.
+        """
         costs = self.made.evaluate_noisy(self.repaired(proposals), first)
         return costs + self._penalties(proposals)
 
     def noise_free(self, proposals: Array) -> Array:
-        """Return the costs (n,) of proposals (n, d), without noise and uncounted: a search that calls this cheats."""
+        """Return the costs (n,) of proposals (n, d) without noise and without counting.
+
+        A search that calls this cheats.
+        """
         return self(np.asarray(proposals, dtype=np.float64).reshape(-1, self._d))
 
     def repaired(self, proposals: Array) -> Array:
-        """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""
+        """Return feasible proposals (n, d).
+
+        Infeasible ones are moved into the box, and then straight towards its middle.
+        """
         rows = np.asarray(proposals, dtype=np.float64).reshape(-1, self._d)
-        return (
-            rows if self.made.space.feasible(rows).all() else self.made.repaired(rows)
-        )
+        if self.made.space.feasible(rows).all():
+            return rows
+        return self.made.repaired(rows)
 
     def look(self) -> list[list[tuple[Camera, Mask]]]:
-        """Return each frame's cameras with what they show, for a method that does not search blind.
+        """Return the cameras and masks of each frame.
 
-        A run is marked from then on. Where silhouettes are noisy, it is the first of them.
+        A method that calls this does not search blind, and `looked` marks its run. If
+        the problem is noisy, the result has the first of its masks.
         """
         self.looked = True
         frames = self.made.noisy[:1] or self.made.frames
-        return [
-            [
-                (camera, silhouette.mask)
-                for camera, silhouette in zip(
-                    frame.cameras, frame.silhouettes, strict=True
-                )
-            ]
-            for frame in frames
-        ]
+        views_of_frames = []
+        for frame in frames:
+            masks = [silhouette.mask for silhouette in frame.silhouettes]
+            views_of_frames.append(list(zip(frame.cameras, masks, strict=True)))
+        return views_of_frames
 
     @property
     def _d(self) -> int:
         return len(self.made.truth)
 
     def _penalties(self, proposals: Array) -> Array:
-        """Return what is added to the costs (n,) of proposals (n, d) that are not feasible."""
+        """Return what infeasible proposals (n, d) cost in addition (n,)."""
         penalties = np.zeros(len(proposals))
         if self.infeasible == "repair":
             return penalties
@@ -140,12 +167,22 @@ def suite(
     infeasible: Infeasible = "repair",
     budget: int | None = None,
 ) -> Problem:
-    """Return a problem of a suite: the same for the same numbers on every machine, with nothing evaluated yet.
+    """Return a problem of a suite, the same for the same numbers on every machine.
 
-    Instances below 10,000 are for training, those up to 19,999 are held out. `posefit.Suite` lists the functions and
-    their dimensions; `SuiteCost` documents `infeasible`; `budget` is the problem's.
+    Args:
+        name: The suite's name.
+        function: The function's number. `posefit.Suite` lists the functions.
+        instance: The instance's number. Instances below 10,000 are for training, and
+            instances from 10,000 to 19,999 are held out.
+        dimension: The dimension, one of the function's.
+        infeasible: The treatment of infeasible proposals, see `SuiteCost`.
+        budget: The most evaluations of the problem, or None for no limit.
 
-    Raises ValueError where there is no such problem.
+    Returns:
+        The problem, with nothing evaluated yet.
+
+    Raises:
+        ValueError: There is no such problem.
     """
     number, instance, dimension = checked_address(name, function, instance, dimension)
     one_of("infeasible", infeasible, INFEASIBLE)
@@ -159,18 +196,31 @@ def suite(
         repair=cost.repaired if infeasible == "repair" else None,
         noisy=cost.noisy if chosen.noisy else None,
         targets=made.truth_cost + TARGETS,
-        # without blanks, as in posefit-2026.3_f001_i00017_d09
+        # without blanks, such as posefit-2026.3_f001_i00017_d09
         id=f"{name}_f{number:03d}_i{instance:05d}_d{dimension:02d}",
     )
 
 
 @final
 class Suite:
-    """Problems to go through, each made in its turn: `for problem in Suite(): ...`, as with COCO's.
+    """An iterable of problems, as in COCO: `for problem in Suite(): ...`.
 
-    By default that is each function in each of its dimensions, on fifteen held-out instances; dimensions that a
-    function does not have are passed over, and functions with none of them are `passed_over`. The order is by
-    dimension, function and instance. Raises ValueError for an unknown number, or where nothing is left.
+    Each problem is made when it is reached. The order is by dimension, function and
+    instance. A function has no problems in dimensions in which it does not exist.
+
+    Args:
+        name: The suite's name.
+        functions: Numbers of functions, by default all.
+        dimensions: Dimensions, by default all.
+        instances: Numbers of instances, by default fifteen that are held out.
+        infeasible: The treatment of infeasible proposals, see `SuiteCost`.
+        budget: The most evaluations of each problem, or None for no limit.
+
+    Attributes:
+        passed_over: The functions that exist in none of the dimensions.
+
+    Raises:
+        ValueError: A number is unknown, or there are no problems.
     """
 
     def __init__(
@@ -184,11 +234,9 @@ class Suite:
         budget: int | None = None,
     ) -> None:
         one_of("suite", name, SUITES)
-        chosen = (
-            FUNCTIONS
-            if functions is None
-            else [suite_function(number) for number in _numbers("functions", functions)]
-        )
+        chosen: Sequence[SuiteFunction] = FUNCTIONS
+        if functions is not None:
+            chosen = list(map(suite_function, _numbers("functions", functions)))
         dimensions = _numbers("dimensions", dimensions)
         instances = _numbers("instances", instances)
         for dimension in dimensions:
@@ -207,12 +255,13 @@ class Suite:
         ]
         if not self._addresses:
             raise InputError(
-                f"a suite must hold at least one problem, got none in {list(dimensions)} dimensions"
+                "a suite must hold at least one problem, "
+                f"got none in {list(dimensions)} dimensions"
             )
 
     @property
     def functions(self) -> tuple[SuiteFunction, ...]:
-        """The functions that problems are of, each with its number, name, summary and dimensions."""
+        """The functions of the problems."""
         numbers = {number for number, _, _ in self._addresses}
         return tuple(function for function in FUNCTIONS if function.number in numbers)
 
@@ -223,7 +272,7 @@ class Suite:
         if isinstance(index, slice):
             raise InputError(
                 f"index must be the number of one problem, got {quoted(index)}: "
-                "problems are made in their turn, as itertools.islice takes them"
+                "itertools.islice makes several, one after the other"
             )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)
@@ -234,9 +283,10 @@ class Suite:
 
 
 def _numbers(what: str, numbers: object) -> list[int]:
-    """Return numbers as a list, since a generator gives them once only. Raises InputError where there are none."""
+    """Return numbers as a list. Raises InputError if there are none."""
     if not isinstance(numbers, Iterable) or isinstance(numbers, str):
         raise InputError(f"{what} must be a list of numbers, got {quoted(numbers)}")
+    # a generator yields them only once
     listed = list(numbers)
     if not listed:
         raise InputError(f"{what} must hold at least one number, got none")

@@ -1,9 +1,11 @@
-"""Runs on problems of a suite, of a plugin's optimiser or any loop; scores of runs: targets reached, running times.
+"""Runs of an optimiser, or of any loop, on problems of a suite, and scores of runs.
 
-Only runs with the same method, function, dimension, budget and way with infeasible proposals are taken together.
+A score is of runs with the same method, function, dimension, budget and treatment of
+infeasible proposals. It has the share of reached targets, and expected running times.
 
-Targets are an instance's own, from 32 to 0.25 above the cost of its true pose. Hansen et al., COCO: a platform for
-comparing continuous optimizers in a black-box setting, 2021.
+Each instance has different targets, from 32 to 0.25 above the cost of its true pose.
+Hansen et al., COCO: a platform for comparing continuous optimizers in a black-box
+setting, 2021.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,7 +29,24 @@ RNG_STREAM = 2027  # part of the seed of every search
 
 @dataclass(frozen=True, eq=False)
 class SuiteRun:
-    """The run of a method on a problem."""
+    """The run of a method on a problem.
+
+    Attributes:
+        suite: The suite's name.
+        method: The method's name.
+        settings: The method's settings by name.
+        function: The function's number.
+        dimension: The problem's dimension.
+        instance: The instance's number.
+        seed: The seed of the run.
+        budget: The most evaluations.
+        infeasible: The treatment of infeasible proposals, see `SuiteCost`.
+        truth_cost: The cost of the true pose.
+        targets: The costs of the targets (t,), falling.
+        evaluations: Evaluations of the trace (k,), the last one at the end of the run.
+        costs: The best cost after each of these (k,).
+        looked: Whether the method read the silhouette, see `Problem.look`.
+    """
 
     suite: str
     method: str
@@ -36,18 +55,17 @@ class SuiteRun:
     dimension: int
     instance: int
     seed: int
-    budget: int  # of evaluations
-    infeasible: str  # the way with infeasible proposals: see `SuiteCost`
+    budget: int
+    infeasible: str
     truth_cost: float
-    targets: Array = field(repr=False)  # (t,) costs, falling
-    # (k,) of the trace, the last of the run at its end
+    targets: Array = field(repr=False)
     evaluations: Array = field(repr=False)
-    costs: Array = field(repr=False)  # (k,)
-    looked: bool = False  # whether the method read the silhouette, see `Problem.look`
+    costs: Array = field(repr=False)
+    looked: bool = False
 
     @property
     def cost(self) -> float:
-        """The best cost."""
+        """The best cost of the run."""
         return float(self.costs[-1])
 
 
@@ -59,12 +77,23 @@ def run_on(
     evaluations: int | None = None,
     seed: int = 0,
 ) -> SuiteRun:
-    """Return the run of an optimiser, by its name, on a problem within a budget; the same for the same seed.
+    """Run an optimiser on a problem. The same seed gives the same run.
 
-    `evaluations` becomes the problem's budget; by default it keeps its own, or has 100 for each dimension.
+    Args:
+        problem: The problem, with nothing evaluated yet.
+        method: The optimiser's name.
+        chosen: Its settings by name.
+        evaluations: The problem's new budget. By default it is the problem's present
+            one, or 100 per dimension if it has none.
+        seed: The seed of the run.
 
-    Raises ValueError where there is no such optimiser or setting, where the budget does not hold one population, and
-    where the plugin breaks a rule of optimisers; ImportError where a library it needs is not installed.
+    Returns:
+        The run.
+
+    Raises:
+        ValueError: There is no such optimiser or setting, one population takes more
+            than the budget, or the plugin breaks a rule of optimisers.
+        ImportError: The optimiser needs a library that is not installed.
     """
     if evaluations is None:
         evaluations = problem.budget or EVALUATIONS * problem.dimension
@@ -75,13 +104,11 @@ def run_on(
     )
     factory = registry().optimiser(method)
     chosen = settings.check(method, factory, chosen or {})
-    with plugin_errors(
-        f"optimiser {method}", "construction", (BudgetError, ImportError)
-    ):
-        optimiser = factory(
-            space, rng, **settings.planned(factory, chosen, evaluations)
-        )
-    guarded = Checked(optimiser, f"optimiser {method}", space, evaluations)
+    plugin = f"optimiser {method}"
+    with plugin_errors(plugin, "construction", (BudgetError, ImportError)):
+        planned = settings.planned(factory, chosen, evaluations)
+        optimiser = factory(space, rng, **planned)
+    guarded = Checked(optimiser, plugin, space, evaluations)
     minimise(problem, guarded, budget_known=True)
     return run_of(problem, method, chosen, seed=seed, budget=evaluations)
 
@@ -94,22 +121,38 @@ def run_of(
     seed: int = 0,
     budget: int | None = None,
 ) -> SuiteRun:
-    """Return the run that any loop has made on a problem, by the name of its method and its settings.
+    """Return the run of any loop that has evaluated a problem.
 
-    `budget` is the problem's where it has one. Raises ValueError where nothing feasible was evaluated, or more than the
-    budget.
+    Args:
+        problem: The problem, after the run.
+        method: The method's name.
+        chosen: Its settings by name.
+        seed: The seed of the run.
+        budget: The most evaluations that the run could have had, by default the
+            problem's budget.
+
+    Returns:
+        The run.
+
+    Raises:
+        ValueError: Nothing feasible was evaluated, the budget is unknown, or there were
+            more evaluations than the budget.
     """
     if not len(problem.points):
         raise InputError(
-            f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected"
+            f"{problem.id}: {method} must propose something feasible, "
+            f"got {problem.evaluations} rejected"
         )
-    if (budget := problem.budget if budget is None else budget) is None:
+    if budget is None:
+        budget = problem.budget
+    if budget is None:
         raise InputError(
             f"{problem.id}: budget must be known, here or of the problem, got none"
         )
     if problem.evaluations > budget:
         raise InputError(
-            f"{problem.id}: evaluations must be at most {budget}, the budget, got {problem.evaluations}"
+            f"{problem.id}: evaluations must be at most {budget}, the budget, "
+            f"got {problem.evaluations}"
         )
     evaluations, costs = problem.trace
     return SuiteRun(
@@ -130,39 +173,62 @@ def run_of(
     )
 
 
-ALL = 0  # the number that stands for all functions together
-# of the targets above the true pose's cost, those with an expected running time
+ALL = 0  # the number of all functions together
+# the targets, above the true pose's cost, with an expected running time
 SHOWN = (16.0, 4.0, 1.0, 0.25)
 
 
 @dataclass(frozen=True)
 class SuiteScore:
-    """The score of runs of one method with one budget on one function in one dimension."""
+    """The score of runs of one method with one budget on one function in one dimension.
+
+    Attributes:
+        method: The method with its settings.
+        function: The function's number, 0 for all functions together.
+        name: The function's name.
+        dimension: The dimension.
+        budget: The most evaluations of a run.
+        infeasible: The treatment of infeasible proposals, see
+            `posefit.suites.problem.SuiteCost`.
+        looked: Whether the method read silhouettes instead of searching blind.
+        runs: The number of runs.
+        above: The median of the best costs above the true poses'. It is below 0 if
+            searches find lower costs.
+        reached: The share of runs and targets that were reached.
+        running_times: The expected evaluations to a cost so much above the true pose's,
+            None for never. All functions together have none, because the hardest
+            function would decide their mean.
+    """
 
     method: str
     function: int
     name: str
     dimension: int
-    budget: int  # evaluations that a run could have had
-    # the way with infeasible proposals: see `posefit.suites.problem.SuiteCost`
+    budget: int
     infeasible: str
-    looked: bool  # whether the method read silhouettes, where the others search blind
+    looked: bool
     runs: int
-    # median of the best costs above the true poses'; below 0 where searches find lower
-    # ones
     above: float
-    reached: float  # share of runs and targets
-    # expected evaluations to so much above the true pose's cost; None for never. Of all functions there are none: a
-    # mean over them would be that of the hardest
+    reached: float
     running_times: dict[float, float | None]
 
 
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
-    """Return the scores of runs, by dimension, function and method, the best first, and after them those that look.
+    """Return the scores of runs, by dimension and function, the best method first.
 
-    In a dimension with several functions those of all together come first, as function 0. Methods with other settings
-    are other methods; runs with another budget, or with another way with what is not feasible, have a score of their
-    own. Raises ValueError where there is no run.
+    Methods that looked at the silhouettes come after the others. In a dimension with
+    several functions, the scores of all functions together come first, as function 0. A
+    method with other settings is another method. Runs with different budgets or
+    treatments of infeasible proposals have separate scores.
+
+    Args:
+        runs: The runs.
+
+    Returns:
+        The scores.
+
+    Raises:
+        ValueError: There are no runs.
     """
     groups: dict[tuple[int, int, str, int, str], list[SuiteRun]] = {}
     for run in runs:
@@ -171,27 +237,26 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
             groups.setdefault(key, []).append(run)
     if not groups:
         raise InputError("runs must be at least one, got none")
-    pairs = {(dimension, function) for dimension, function, *_ in groups}
-    several = {
-        dimension
-        for dimension, _ in pairs
-        if sum(other == dimension for other, _ in pairs) > 2
-    }
-    scores = [
-        _score(method, function, group)
-        for (dimension, function, method, *_), group in groups.items()
-        if function != ALL or dimension in several
-    ]
+    functions_of: dict[int, set[int]] = {}
+    for dimension, function, *_ in groups:
+        functions_of.setdefault(dimension, set()).add(function)
+    scores = []
+    for (dimension, function, method, *_), group in groups.items():
+        # `ALL` and one function would be the same score twice
+        is_repeated = function == ALL and len(functions_of[dimension]) == 2
+        if not is_repeated:
+            scores.append(_score(method, function, group))
     return sorted(scores, key=_rank)
 
 
 def _rank(score: SuiteScore) -> tuple[Any, ...]:
-    best_first = -score.reached, score.above
+    """Return the key by which scores are sorted."""
     return (
         score.dimension,
         score.function,
         score.looked,
-        *best_first,
+        -score.reached,
+        score.above,
         score.method,
         score.budget,
         score.infeasible,
@@ -199,23 +264,24 @@ def _rank(score: SuiteScore) -> tuple[Any, ...]:
 
 
 def method_name(run: SuiteRun) -> str:
-    """Return a run's method with its settings, marked where it looks."""
-    chosen = ", ".join(
-        [f"{name}={value}" for name, value in sorted(run.settings.items())]
-        + ["looks"] * run.looked
-    )
-    return f"{run.method} ({chosen})" if chosen else run.method
+    """Return a run's method with its settings, and "looks" if it read silhouettes."""
+    details = [f"{name}={value}" for name, value in sorted(run.settings.items())]
+    if run.looked:
+        details.append("looks")
+    return f"{run.method} ({', '.join(details)})" if details else run.method
 
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
-    """Return the score of runs that differ only in their instances, seeds and functions."""
+    """Return the score of runs that differ only in instances, seeds and functions."""
     reached = np.array(
         [hits((run.evaluations, run.costs), run.targets) for run in runs]
     )
     used = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, used)
-    shown = () if function == ALL else SHOWN
-    places = [int(np.flatnonzero(above == TARGETS)[0]) for above in shown]
+    running_times: dict[float, float | None] = {}
+    for above in () if function == ALL else SHOWN:
+        time = times[int(np.flatnonzero(above == TARGETS)[0])]
+        running_times[above] = float(time) if np.isfinite(time) else None
     return SuiteScore(
         method=method,
         function=function,
@@ -227,8 +293,5 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         runs=len(runs),
         above=float(np.median([run.cost - run.truth_cost for run in runs])),
         reached=float(np.isfinite(reached).mean()),
-        running_times={
-            above: float(times[place]) if np.isfinite(times[place]) else None
-            for above, place in zip(shown, places, strict=True)
-        },
+        running_times=running_times,
     )

@@ -1,11 +1,16 @@
-"""Comparative sweeps: many runs that cannot be lost.
+"""Comparative sweeps: many runs, with results that survive crashes.
 
-    plan = Plan.read("plan.toml")                     # or Plan.of({...}); raises ValueError for every mistake
-    frame = Ledger("results").frame()                 # what `posefit sweep plan.toml --out results` measured
+    plan = Plan.read("plan.toml")        # or Plan.of({...}); ValueError if it is wrong
+    frame = Ledger("results").frame()    # after `posefit sweep plan.toml --out results`
 
-A plan (plan.py) consists of cells (cell.py), tracks or single searches, all checked before anything runs (check.py).
-A driver (drive.py) has an engine run them (engine.py: pebble's processes in pool.py and worker.py, Dask's workers in
-cluster.py) and writes their rows to a ledger, an SQLite file (ledger.py); rows are checked where they are read. The
-observations of a cell follow from its motion and instance (`posefit.motion.instances`), so that methods are paired.
-`posefit.report` compares them.
+A plan (plan.py) consists of cells (cell.py). A cell is one track or one search. All
+cells are checked before any of them runs (check.py).
+
+A driver (drive.py) passes the cells to an engine (engine.py), which runs them in other
+processes: pebble's on this machine (pool.py and worker.py) or Dask's workers
+(cluster.py). The driver writes each result as a row of a ledger, an SQLite file
+(ledger.py). Rows are checked when they are read.
+
+A cell's motion and instance determine its observations (`posefit.motion.instances`), so
+all methods see the same ones and can be compared in pairs. `posefit.report` does that.
 """

@@ -1,10 +1,13 @@
-"""A cell: one run of a sweep, a track or a search, described completely by names and numbers; and its result."""
+"""A cell: one run of a sweep, either a track or a search.
+
+Names and numbers describe it completely. `run_cell` runs it and returns its row.
+"""
 
 import hashlib
-import io
 import json
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,30 +18,28 @@ from posefit.settings import settings_text
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
-    from posefit.arrays import Array
     from posefit.footage.scene import Scene
 
-ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
-RNG_STREAM_PERSON = 2001  # of what a method knows of the person
-DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
-# that a row has under another name, or not at all
+ALL_AROUND = 180.0  # degrees; with an error this large the yaw is unknown
+RNG_STREAM_PERSON = 2001  # of the errors in a method's knowledge of the person
+DROPPED = "dropped"  # the corruption that removes a share of the frames
+# measures that a row has under another name, or lacks
 RENAMED_MEASURES = ("evaluations", "evaluations_per_second")
 
 
-@dataclass(frozen=True)
-class CellResult:
-    """What a cell measured; but for the times, the same bits wherever it ran."""
-
-    row: dict[str, Any]  # as JSON holds it: the key, the spec, and the figures
-    # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
-    joints: bytes = field(repr=False)
-
-
 class Cell:
-    """Everything that one run depends on. `posefit.sweep.plan` makes cells that are checked.
+    """Everything that one run depends on. `posefit.sweep.plan` makes checked cells.
 
-    `version` is that of posefit and of the method's plugins, with digests of their sources: see
-    `posefit.registry.version_of`. `name` is what reports call the method; it changes no result, and no key.
+    Attributes:
+        kind: "track" or "search".
+        method: The method's name.
+        settings: The method's settings by name.
+        evaluations: The budget: of a frame, or of a search.
+        instance: The number of the variation of the motion or the function.
+        seed: Of everything random.
+        name: The method's name in reports. It changes neither the result nor the key.
+        version: The versions of posefit and of the method's plugins, with digests of
+            their sources, as `posefit.registry.version_of` returns them.
     """
 
     kind: ClassVar[str]  # "track" or "search"
@@ -52,47 +53,73 @@ class Cell:
 
     @cached_property
     def spec(self) -> dict[str, Any]:
-        """The cell as JSON holds it."""
+        """The cell's fields as JSON has them: tuples are lists."""
         spec: dict[str, Any] = json.loads(json.dumps(self._values))
         return spec
 
     @cached_property
     def key(self) -> str:
-        """The SHA-256 of its spec without its name, version included, as 64 hexadecimal digits."""
-        return hashlib.sha256(
-            json_of({**self._values, "name": ""}).encode()
-        ).hexdigest()
+        """The SHA-256 of its spec without the name, as 64 hexadecimal digits."""
+        text = json_of({**self._values, "name": ""})
+        return hashlib.sha256(text.encode()).hexdigest()
 
     @property
     def _values(self) -> dict[str, Any]:
-        return {
-            "kind": self.kind,
-            **{field.name: getattr(self, field.name) for field in fields(self)},  # type: ignore[arg-type]
-        }
+        names = [field.name for field in fields(self)]  # type: ignore[arg-type]
+        return {"kind": self.kind, **{name: getattr(self, name) for name in names}}
 
     @property
     def total_evaluations(self) -> int:
         """The evaluations of the whole cell."""
         return self.evaluations
 
-    def measure(self) -> CellResult:
-        """Run it. Raises ValueError where a file has changed since it was planned."""
+    def measure(self) -> dict[str, Any]:
+        """Run the cell and return its figures as values that JSON has.
+
+        Except for the times they have the same bits on every machine.
+
+        Raises:
+            ValueError: A file has changed since the cell was planned.
+        """
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class TrackCell(Cell):
-    """A motion that is tracked.
+    """The tracking of one motion by one method.
 
-    `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
-    numbers what the cameras see of the motion, see `posefit.motion.instances`. `corruption` gives kinds of
-    `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames without masks; the damage
-    follows from the instance, so that it is the same for every method and seed. `hypotheses` is how many times the
-    motion is tracked, see `posefit.tracking.restarts`. `files` holds the SHA-256 of every capture file that is read.
+    A field with the name of an option of `posefit.tracking.options.TrackOptions` is
+    that option.
 
-    Of the person a method knows where they face at first, at most `yaw_off_degrees` off, nothing at 180; and their
-    body, each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's
-    name. A field that has the name of an option of `posefit.tracking.options.TrackOptions` is that option.
+    Attributes:
+        method: `OPTIMISER@PRIOR`, or the name of a tracker.
+        motion: The motion that is tracked.
+        train: The motions that the method learns from.
+        settings: The method's settings, named `NAME.SETTING`, as for `--set`.
+        view_degrees: The directions of the cameras.
+        corruption: The strength, 0 to 1, of each kind of
+            `posefit.silhouette.corruption`, and under `dropped` the share of frames
+            without masks. The damage depends on the instance, so it is the same for
+            every method and seed.
+        instance: The number of the variation of the motion and its cameras, see
+            `posefit.motion.instances`.
+        frames: Number of frames.
+        fps: Frames per second.
+        size: Width and height of the masks, in pixels.
+        evaluations: The budget of a frame.
+        translation: The root's position: "known", "searched" or "aligned".
+        first_pose: "searched" or "given".
+        hypotheses: How many times the motion is tracked, see
+            `posefit.tracking.restarts`.
+        yaw_off_degrees: The largest error of the first frame's yaw, as it is given to
+            the method. At 180 the yaw is not given. The error depends on the instance
+            and the motion's name.
+        body_off_percent: The largest error of each bone's length and radii, as they are
+            given to the method. It depends on the same two.
+        seed: Of everything random.
+        name: The method's name in reports.
+        files: The SHA-256 of each motion file that is read, by path.
+        version: The versions of posefit and of the method's plugins.
     """
 
     method: str
@@ -118,15 +145,22 @@ class TrackCell(Cell):
     kind: ClassVar[str] = "track"
 
     def __str__(self) -> str:
-        return f"{self.name or self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
+        return (
+            f"{self.name or self.method} on {self.motion}, "
+            f"instance {self.instance}, seed {self.seed}"
+        )
 
     @property
     def total_evaluations(self) -> int:
         """The evaluations of all frames, by every hypothesis."""
         return self.hypotheses * self.frames * self.evaluations
 
-    def measure(self) -> CellResult:
-        """Track the motion. Raises ValueError where a file has changed since it was planned."""
+    def measure(self) -> dict[str, Any]:
+        """Track the motion and return the figures.
+
+        Raises:
+            ValueError: A file has changed since the cell was planned.
+        """
         from posefit.evaluation.errors import anytime_trace, mode_reliability
         from posefit.evaluation.measures import MEASURES
         from posefit.geometry.skeleton import joint_distances
@@ -138,35 +172,33 @@ class TrackCell(Cell):
         for path, digest in self.files.items():
             if (present := digest_of(path)) != digest:
                 raise InputError(
-                    f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}"
+                    f"{path} must be the file that was planned, "
+                    f"{digest[:8]}, got {present[:8]}"
                 )
         scene = cell_scene(self)
-        training = training_motions(
-            training_clips(self.train, followed=self.motion), scene.fps
-        )
-        options_of_cells = {field.name for field in fields(TrackOptions)} - {
-            *VIEW,
-            "train",
-        }
+        clips = training_clips(self.train, followed=self.motion)
+        training = training_motions(clips, scene.fps)
+        # the scene has the views already, and the training motions are loaded
+        option_names = {field.name for field in fields(TrackOptions)}
+        option_names -= {*VIEW, "train"}
         values = {
             field.name: getattr(self, field.name)
             for field in fields(self)
-            if field.name in options_of_cells
+            if field.name in option_names
         }
         options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
         result = track_scene(scene, training, completed(options, self.motion))
         assert result.truth is not None
         truth = result.truth.joints
         estimate = result.motion.joints
-        # both roots at one point, as in `mpjpe_mm`
-        errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)
+        # in mm, with both roots at one point, as in `mpjpe_mm`
+        errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # (joints,)
         measured = asdict(result.measures)
-        row = {
-            **{
-                name: measured[name]
-                for name in MEASURES
-                if name not in RENAMED_MEASURES
-            },
+        figures = {
+            name: measured[name] for name in MEASURES if name not in RENAMED_MEASURES
+        }
+        return {
+            **figures,
             "warnings": result.log.warnings,
             "evaluations_used": result.measures.evaluations,
             "dimensions": result.setup.dimensions,
@@ -176,12 +208,25 @@ class TrackCell(Cell):
             ),
             "trace": anytime_trace(result.frames),
         }
-        return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 
 
 @dataclass(frozen=True)
 class SearchCell(Cell):
-    """An optimiser that searches a problem of a suite once."""
+    """One search of a suite's problem by one optimiser.
+
+    Attributes:
+        method: The optimiser's name.
+        suite: The suite's name.
+        function: The function's number.
+        dimension: Number of coordinates.
+        instance: The number of the variation of the function.
+        evaluations: The budget of the search.
+        settings: The optimiser's settings by name.
+        infeasible: The treatment of proposals outside the limits of a person.
+        seed: Of everything random.
+        name: The optimiser's name in reports.
+        version: The versions of posefit and of the optimiser's plugin.
+    """
 
     method: str
     suite: str
@@ -189,7 +234,7 @@ class SearchCell(Cell):
     dimension: int
     instance: int
     evaluations: int
-    settings: Mapping[str, Any] = field(default_factory=dict)  # of the optimiser
+    settings: Mapping[str, Any] = field(default_factory=dict)
     infeasible: str = "repair"
     seed: int = 0
     name: str = ""
@@ -200,8 +245,8 @@ class SearchCell(Cell):
         problem = f"f{self.function} in {self.dimension}D, instance {self.instance}"
         return f"{self.name or self.method} on {problem}, seed {self.seed}"
 
-    def measure(self) -> CellResult:
-        """Search the problem."""
+    def measure(self) -> dict[str, Any]:
+        """Search the problem, and return the figures."""
         from posefit.suites.problem import suite
         from posefit.suites.running import run_on
 
@@ -219,7 +264,7 @@ class SearchCell(Cell):
             evaluations=self.evaluations,
             seed=self.seed,
         )
-        row = {
+        return {
             "cost": run.cost,
             "truth_cost": run.truth_cost,
             "evaluations_used": problem.evaluations,
@@ -230,7 +275,6 @@ class SearchCell(Cell):
             },
             "warnings": [],
         }
-        return CellResult(row, b"")
 
 
 KINDS: dict[str, type[TrackCell] | type[SearchCell]] = {
@@ -239,43 +283,80 @@ KINDS: dict[str, type[TrackCell] | type[SearchCell]] = {
 
 
 def cell_from(spec: Mapping[str, Any]) -> Cell:
-    """Return the cell of a spec, as JSON holds it."""
-    values: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in spec.items()
-        if name != "kind"
-    }
+    """Return the cell of a spec that was read from JSON."""
+    values: dict[str, Any] = {}
+    for name, value in spec.items():
+        if name != "kind":
+            values[name] = tuple(value) if isinstance(value, list) else value
     return KINDS[spec["kind"]](**values)
 
 
-def run_cell(cell: Cell) -> CellResult:
-    """Return the result of a cell, with its key and spec.
+def run_cell(cell: Cell) -> dict[str, Any]:
+    """Run a cell and return its row.
 
-    Raises ValueError where this posefit, on a remote worker perhaps, or one of its plugins is not the planned one.
+    Returns:
+        The cell's key, its spec, its status, its figures and the seconds that it took.
+
+    Raises:
+        ValueError: The installed posefit or plugin, of a remote worker for example, is
+            not the planned version, or a figure is not a finite number.
     """
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     for planned in cell.version.split(", "):
         if installed := other_version(planned):
             raise InputError(f"a worker must have {planned}, got {installed}")
-    result = cell.measure()
+    with _guarded(cell):
+        figures = cell.measure()
     row = {
         "key": cell.key,
         "spec": cell.spec,
         "status": "done",
-        **result.row,
-        "seconds": time.perf_counter() - began,
+        **figures,
+        "seconds": time.perf_counter() - start_time,
     }
     try:
         json.dumps(row, allow_nan=False)
     except ValueError:
         raise InputError(
-            f"what {cell.method} measures must be finite numbers, got some that are not"
+            f"the figures of {cell.method} must be finite numbers, "
+            "got some that are not"
         ) from None
-    return replace(result, row=row)
+    return row
+
+
+def _guarded(cell: Cell) -> AbstractContextManager[None]:
+    """Return a context that undoes a plugin's changes to libraries.
+
+    posefit's own plugins change none, so that they need no such context.
+    """
+    from posefit.sweep.worker import functions_kept
+
+    if _own_origins().issuperset(cell.version.split(", ")[1:]):
+        return nullcontext()
+    return functions_kept()
+
+
+@lru_cache(maxsize=1)
+def _own_origins() -> frozenset[str]:
+    """Return the origins of posefit's own plugins."""
+    from posefit.hooks import PROJECT
+    from posefit.registry import registry
+
+    offers = (offer for named in registry().offers.values() for offer in named.values())
+    return frozenset(offer.origin for offer in offers if offer.distribution == PROJECT)
 
 
 def other_version(origin: str) -> str | None:
-    """Return what is installed instead of one origin of a version; None where it is this one, or is unknown here."""
+    """Return the installed version of a library if it differs from the planned one.
+
+    Args:
+        origin: The library's name and its planned version, one part of a cell's
+            version.
+
+    Returns:
+        The origin of the installed version, or None if it is the same or the library is
+        not installed.
+    """
     name = origin.partition(" ")[0]
     origins = installed()
     if origin in origins:
@@ -285,7 +366,10 @@ def other_version(origin: str) -> str | None:
 
 @lru_cache(maxsize=1)
 def installed() -> frozenset[str]:
-    """Return the origins of everything that is installed: see `posefit.registry.Offer.origin`."""
+    """Return the origins of posefit and all installed plugins.
+
+    See `posefit.registry.Offer.origin`.
+    """
     from posefit.registry import registry
 
     offers = (offer for named in registry().offers.values() for offer in named.values())
@@ -293,20 +377,15 @@ def installed() -> frozenset[str]:
 
 
 def cell_scene(cell: TrackCell) -> "Scene":
-    """Return the observations of a cell; the same for all methods and seeds."""
+    """Return the scene of a cell, which is the same for all methods and seeds."""
     from posefit.footage.scene import synthetic, with_corruption
     from posefit.motion.instances import motion_of_instance, variation
 
     motion = motion_of_instance(
         cell.motion, cell.instance, frames=cell.frames, fps=cell.fps
     )
-    scene = synthetic(
-        motion,
-        variation(cell.instance).views(cell.view_degrees),
-        cell.size,
-        [],
-        (None, None),
-    )
+    views = variation(cell.instance).views(cell.view_degrees)
+    scene = synthetic(motion, views, cell.size, [], (None, None))
     scene = _with_known_person(cell, scene)
     if not cell.corruption:
         return scene
@@ -320,7 +399,10 @@ def cell_scene(cell: TrackCell) -> "Scene":
 
 
 def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
-    """Return the scene with what a method knows of the person: about where they face at first, and their body."""
+    """Return the scene with the person as it is given to a method.
+
+    Their first yaw and their body have random errors up to the cell's limits.
+    """
     import numpy as np
 
     from posefit.geometry.body import varied
@@ -328,40 +410,23 @@ def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
     if not (cell.yaw_off_degrees or cell.body_off_percent):
         return scene
     stream = [RNG_STREAM_PERSON, cell.instance, *Path(cell.motion).stem.encode()]
-    for_yaw, for_body = np.random.default_rng(stream).spawn(2)
-    off = np.radians(cell.yaw_off_degrees) * for_yaw.uniform(-1.0, 1.0)
-    yaw = (
-        None
-        if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None
-        else scene.yaw + float(off)
-    )
-    return replace(
-        scene, yaw=yaw, body=varied(scene.body, cell.body_off_percent, for_body)
-    )
+    yaw_rng, body_rng = np.random.default_rng(stream).spawn(2)
+    yaw = None
+    if scene.yaw is not None and cell.yaw_off_degrees < ALL_AROUND:
+        error = np.radians(cell.yaw_off_degrees) * yaw_rng.uniform(-1.0, 1.0)
+        yaw = scene.yaw + float(error)
+    body = varied(scene.body, cell.body_off_percent, body_rng)
+    return replace(scene, yaw=yaw, body=body)
 
 
 def json_of(value: Any) -> str:
-    """Return the one JSON text of a value, as keys are made of it."""
+    """Return the canonical JSON text of a value: equal values have the same text."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def digest_of(path: str | Path) -> str:
-    """Return the SHA-256 of a file's content. Raises InputError where there is no file, or something else."""
+    """Return the SHA-256 of a file's content. Raises InputError if it is not a file."""
     if not Path(path).is_file():
         raise InputError(f"{path}: expected a file, got none")
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def packed_joints(**arrays: "Array") -> bytes:
-    """Return arrays in metres as an .npz, float32."""
-    import numpy as np
-
-    buffer = io.BytesIO()
-    # to half a millimetre: the digits after that do not compress, and no picture shows them
-    rounded: dict[str, Any] = {
-        name: (np.round(array * 1024.0) / 1024.0).astype(np.float32)
-        for name, array in arrays.items()
-    }
-    np.savez_compressed(buffer, **rounded)
-    return buffer.getvalue()

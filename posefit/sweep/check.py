@@ -1,22 +1,21 @@
-"""Checks a cell's spec before anything runs, and a row of a ledger where it is read.
+"""Checks the spec of a cell before anything runs.
 
-Options of a track are checked by their one declaration, all other fields here.
+The options of a track are checked as `posefit.tracking.options` declares them. All
+other fields are checked here.
 """
 
 import json
 import os
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import fields
-from functools import lru_cache, partial
+from functools import lru_cache
 from math import inf
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any
 
 from posefit import settings
 from posefit.errors import InputError
-from posefit.evaluation.measures import Measures, Spread
-from posefit.fitting.check import between, one_of, whole
-from posefit.geometry.skeleton import JOINTS
+from posefit.fitting.check import between, whole
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
 from posefit.reading import SHOWN, quoted, suggestion
@@ -27,7 +26,6 @@ from posefit.suites.problem import INFEASIBLE
 from posefit.sweep.cell import (
     ALL_AROUND,
     DROPPED,
-    KINDS,
     SearchCell,
     TrackCell,
     digest_of,
@@ -38,32 +36,35 @@ from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import Check, TrackOptions, choice, declared, within
 from posefit.version import source_digest
 
+# the fields of a track that a plan may set; posefit adds the other two
 FIELDS = tuple(
     field.name for field in fields(TrackCell) if field.name not in ("files", "version")
 )
-# of a cell
+# limits of one cell
 MAX_VIEWS = 100
 MAX_FRAMES = 100_000
-MAX_BODY_OFF = 50.0  # percent that a body may be off
-# of a figure in a row: its square is finite, and so is itself in 32 bits
-LARGEST = 1e30
-# the measures that are a table of numbers: a spread over frames, or one for each baseline or level
-SEVERAL = {
-    name
-    for name, hint in get_type_hints(Measures).items()
-    if any(kind is Spread or get_origin(kind) is Mapping for kind in get_args(hint))
-}
+MAX_BODY_OFF = 50.0  # percent, the largest error of the body given to a method
 
 
 def cell_of(spec: Mapping[str, Any]) -> TrackCell:
-    """Return the cell that a spec describes, complete: settings as their types ask, training motions by name.
+    """Return the track that a spec describes.
 
-    Raises ValueError where a name is not known or a value makes no sense, and ImportError where a method needs a
-    library that is not installed.
+    Settings are converted to their types, and default training motions are filled in.
+
+    Args:
+        spec: The fields of a `posefit.sweep.cell.TrackCell` by name, except `files` and
+            `version`. `method` and `motion` are required.
+
+    Returns:
+        The complete cell.
+
+    Raises:
+        ValueError: A name is unknown or a value is invalid.
+        ImportError: The method needs a library that is not installed.
     """
     for name in ("method", "motion"):
         if name not in spec:
-            raise InputError(f"a cell must say its {name}, got none")
+            raise InputError(f"a cell must have a {name}, got none")
     values = _checked(spec, CHECKS)
     texts = tuple(settings.settings_text(values.get("settings", {})))
     offers, chosen = _of_method(values["method"], texts)
@@ -87,29 +88,39 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
             "version": version,
         }
     )
-    if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
+    size = _population(cell.method, texts, cell.evaluations)
+    if size > cell.evaluations:
         raise InputError(
             f"evaluations must hold one population of {size}, got {cell.evaluations}"
         )
-    if files.get(cell.motion) and cell.frames > (
-        length := _length(cell.motion, cell.fps)
-    ):
-        raise InputError(
-            f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}"
-        )
+    # only a motion that is read from a file has a length
+    if files.get(cell.motion):
+        length = _length(cell.motion, cell.fps)
+        if cell.frames > length:
+            raise InputError(
+                f"frames must be at most {length}, the length of {cell.motion}, "
+                f"got {cell.frames}"
+            )
     return cell
 
 
 def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
-    """Return the single search that a spec describes, whose evaluations are a `budget` for each dimension.
+    """Return the single search that a spec describes.
 
-    None where its function does not have the dimension. Raises ValueError where anything is wrong, and ImportError
-    where the method needs a library that is not installed.
+    Args:
+        spec: The fields of a `posefit.sweep.cell.SearchCell` by name, but with a
+            `budget`, in evaluations per dimension, instead of `evaluations`.
+
+    Returns:
+        The complete cell, or None if the function does not exist in that dimension.
+
+    Raises:
+        ValueError: A name is unknown or a value is invalid.
+        ImportError: The method needs a library that is not installed.
     """
     values = _checked(spec, SEARCH_CHECKS)
-    if (dimension := values["dimension"]) not in suite_function(
-        values["function"]
-    ).dimensions:
+    dimension = values["dimension"]
+    if dimension not in suite_function(values["function"]).dimensions:
         return None
     checked_address(
         *(values[name] for name in ("suite", "function", "instance", "dimension"))
@@ -122,7 +133,10 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
 
 
 def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an entry of a list of optimisers with its settings, checked, by their names alone."""
+    """Return an entry of a list of optimisers, with its settings checked.
+
+    Settings may be written `NAME.SETTING`; in the result they are named `SETTING`.
+    """
     method = _name("method", entry.get("method"))
     entered = flattened("settings", entry.get("settings", {})).items()
     chosen = {name.rpartition(".")[2]: value for name, value in entered}
@@ -133,11 +147,12 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def forget() -> None:
-    """Forget what is kept of methods and files between the cells of a plan, for the next plan to find it again.
+    """Clear the caches of methods and files that the cells of one plan share.
 
-    In between a file may have changed, or a comparison registered another factory under the same name.
+    Before the next plan a file may have changed, or a comparison may have registered
+    another factory under the same name.
     """
-    for kept in (
+    for cached in (
         _offers,
         _of_method,
         _of_search,
@@ -148,21 +163,27 @@ def forget() -> None:
         installed,
         source_digest,
     ):
-        kept.cache_clear()
+        cached.cache_clear()
 
 
 def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
-    """Return fields of a cell, each by itself checked. Raises ValueError where a name or a value makes no sense."""
+    """Return the fields of a cell after checking each one separately.
+
+    Raises InputError if a name is unknown or a value is invalid.
+    """
     if unknown := [name for name in spec if name not in checks]:
         known = suggestion(unknown[0], checks)
         raise InputError(
-            f"a cell must say {', '.join(checks)}, got {quoted(unknown[0])}{known}"
+            f"a cell must hold {', '.join(checks)}, got {quoted(unknown[0])}{known}"
         )
     return {name: checks[name](name, value) for name, value in spec.items()}
 
 
 def families(method: str) -> tuple[str, ...]:
-    """Return the names that settings of a method begin with. Raises ValueError where it is unknown."""
+    """Return the names that a method's settings begin with, such as `sapso` and `pca`.
+
+    Raises ValueError if the method is unknown.
+    """
     return tuple(places_of(_offers(method)))
 
 
@@ -171,49 +192,54 @@ def _offers(method: str) -> tuple[Offer, ...]:
     names = method_names(method)
     if names.tracker is not None:
         return (registry().offer("tracker", names.tracker),)
-    return registry().offer("optimiser", names.optimiser), registry().offer(
-        "prior", names.prior
-    )
+    optimiser = registry().offer("optimiser", names.optimiser)
+    prior = registry().offer("prior", names.prior)
+    return optimiser, prior
 
 
 @lru_cache(maxsize=1024)
 def _of_method(
     method: str, texts: tuple[str, ...]
 ) -> tuple[tuple[Offer, ...], dict[str, Any]]:
-    """Return a method's plugins, and the settings of texts such as `sapso.cooling=0.9`: sorted, as their types ask."""
+    """Return a method's plugins and its settings, sorted by name, with their types.
+
+    `texts` are settings such as `sapso.cooling=0.9`.
+    """
     offers = _offers(method)
     names = {kind: name for name, (kind, _) in places_of(offers).items()}
-    each = parsed_settings(offers, texts).items()
-    named = (
-        (f"{names[kind]}.{setting}", value)
-        for kind, values in each
-        for setting, value in values.items()
-    )
-    return offers, dict(sorted(named))
+    named: dict[str, Any] = {}
+    for kind, values in parsed_settings(offers, texts).items():
+        for setting, value in values.items():
+            named[f"{names[kind]}.{setting}"] = value
+    return offers, dict(sorted(named.items()))
 
 
 @lru_cache(maxsize=1024)
 def _of_search(method: str, chosen: str, evaluations: int) -> str:
-    """Return the version of an optimiser. Raises ValueError where its settings, a JSON text, need a larger budget."""
+    """Return the version of an optimiser.
+
+    `chosen` is the JSON text of its settings. Raises InputError if one population with
+    these settings takes more evaluations than there are.
+    """
     offer = registry().offer("optimiser", method)
-    if (
-        size := settings.population(offer.factory, json.loads(chosen), evaluations)
-    ) > evaluations:
+    size = settings.population(offer.factory, json.loads(chosen), evaluations)
+    if size > evaluations:
         raise InputError(
-            f"evaluations must hold one population of {size}, got {evaluations} of {method}"
+            f"evaluations must hold one population of {size}, "
+            f"got {evaluations} of {method}"
         )
     return version_of([offer.origin])
 
 
 @lru_cache(maxsize=1024)
 def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
-    """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
-    offer = _offers(method)[0]
+    """Return an optimiser's population size if it has such a setting, else 1."""
+    offers = _offers(method)
+    offer = offers[0]
     if offer.kind != "optimiser":
         return 1
-    return settings.population(
-        offer.factory, parsed_settings(_offers(method), texts)["optimiser"], evaluations
-    )
+    chosen = parsed_settings(offers, texts)["optimiser"]
+    return settings.population(offer.factory, chosen, evaluations)
 
 
 @lru_cache(maxsize=1024)
@@ -223,24 +249,27 @@ def _other_styles(motion: str) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1024)
 def _files(motion: str) -> tuple[tuple[str, str], ...]:
-    """Return the files that a motion is read from, each with its digest; none for a built-in one."""
+    """Return the files that a motion is read from, with their digests.
+
+    Motions that come with posefit or with a library of people have no files here.
+    """
     if (
         motion in built_in.names()
         or recorded.is_recorded(motion)
         or recorded.is_library(motion)
     ):
         return ()
-    if os.path.isdir(motion):
-        training_clips([motion])  # raises where one cannot be read
-        return tuple(
-            (str(file), digest_of(file))
-            for file in sorted(Path(motion).iterdir())
-            if file.is_file()
-        )
-    load_motion(motion, FPS)  # raises where it cannot be read
     path = Path(motion)
-    beside = sorted(path.parent.glob("*.asf")) if path.suffix.lower() == ".amc" else []
-    return tuple((str(file), digest_of(file)) for file in (path, *beside))
+    if path.is_dir():
+        training_clips([motion])  # raises if a file cannot be read
+        paths = [file for file in sorted(path.iterdir()) if file.is_file()]
+    else:
+        load_motion(motion, FPS)  # raises if it cannot be read
+        paths = [path]
+        # an .amc file has its skeleton in an .asf file of the same folder
+        if path.suffix.lower() == ".amc":
+            paths += sorted(path.parent.glob("*.asf"))
+    return tuple((str(file), digest_of(file)) for file in paths)
 
 
 @lru_cache(maxsize=1024)
@@ -263,7 +292,7 @@ def _label(field: str, value: Any) -> str:
 
 
 def _method(field: str, value: Any) -> str:
-    """Return a method by its whole name: `sapso` is `sapso@pca`."""
+    """Return a method's full name: `sapso@pca` for `sapso`."""
     return str(method_names(_name(field, value)))
 
 
@@ -274,9 +303,10 @@ def _motion(field: str, value: Any) -> str:
         and not recorded.is_recorded(name)
         and Path(name).suffix.lower() not in MOTIONS
     ):
+        known = built_in.names()
         raise InputError(
-            f"{field} must be an .amc file, a .bvh file or one of {', '.join(built_in.names())}, "
-            f"got {quoted(name)}{suggestion(name, built_in.names())}"
+            f"{field} must be an .amc file, a .bvh file or one of {', '.join(known)}, "
+            f"got {quoted(name)}{suggestion(name, known)}"
         )
     return name
 
@@ -288,15 +318,13 @@ def _train(field: str, value: Any) -> tuple[str, ...]:
 
 
 def _learned_from(field: str, value: Any) -> str:
-    """Return what a method learns from: a motion, people of the library, or a folder."""
+    """Return a source of training: a motion, people of the library, or a folder."""
     if recorded.is_library(value):
-        recorded.named(value)  # raises where a person is unknown
+        recorded.named(value)  # raises if a person is unknown
         return str(value)
-    return (
-        value
-        if isinstance(value, str) and os.path.isdir(value)
-        else _motion(field, value)
-    )
+    if isinstance(value, str) and os.path.isdir(value):
+        return value
+    return _motion(field, value)
 
 
 def _views(field: str, value: Any) -> tuple[float, ...]:
@@ -309,39 +337,49 @@ def _views(field: str, value: Any) -> tuple[float, ...]:
 def _corruption(field: str, value: Any) -> dict[str, float]:
     if not isinstance(value, Mapping):
         raise InputError(
-            f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}"
+            f"{field} must be a table of strengths such as {{holes = 0.3}}, "
+            f"got {quoted(value)}"
         )
     kinds = (*CORRUPTIONS, DROPPED)
     for kind in value:
         if kind not in kinds:
             raise InputError(
-                f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{suggestion(kind, kinds)}"
+                f"{field} must be of {', '.join(kinds)}, "
+                f"got {quoted(kind)}{suggestion(kind, kinds)}"
             )
-    strengths = {
-        kind: within(0.0, 1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)
-    }
-    return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
+    check = within(0.0, 1.0)
+    strengths = {}
+    for kind in sorted(value):
+        strength = check(f"{field} {kind}", value[kind])
+        # a cell with a strength of 0 is the same cell as without that corruption
+        if strength > 0.0:
+            strengths[kind] = strength
+    return strengths
 
 
 def flattened(field: str, value: Any) -> dict[str, Any]:
-    """Return settings whose names are NAME.SETTING, of a table that may hold a table for each NAME."""
+    """Return settings by their names NAME.SETTING.
+
+    In the table the settings of each NAME may also be a table inside it.
+    """
     if not isinstance(value, Mapping):
         raise InputError(
-            f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}"
+            f"{field} must be a table such as {{sapso.cooling = 0.9}}, "
+            f"got {quoted(value)}"
         )
     flat: dict[str, Any] = {}
     for name, inner in value.items():
-        flat |= (
-            {f"{name}.{setting}": chosen for setting, chosen in inner.items()}
-            if isinstance(inner, Mapping)
-            else {name: inner}
-        )
+        if isinstance(inner, Mapping):
+            flat |= {f"{name}.{setting}": chosen for setting, chosen in inner.items()}
+        else:
+            flat[name] = inner
     return flat
 
 
 def _whole(least: int, most: float = inf) -> Check:
     def check(field: str, value: Any) -> int:
-        between(field, number := whole(field, value, least), least, most)
+        number = whole(field, value, least)
+        between(field, number, least, most)
         return number
 
     return check
@@ -379,143 +417,3 @@ SEARCH_CHECKS: Checks = {
     "seed": _whole(0),
     "name": _label,
 }
-
-
-def _plain(outer: type, *inner: type) -> Check:
-    """Return the check of a value of type `outer`, whose parts, if it is a list or a table, are of `inner` types."""
-
-    def check(field: str, value: Any) -> Any:
-        parts = (
-            value.values()
-            if isinstance(value, dict)
-            else value
-            if isinstance(value, list)
-            else [value]
-        )
-        if type(value) is not outer or not all(type(part) in inner for part in parts):
-            raise InputError(
-                f"{field} must be what posefit writes, got {quoted(value)}"
-            )
-        return value
-
-    return check
-
-
-def _number(field: str, value: Any) -> float:
-    if type(value) not in (int, float) or not -LARGEST < value < LARGEST:
-        raise InputError(
-            f"{field} must be a number that a cell can measure, got {quoted(value)}"
-        )
-    return float(value)
-
-
-def _figure(field: str, value: Any) -> None:
-    """Check a figure: a number, or a table of numbers if the measure has several; or None, as any part may be."""
-    if value is None:
-        return
-    parts = [value]
-    if field in SEVERAL:
-        parts = list(_plain(dict, int, float, type(None))(field, value).values())
-    for part in parts:
-        if part is not None:
-            _number(field, part)
-
-
-def _numbers(field: str, value: Any, count: int | None = None) -> list[float]:
-    numbers = [_number(field, part) for part in _plain(list, int, float)(field, value)]
-    if count is not None and len(numbers) != count:
-        raise InputError(f"{field} must be {count} numbers, got {len(numbers)}")
-    return numbers
-
-
-def _trace(field: str, value: Any) -> None:
-    trace = _plain(dict, list)(field, value)
-    used, costs = (_numbers(field, trace.get(name)) for name in ("evaluations", "cost"))
-    rising = (
-        used == sorted(set(used))
-        and costs == sorted(costs, reverse=True)
-        and all(number >= 1 for number in used)
-    )
-    if not rising or len(used) != len(costs):
-        raise InputError(
-            f"{field} must be rising evaluations from 1 and the best cost after each, got {quoted(value)}"
-        )
-
-
-def _modes(field: str, value: Any) -> None:
-    for part in _plain(list, list)(field, value):
-        between(f"the probability of {field}", _numbers(field, part, 3)[1], 0.0, 1.0)
-
-
-# what a ledger holds of a cell: names of methods, motions and files as they were wherever it was written
-WRITTEN: Checks = {
-    **CHECKS,
-    **SEARCH_CHECKS,
-    **dict.fromkeys(("kind", "method", "motion", "version"), _plain(str, str)),
-    "train": _plain(list, str),
-    "files": _plain(dict, str),
-    "settings": _plain(dict, int, float, str, bool, type(None), list),
-    "evaluations": _whole(1),
-}
-# the figures that a row must have; others are numbers
-FIGURES: Mapping[str, Checks] = {
-    "track": {
-        "warnings": _plain(list, str),
-        "trace": _trace,
-        "joint_errors_mm": partial(_numbers, count=len(JOINTS)),
-        "mode_reliability": _modes,
-    },
-    "search": {"warnings": _plain(list, str), "trace": _trace, "truth_cost": _number},
-}
-
-
-def checked_row(
-    key: str, spec: str, status: str, faults: str, row: str | None
-) -> dict[str, Any]:
-    """Return a row of a ledger as a mapping. Raises InputError saying what was expected instead."""
-    values = _parsed(spec)
-    one_of("kind", kind := str(values.get("kind")), KINDS)
-    _check_names(values, {"kind", *(field.name for field in fields(KINDS[kind]))})
-    for name, value in values.items():
-        checked = WRITTEN[name](name, value)
-        if (list(checked) if isinstance(checked, tuple) else checked) != value:
-            raise InputError(f"{name} must be what posefit writes, got {quoted(value)}")
-    if kind == "search":
-        checked_address(
-            *(values[name] for name in ("suite", "function", "instance", "dimension"))
-        )
-    if status != "done":
-        reasons = _plain(list, str)(
-            "reasons", _parsed(f'{{"reasons": {faults}}}').get("reasons")
-        )
-        return {"key": key, "spec": values, "status": "quarantined", "reasons": reasons}
-    figures = _parsed(row or "")
-    _check_names(figures, FIGURES[kind].keys() | figures.keys())
-    for name, value in figures.items():
-        check: Check = FIGURES[kind].get(name, _figure)
-        check(name, value)
-    if kind == "search" and not figures["trace"]["cost"]:
-        raise InputError("trace must have an evaluation, got none")
-    return {"key": key, "spec": values, "status": "done", **figures}
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    try:
-        values = json.loads(text)
-        # finite numbers, whole characters
-        json.dumps(values, ensure_ascii=False, allow_nan=False).encode()
-    except (ValueError, TypeError, RecursionError) as error:
-        raise InputError(
-            f"expected JSON of finite numbers and whole characters, got {quoted(str(error))}"
-        ) from None
-    if not isinstance(values, dict):
-        raise InputError(f"expected a table of values, got {quoted(values)}")
-    return values
-
-
-def _check_names(values: Mapping[str, Any], names: Set[str]) -> None:
-    if values.keys() != names:
-        came = "one more" if (wrong := min(values.keys() ^ names)) in values else "none"
-        raise InputError(
-            f"a row must hold what posefit writes, got {came}: {quoted(wrong)}"
-        )

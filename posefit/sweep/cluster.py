@@ -1,7 +1,8 @@
-"""Runs cells on Dask workers, as its users know it: `submit` with a bounded window, and what is ready is written.
+"""Runs cells on Dask workers.
 
-Each thread of a worker runs its cells in a process that pool.py starts, so limits hold, and whatever a cell does, its
-worker goes on: a worker that is lost was ended from outside.
+A limited number of cells is submitted at a time, and each result is written when it is
+ready. Each thread of a worker runs its cells in a process of pool.py. So limits hold,
+and no cell can end its worker: if a worker is lost, it was killed from outside.
 """
 
 import multiprocessing
@@ -18,17 +19,27 @@ from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome, Run, text_of
 from posefit.sweep.pool import Pool
 from posefit.version import posefit_build
 
-CONNECT_TIMEOUT_SECONDS = 30.0  # seconds to wait for a scheduler, and for its workers
+CONNECT_TIMEOUT_SECONDS = 30.0  # of waiting for a scheduler, and for its workers
 CLOSE_SECONDS = 5.0
-# what a process answers, also without posefit, to which build it has
+# An expression of a process's posefit build. It is a text, because a function of
+# posefit could not be sent to a process that lacks posefit.
 _BUILD = "__import__('posefit.version', fromlist=['version']).posefit_build()"
 _thread = threading.local()
 
 
 class Cluster:
-    """An engine of the Dask workers of a scheduler at an address.
+    """An engine of a Dask scheduler's workers.
 
-    Raises InputError where the scheduler does not answer, has no workers within `patience` seconds, or goes away.
+    Args:
+        scheduler: The scheduler's address.
+        limits: The longest time and the most memory of a job.
+        run: Called with a job in a worker; its result is the job's.
+        patience: Seconds to wait for the scheduler, and for its first worker.
+
+    Raises:
+        ImportError: The library distributed is not installed.
+        InputError: The scheduler does not answer in time, has no workers, or goes away;
+            or a worker has another build of posefit.
     """
 
     def __init__(
@@ -42,7 +53,8 @@ class Cluster:
             import distributed
         except ImportError as error:
             raise ImportError(
-                "Dask needs the library distributed: python -m pip install 'posefit[dask]'"
+                "Dask needs the library distributed: "
+                "python -m pip install 'posefit[dask]'"
             ) from error
         self._distributed = distributed
         self._address = scheduler
@@ -62,13 +74,15 @@ class Cluster:
             self.close()
             cause = " ".join(str(error).split())
             raise InputError(
-                f"scheduler must be one with workers that answers, got {scheduler}: {cause}"
+                "scheduler must be one with workers that answers, "
+                f"got {scheduler}: {cause}"
             ) from None
 
     def _check_versions(self) -> None:
-        """Raise InputError if a worker has another posefit or none, or if the scheduler cannot read a job.
+        """Raise InputError if posefit is missing or another build on a remote process.
 
-        Dask would end such a worker, or have each job fail by what looks like the job's own fault.
+        Dask would otherwise end such a worker, or each job would seem to fail by its
+        own fault. The scheduler needs posefit to read a job.
         """
         wanted = posefit_build()
         for worker, found in self._client.run(eval, _BUILD, on_error="return").items():
@@ -79,14 +93,18 @@ class Cluster:
             self._client.run_on_scheduler(eval, _BUILD)
         except ImportError as error:
             raise InputError(
-                f"the scheduler {self._address} must have posefit, got none ({text_of(error)})"
+                f"the scheduler {self._address} must have posefit, "
+                f"got none ({text_of(error)})"
             ) from None
 
     def window(self) -> int:
-        """Return how many threads the workers have; while there is none, Dask waits for one with a job."""
+        """Return the number of threads of all workers, but at least one.
+
+        Dask keeps a job while there are no workers.
+        """
         try:
             return max(1, int(sum(self._client.nthreads().values())))
-        # it went away, and all that it had
+        # raised by a client whose scheduler went away
         except (OSError, TimeoutError, ValueError, AttributeError):
             raise InputError(
                 f"scheduler must stay, got {self._address}, which went away"
@@ -95,12 +113,11 @@ class Cluster:
     def submit(self, job: Any) -> None:
         """Send a job; Dask chooses the worker."""
         key = f"posefit-{secrets.token_hex(16)}"
-        self._running[
-            self._client.submit(self._call, job, key=key, pure=False, retries=0)
-        ] = job
+        future = self._client.submit(self._call, job, key=key, pure=False, retries=0)
+        self._running[future] = job
 
     def wait(self, seconds: float) -> list[Outcome]:
-        """Return the jobs that ended."""
+        """Return the outcomes of the jobs that ended."""
         if self._client.status != "running":
             raise InputError(
                 f"scheduler must stay, got {self._address}, which went away"
@@ -110,7 +127,9 @@ class Cluster:
                 suppress(TimeoutError, self._distributed.CancelledError),
                 self._client.as_current(),
             ):
-                self._distributed.wait(tuple(self._running), seconds, "FIRST_COMPLETED")  # type: ignore[no-untyped-call]
+                futures = tuple(self._running)
+                wait: Any = self._distributed.wait
+                wait(futures, seconds, "FIRST_COMPLETED")
         return [
             self._outcome(future) for future in tuple(self._running) if future.done()
         ]
@@ -129,19 +148,25 @@ class Cluster:
         except self._distributed.KilledWorker:
             return Outcome(job, None, "its worker was lost", is_own_fault=False)
         except (OSError, TimeoutError, self._distributed.CancelledError):
-            return Outcome(job)  # with its worker or the scheduler
+            return Outcome(job)  # lost with its worker or the scheduler
         except Exception as error:
             return Outcome(job, None, text_of(error))
 
 
 def _call(run: Run, limits: Limits, job: Any) -> tuple[Any, str | None, bool]:
-    """Return, on a thread of a worker, what a function makes of a job; or None, why, and whose fault it is."""
-    if getattr(_thread, "runs", None) != (current := (pickle.dumps(run), limits)):
+    """Run a job on a thread of a Dask worker.
+
+    Returns:
+        The job's result, the reason if it failed, and whether that was its own fault.
+    """
+    current = pickle.dumps(run), limits
+    if getattr(_thread, "runs", None) != current:
         if hasattr(_thread, "pool"):
             _thread.pool.close()
-        # which Dask's nanny makes it, and no daemon has processes
+        # Dask's nanny makes its worker a daemon, and a daemon may not start processes
         multiprocessing.current_process().daemon = False
-        _thread.runs, _thread.pool = current, Pool(1, limits, run)
+        _thread.pool = Pool(1, limits, run)
+        _thread.runs = current
     _thread.pool.submit(job)
     while not (outcomes := _thread.pool.wait(POLL_SECONDS)):
         pass

@@ -1,4 +1,4 @@
-"""What `posefit sweep` does."""
+"""The steps of the command `posefit sweep`."""
 
 import os
 import re
@@ -6,21 +6,19 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
-from itertools import islice
 from pathlib import Path
 
 from posefit.errors import InputError
 from posefit.progress import bars_shown
 from posefit.reading import counted, cut
-from posefit.sweep.cell import Cell, json_of, other_version, run_cell
+from posefit.sweep.cell import Cell, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Run
 from posefit.sweep.ledger import FILE, Ledger, Writer
-from posefit.sweep.plan import MAX_CELLS, Plan
+from posefit.sweep.plan import MAX_CELLS
 from posefit.sweep.pool import Pool, cores
 
-SHARDS = "ledger-*-of-*.sqlite"  # the names that `file_of` gives
-VALUES = 12  # of a field, that a preview lists
+SHARDS = "ledger-*-of-*.sqlite"  # matches the names that `file_of` returns
 
 
 def swept(
@@ -33,28 +31,43 @@ def swept(
     retry_quarantined: bool = False,
     quiet: bool = False,
 ) -> Tally:
-    """Return how the cells of a plan, or of one shard, ended that an engine ran into a folder, with a bar on stderr.
+    """Run the cells of a plan, or of one shard, with a progress bar on stderr.
 
-    Rows of another version of posefit or of a plugin do not count. The engine is closed at the end.
+    Finished rows of another version of posefit or of a plugin do not count as done.
+
+    Args:
+        plan: The cells.
+        out: The folder of the ledger.
+        engine: Runs the cells. It is closed at the end.
+        say: Called with each message for the user.
+        shard: The shard as I/N, or None for all cells.
+        retry_quarantined: Whether to try cells in quarantine again.
+        quiet: Whether to hide the progress bar.
+
+    Returns:
+        The state at the end.
+
+    Raises:
+        InputError: The ledger cannot be written to, or the engine is gone.
     """
     from tqdm.auto import tqdm
 
     with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
-        for version, count in Counter(
-            spec["version"] for spec in ledger.old_specs()
-        ).items():
+        versions = Counter(spec["version"] for spec in ledger.old_specs())
+        for version, count in versions.items():
             if any(map(other_version, version.split(", "))):
                 say(
-                    f"{counted(count, 'row')} in {out} are of another version, {cut(version)}, and do not count here"
+                    f"{counted(count, 'row')} in {out} are of another version, "
+                    f"{cut(version)}, and do not count here"
                 )
         elsewhere = done_elsewhere(Path(out)) if shard is None else set()
         ledger.plan(cells_of(plan, shard), elsewhere)
         if retry_quarantined:
             count = ledger.release_quarantined()
-            say(
-                f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again"
-            )
-        total = (counts := ledger.counts()).total()
+            cells = "cell is" if count == 1 else "cells are"
+            say(f"{count} {cells} out of quarantine, to be tried again")
+        counts = ledger.counts()
+        total = counts.total()
         finished = counts["done"] + counts["quarantined"]
         if finished:
             say(f"{finished} of {total} cells are done already")
@@ -84,7 +97,10 @@ def swept(
 
 
 def file_of(shard: str | None) -> str:
-    """Return the name of a shard's file. Raises InputError where it is none."""
+    """Return the name of a ledger's file: of a shard I/N, or of all cells for None.
+
+    Raises InputError if the shard is not I/N.
+    """
     if shard is None:
         return FILE
     match = re.fullmatch(r"([0-9]{1,7})/([0-9]{1,7})", shard)
@@ -96,7 +112,8 @@ def file_of(shard: str | None) -> str:
 def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     """Return the cells of a plan, or of one shard I/N.
 
-    A cell's key decides its shard, so that it stays there, whatever is added to the plan.
+    A cell's key alone decides its shard. So it does not move to another shard when the
+    plan grows.
     """
     if shard is None:
         return iter(plan)
@@ -105,59 +122,15 @@ def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
 
 
 def done_elsewhere(out: Path) -> set[str]:
-    """Return the keys of the cells that shards in a folder have done: a run without shards does not repeat them."""
+    """Return the keys of the cells that shards in a folder have done.
+
+    A run without shards does not repeat them.
+    """
     files = [file for file in sorted(out.glob(SHARDS)) if file.stat().st_size]
     if not files:
         return set()
     with Ledger(*files) as ledger:
         return ledger.done()
-
-
-def previewed(
-    plan: str, out: str | None, shard: str | None
-) -> Iterator[tuple[Cell, bool]]:
-    """Yield the cells of a plan or of a shard, and whether each is done."""
-    name = file_of(shard)
-    cells = cells_of(Plan.read(plan), shard)
-    done = set[str]()
-    if out is not None:
-        if shard is None:
-            done |= done_elsewhere(Path(out))
-        if (path := Path(out) / name).exists():
-            with Ledger(path) as ledger:
-                done |= ledger.done()
-    yield from ((cell, cell.key in done) for cell in cells)
-
-
-def preview_lines(cells: Iterable[tuple[Cell, bool]]) -> list[str]:
-    """Return how many cells have which values, and how many are to run."""
-    counts: dict[str, Counter[str]] = {}
-    total = to_run = evaluations = 0
-    for cell, done in cells:
-        total += 1
-        to_run = to_run + (not done)
-        evaluations = evaluations + (not done) * cell.total_evaluations
-        for name, value in cell.spec.items():
-            counts.setdefault(name, Counter())[
-                value if isinstance(value, str) else json_of(value)
-            ] += 1
-    lines = []
-    for name, values in counts.items():
-        if name in ("method", "motion") or (
-            len(values) > 1 and name not in ("version", "files")
-        ):
-            shown = [
-                f"{count:,} x {cut(value)}"
-                for value, count in islice(values.items(), VALUES)
-            ]
-            more = [f"and {len(values) - VALUES:,} other values"] * (
-                len(values) > VALUES
-            )
-            lines.append(f"{name:16}  {', '.join(shown + more)}")
-    return [
-        *lines,
-        f"{total:,} cells, {to_run:,} of them to run, {evaluations:,} evaluations",
-    ]
 
 
 def engine(
@@ -167,9 +140,16 @@ def engine(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> Callable[[], Engine]:
-    """Return a function that starts the engine asked for: processes of this machine, or the workers of a scheduler.
+    """Return a function that starts an engine.
 
-    Raises ValueError where both are asked for.
+    Args:
+        limits: The longest time and the most memory of a cell.
+        run: Called with each cell in a worker.
+        workers: Number of processes on this machine, by default one per processor.
+        scheduler: The address of a Dask scheduler whose workers run the cells instead.
+
+    Raises:
+        ValueError: `workers` is less than 1, or `scheduler` is given as well.
     """
     if workers is not None and scheduler is not None:
         raise InputError(
@@ -192,15 +172,16 @@ def engine(
 
 
 def tally_lines(tally: Tally, out: str) -> list[str]:
-    """Return how a sweep ended, and the command that shows its results."""
-    line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
+    """Return lines that sum up a sweep, with the command that shows its results."""
+    line = (
+        f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, "
+        f"written to {out}"
+    )
     if tally.quarantined:
         line += f"; {tally.quarantined} quarantined: posefit report names the reasons"
     if tally.stopped:
-        return [f"{line}; stopped: the same command goes on from there"]
+        return [f"{line}; stopped: run the same command again to continue"]
+    if not tally.done:
+        return [line]
     page = shlex.quote(f"{out.rstrip(os.sep)}.html")
-    return (
-        [line, f"results: posefit report {shlex.quote(out)} --out {page}"]
-        if tally.done
-        else [line]
-    )
+    return [line, f"results: posefit report {shlex.quote(out)} --out {page}"]

@@ -1,7 +1,8 @@
-"""Drives a sweep: has an engine run the cells of a ledger that are planned, and writes what becomes of them.
+"""Drives a sweep: has an engine run the planned cells, and writes their outcomes.
 
-Three attempts that fail by the cell's own fault put it into quarantine. One that was ended from outside is no fault of
-the cell: it is tried again after all others, and only fifty of these put it into quarantine.
+A cell goes into quarantine after three attempts that failed by its own fault. An
+attempt that was killed from outside is not the cell's fault: the cell is tried again
+after all others, and goes into quarantine only after fifty such attempts.
 """
 
 import signal
@@ -18,11 +19,11 @@ from posefit.sweep.ledger import Writer
 
 @dataclass
 class Tally:
-    """How a sweep stands."""
+    """The state of a sweep, in numbers of cells."""
 
     cells: int
-    done: int = 0  # cells with a row
-    ran: int = 0  # of these, cells that this driver ran
+    done: int = 0  # with a row
+    ran: int = 0  # done by this driver
     failed: int = 0  # attempts of this driver that failed
     quarantined: int = 0
     stopped: bool = False  # by the user
@@ -34,16 +35,26 @@ def drive(
     say: Callable[[str], None],
     watch: Callable[[Tally], None] = lambda _: None,
 ) -> Tally:
-    """Return how a sweep ended: with all planned cells done or quarantined, or stopped. `watch` is called at changes.
+    """Run the planned cells of a ledger until all are done or quarantined, or it stops.
 
-    Raises InputError where the ledger cannot be written to or the engine is gone; rows that were finished are safe.
+    Args:
+        ledger: The ledger whose cells run.
+        engine: Runs the cells. It is closed at the end.
+        say: Called with each message for the user.
+        watch: Called with the tally at the beginning and after each change.
+
+    Returns:
+        The state at the end.
+
+    Raises:
+        InputError: The ledger cannot be written to, or the engine is gone. Finished
+            rows are safe.
     """
     counts = ledger.counts()
     tally = Tally(counts.total(), counts["done"], quarantined=counts["quarantined"])
     watch(tally)
-    # the place of each cell that runs, by its key
     waiting = deque(ledger.planned())
-    running = dict[str, int]()
+    running = dict[str, int]()  # place in the ledger by the cell's key
     try:
         with _stopping(say) as stop_requests:
             while len(stop_requests) < 2 and (
@@ -56,7 +67,7 @@ def drive(
                     engine.submit(cell)
                 if not (outcomes := engine.wait(POLL_SECONDS)):
                     continue
-                # a row counts once it is on the disk
+                # a row counts once it is on the disk, so count in a copy until then
                 written = replace(tally)
                 with ledger.transaction():
                     for outcome in outcomes:
@@ -67,7 +78,10 @@ def drive(
                 watch(tally)
             tally.stopped = bool(waiting or running)
     except InputError as error:
-        safe = f"{tally.done} of {tally.cells} cells are done and safe: the same command goes on from there"
+        safe = (
+            f"{tally.done} of {tally.cells} cells are done and safe: "
+            "run the same command again to continue"
+        )
         raise InputError(f"{error}; {safe}") from error
     finally:
         engine.close()
@@ -75,7 +89,10 @@ def drive(
 
 
 def _record(ledger: Writer, tally: Tally, outcome: Outcome) -> bool:
-    """Write what became of a cell, count it, and return whether the cell has ended; else it is to be tried again."""
+    """Write and count the outcome of one attempt.
+
+    Returns whether the cell is done or quarantined. If not, it must be tried again.
+    """
     key = outcome.job.key
     if outcome.result is not None:
         tally.ran += 1
@@ -91,7 +108,12 @@ def _record(ledger: Writer, tally: Tally, outcome: Outcome) -> bool:
 
 @contextmanager
 def _stopping(say: Callable[[str], None]) -> Iterator[list[int]]:
-    """Yield requests to stop, which come by Ctrl-C, twice for at once, or by SIGTERM; in the main thread alone."""
+    """Yield a list that grows with each request to stop.
+
+    One entry means: finish the running cells. Two mean: stop at once. Ctrl-C adds one,
+    SIGTERM two. Python handles signals only in the main thread; in others the list
+    remains empty.
+    """
     stop_requests: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield stop_requests
@@ -100,7 +122,7 @@ def _stopping(say: Callable[[str], None]) -> Iterator[list[int]]:
     def stop(number: int, _: object) -> None:
         stop_requests.extend([number] * (2 if number == signal.SIGTERM else 1))
         if len(stop_requests) == 1:
-            say("finishing the cells that run; Ctrl-C once more stops at once")
+            say("finishing the running cells; press Ctrl-C again to stop at once")
 
     before = {
         number: signal.signal(number, stop)

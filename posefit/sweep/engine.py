@@ -1,10 +1,11 @@
-"""What runs cells in other processes: an engine. It keeps no order and no state; the ledger does.
+"""The protocol of an engine, which runs cells in other processes.
 
-    with closing(Pool(2, Limits(seconds=600.0), run_cell)) as engine:    # so many worker processes: pool.py
+    with closing(Pool(2, Limits(seconds=600.0), run_cell)) as engine:  # two processes
         engine.submit(cell)
-        outcomes = engine.wait(1.0)                                      # what ended within a second
+        outcomes = engine.wait(1.0)  # the outcomes within a second
 
-The workers of a Dask scheduler are one too: cluster.py.
+There are two engines: the processes of this machine (pool.py) and the workers of a Dask
+scheduler (cluster.py). The ledger decides the order and keeps the state.
 """
 
 import os
@@ -29,7 +30,7 @@ THREADS = (
 
 @dataclass(frozen=True)
 class Limits:
-    """How many seconds a cell may take, and how much memory its process may have."""
+    """The longest time of a cell, and the most memory of its process."""
 
     seconds: float = 3600.0
     gigabytes: float = 4.0
@@ -41,23 +42,27 @@ class Limits:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job, a cell or whatever an engine's function takes: a result, or the reason why there is none.
+    """The outcome of a job: its result, or the reason of its failure.
 
-    With neither it was lost with what ran it, and counts as not tried.
+    A job is a cell, or any other argument of the engine's function. If both are None,
+    the job was lost together with its worker, and counts as not tried.
     """
 
     job: Any
     result: Any = field(default=None, repr=False)
     reason: str | None = None
-    # its own fault: a limit, an exception, a segfault, an exit; not a kill from outside
+    # False only if the job was killed from outside
     is_own_fault: bool = True
 
 
 class Engine(Protocol):
-    """Runs so many jobs at a time."""
+    """Runs a limited number of jobs at a time."""
 
     def window(self) -> int:
-        """Return how many jobs may run at the moment. Raises InputError where the engine is gone for good."""
+        """Return how many jobs may run at the moment.
+
+        Raises InputError if the engine is gone for good.
+        """
         ...
 
     def submit(self, job: Any) -> None:
@@ -65,25 +70,28 @@ class Engine(Protocol):
         ...
 
     def wait(self, seconds: float) -> list[Outcome]:
-        """Return the jobs that ended, once one has or the time is over."""
+        """Return the outcomes of the jobs that ended.
+
+        Waits until a job ends, or for that many seconds.
+        """
         ...
 
     def close(self) -> None:
-        """Stop everything, whatever still runs."""
+        """Stop everything, including running jobs."""
         ...
 
 
 def text_of(error: BaseException) -> str:
-    """Return an exception in one line."""
-    return printable(
-        f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
-    )
+    """Return an exception's type and message in one line."""
+    message = " ".join(str(error).split())
+    return printable(f"{type(error).__name__}: {message}".removesuffix(": "))
 
 
 def single_thread() -> None:
-    """Leave this process one thread of everything: cells run side by side."""
-    os.environ.update(dict.fromkeys(THREADS, "1"))  # before they are loaded
-    # a loaded one takes another number for an error, at its next compilation
+    """Limit each library of this process to one thread, as cells run side by side."""
+    # these libraries read the variables when they are loaded
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    # numba, once loaded, raises an error at its next compilation if the number changed
     if "numba" not in sys.modules:
         os.environ["NUMBA_NUM_THREADS"] = "1"
     import cv2

@@ -1,23 +1,30 @@
-"""The ledger: one SQLite file in which every cell has a row, whatever happens to the process that writes it.
+"""The ledger: an SQLite file with a row for every cell of a sweep.
 
-    with Ledger("results") as ledger:  # the .sqlite files of a folder, also while they grow
+    with Ledger("results") as ledger:  # the .sqlite files of a folder
         rows = list(ledger.rows())
 
-Cells are in the table `cells`: key, kind ("track" or "search"), spec (JSON: what was run), status ("planned", "done" or
-"quarantined"), faults (JSON: the reasons of failed attempts), losses (times that something outside ended it), row
-(JSON: the figures) and arrays (an .npz). The view `runs` has what queries ask for most as columns.
+A ledger can be read while a sweep writes to it. A row that was written is safe,
+whatever happens to the process that wrote it. The table `cells` has these columns:
 
-One driver writes a file: it holds a lock on a second one beside it, FILE.driver, which names its process. The operating
-system drops that lock when the process ends in any way.
+- key
+- kind: "track" or "search"
+- spec (JSON): the fields of the cell
+- status: "planned", "done" or "quarantined"
+- faults (JSON): the reasons of failed attempts
+- losses: how often the cell was killed from outside
+- row (JSON): the figures
+
+The view `runs` has columns for the values that queries use most.
+
+Only one driver writes to a file. It locks a second file, FILE.driver, which names its
+process. The operating system releases that lock when the process ends in any way.
 """
 
-import io
 import json
 import os
 import socket
 import sqlite3
 import stat
-import zipfile
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -28,34 +35,35 @@ from typing import TYPE_CHECKING, Any, Self
 from posefit.errors import InputError
 from posefit.files import lock, made_folders, remove_empty
 from posefit.reading import counted, cut, quoted
-from posefit.sweep.cell import Cell, CellResult, cell_from
-from posefit.sweep.check import checked_row
+from posefit.sweep.cell import Cell, cell_from
+from posefit.sweep.engine import text_of
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from posefit.arrays import Array
-
 FILE = "ledger.sqlite"
 SUFFIX = ".sqlite"
-WAL = "-wal"  # of SQLite's log beside a file that is written
-DRIVER = ".driver"
+WAL = "-wal"  # suffix of the log that SQLite keeps while a file is written
+DRIVER = ".driver"  # suffix of the lock file
 DRIVEN_BY = "process "  # how the content of a lock file begins
-NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # not on every operating system
-ATTEMPTS = 3  # that fail by a cell's own fault
-LOSSES = 50  # attempts that something outside ended
-# to wait for another program that locks a file: where it is opened, and in the middle of a sweep
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # missing on some operating systems
+# A cell goes into quarantine after this many attempts that failed by its own fault, or
+# this many that were killed from outside.
+ATTEMPTS = 3
+LOSSES = 50
+# The longest wait for a program that locks a file: on opening it, and during a sweep.
 OPEN_SECONDS = 5.0
 BUSY_SECONDS = 60.0
-MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
-MAX_VALUE_BYTES = 200_000_000  # of a value in a file
-MIN_FILE_BYTES = 512  # a page of SQLite, at least
-COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row", "arrays"}
-NAMES = ("key", "spec", "status")  # that a row has beside its figures
-# What queries ask for most: where each stands, and its type. A view's expressions have no declared type, and a program
-# that asks for one, such as DuckDB, would take numbers for bytes: 10 would be less than 9. So the view begins with an
-# empty table, whose types SQLite takes for the view's.
+MAX_VALUE_BYTES = 200_000_000  # of one value that is read
+MIN_FILE_BYTES = 512  # SQLite's smallest page, and so its smallest file
+PAGE_BYTES = 8192  # of a new file; a page then holds about three rows
+COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row"}
+NAMES = ("key", "spec", "status")  # the parts of a row that are not figures
+# The columns of the view: the column and path of each value, and its type. Expressions
+# in a view have no declared type, and a program that asks for it, such as DuckDB, would
+# take numbers for bytes: 10 would be less than 9. So the view begins with an empty
+# table, whose types SQLite uses for the view.
 VIEWED = {
     "method": ("spec", "$.method", "TEXT"),
     "name": ("spec", "$.name", "TEXT"),
@@ -75,29 +83,41 @@ _VALUES = ", ".join(
     f"CAST(json_extract({column}, '{path}') AS {kind})"
     for column, path, kind in VIEWED.values()
 )
-# What brings a file to a format, its user_version, from the one before. A row has been the same since the first.
+# The statements that bring a file from the previous format to this one. SQLite's
+# user_version is the format. Rows are the same in all formats. Until format 2 a column
+# `arrays` held the joints of each frame, which nothing read; older files still have it.
 MIGRATIONS = {
     1: """
     CREATE TABLE cells (
-        key TEXT PRIMARY KEY, kind TEXT NOT NULL, spec TEXT NOT NULL, status TEXT NOT NULL DEFAULT 'planned',
-        faults TEXT NOT NULL DEFAULT '[]', losses INTEGER NOT NULL DEFAULT 0, row TEXT, arrays BLOB);
+        key TEXT PRIMARY KEY, kind TEXT NOT NULL, spec TEXT NOT NULL,
+        status TEXT NOT NULL DEFAULT 'planned',
+        faults TEXT NOT NULL DEFAULT '[]', losses INTEGER NOT NULL DEFAULT 0, row TEXT);
     CREATE INDEX by_status ON cells (status);
     """,
-    # the columns of the view have types
+    # gives the columns of the view types
     2: f"""
     DROP VIEW IF EXISTS runs;
     CREATE TABLE run_types (key TEXT, kind TEXT, status TEXT, faults TEXT, {_TYPES});
     CREATE VIEW runs AS SELECT * FROM run_types
         UNION ALL SELECT key, kind, status, faults, {_VALUES} FROM cells;
     """,
+    # changes nothing in an older file; only new files lack the column `arrays`
+    3: "",
 }
 FORMAT = max(MIGRATIONS)
 
 
 class Ledger:
-    """Reads ledgers, also while drivers write to them. A context, which closes its files at the end.
+    """Reads ledgers, also while drivers write to them.
 
-    Raises InputError if there is no ledger, if it is damaged, or if it cannot be read here.
+    It is a context manager that closes its files at the end. If several files have the
+    same cell, the first finished one counts.
+
+    Args:
+        paths: Ledger files, or folders of them.
+
+    Raises:
+        InputError: There is no ledger, it is damaged, or it cannot be read here.
     """
 
     def __init__(self, *paths: str | Path) -> None:
@@ -106,7 +126,7 @@ class Ledger:
             dict.fromkeys(file for path in paths for file in _files(Path(path)))
         )
         self._open: list[tuple[Path, sqlite3.Connection]] = []
-        # the file of each cell that ended, and whether it is done
+        # by key of each done or quarantined cell: its file, and whether it is done
         self._places: dict[str, tuple[int, bool]] = {}
         with ExitStack() as opened:
             opened.callback(self.close)
@@ -117,7 +137,10 @@ class Ledger:
             opened.pop_all()
 
     def _place(self, k: int) -> None:
-        """Note the cells of a file: of a cell in several files the first finished one counts, or the first."""
+        """Note the cells of file `k`.
+
+        If several files have a cell, the first finished one counts, else the first.
+        """
         query = "SELECT key, status FROM cells WHERE status != 'planned'"
         for key, status in self._query(k, query):
             done = status == "done"
@@ -142,30 +165,38 @@ class Ledger:
 
     @property
     def changed(self) -> float:
-        """When its latest file was written, in seconds since 1970."""
+        """The time of the latest change to any of its files, in seconds since 1970."""
         parts = [Path(f"{file}{suffix}") for file in self.files for suffix in ("", WAL)]
         return max(path.stat().st_mtime for path in parts if path.exists())
 
     @property
     def version(self) -> str:
-        """The versions of posefit whose results these are, with digests of its source; that of today without rows."""
-        query = "SELECT DISTINCT json_extract(spec, '$.version') FROM cells WHERE status = 'done'"
-        versions = [
-            str(version)
-            for k in range(len(self._open))
-            for (version,) in self._query(k, query)
-        ]
-        builds = {version.partition(", ")[0] for version in versions} or {
-            posefit_build()
-        }
+        """The versions of posefit that ran the cells, with digests of their sources.
+
+        Without finished rows, the installed version.
+        """
+        query = (
+            "SELECT DISTINCT json_extract(spec, '$.version') FROM cells "
+            "WHERE status = 'done'"
+        )
+        builds = set()
+        for k in range(len(self._open)):
+            for (version,) in self._query(k, query):
+                # the versions of plugins follow after commas
+                builds.add(str(version).partition(", ")[0])
+        if not builds:
+            builds.add(posefit_build())
         return ", ".join(sorted(build.removeprefix("posefit ") for build in builds))
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it, in the order of the plans."""
+        """Yield every finished row in the order of the plans.
+
+        `posefit.sweep.cell.run_cell` describes a row.
+        """
         return self._rows("done")
 
     def quarantined(self) -> list[dict[str, Any]]:
-        """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
+        """Return the key, spec, status and failures of each cell in quarantine."""
         return list(self._rows("quarantined"))
 
     def all_rows(self) -> Iterator[dict[str, Any]]:
@@ -173,37 +204,8 @@ class Ledger:
         yield from self.rows()
         yield from self.quarantined()
 
-    def joints(self, key: str) -> dict[str, "Array"]:
-        """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
-        import numpy as np
-
-        k, done = self._places.get(key, (0, False))
-        if not done:
-            raise InputError(
-                f"{self.path}: expected the key of a finished cell, got {quoted(key)}"
-            )
-        query = "SELECT kind, arrays FROM cells WHERE key = ?"
-        ((kind, data),) = self._query(k, query, key)
-        if kind != "track":
-            raise InputError(
-                f"{self._open[k][0]}: cell {key[:8]} is a search, which has no joints"
-            )
-        try:
-            with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                if (
-                    sum(member.file_size for member in archive.infolist())
-                    > MAX_JOINTS_BYTES
-                ):
-                    raise ValueError("more than a cell has")
-            with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-                return {name: stored[name] for name in ("estimate", "truth")}
-        except Exception:  # whatever a hostile archive raises
-            raise InputError(
-                f"{self._open[k][0]}: the joints of cell {key[:8]} must be whole, got damaged ones"
-            ) from None
-
     def frame(self) -> "pd.DataFrame":
-        """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
+        """Return the pandas table of all cells. See `posefit.sweep.table`."""
         from posefit.sweep.table import dataframe
 
         return dataframe(self.all_rows())
@@ -213,26 +215,30 @@ class Ledger:
         for _, database in self._open:
             database.close()
 
-    def _rows(self, status: str) -> Iterator[dict[str, Any]]:
-        for k in range(len(self._open)):
-            for values in self._query(
-                k, f"{SELECT} WHERE status = ? ORDER BY rowid", status
-            ):
-                if self._places.get(values[0]) == (k, status == "done"):
-                    yield self._checked(k, *values)
+    def damaged_row(self, key: str, error: Exception) -> InputError:
+        """Return the error of a row that was changed since posefit wrote it.
 
-    def _checked(
-        self, k: int, key: Any, spec: Any, status: Any, faults: Any, row: Any
-    ) -> dict[str, Any]:
-        try:
-            return checked_row(str(key), spec, status, faults, row)
-        except ValueError as error:
-            name = quoted(str(key)[:8])[1:-1]
-            fix = f"sqlite3 {FILE} \"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'\""
-            raise InputError(
-                f"{self._open[k][0]}: the row of cell {name} must be one that posefit wrote: {cut(str(error))}; "
-                f"to run it again: {fix}"
-            ) from None
+        Its message has a command that plans the cell again.
+        """
+        name = quoted(key[:8])[1:-1]
+        file = self._open[self._places[key][0]][0]
+        statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
+        return InputError(
+            f"{file}: the row of cell {name} must be one that posefit wrote: "
+            f"{cut(text_of(error))}; "
+            f'to run it again: sqlite3 {FILE} "{statement}"'
+        )
+
+    def _rows(self, status: str) -> Iterator[dict[str, Any]]:
+        query = f"{SELECT} WHERE status = ? ORDER BY rowid"
+        for k in range(len(self._open)):
+            for key, *texts in self._query(k, query, status):
+                if self._places.get(key) != (k, status == "done"):
+                    continue
+                try:
+                    yield _parsed_row(key, status, *texts)
+                except (ValueError, TypeError, KeyError, RecursionError) as error:
+                    raise self.damaged_row(str(key), error) from None
 
     def _query(self, k: int, query: str, *values: Any) -> Iterator[Any]:
         file, database = self._open[k]
@@ -242,53 +248,70 @@ class Ledger:
             raise _unreadable(file, error) from None
 
 
-SELECT = "SELECT key, spec, status, faults, row FROM cells"
+SELECT = "SELECT key, spec, faults, row FROM cells"
+
+
+def _parsed_row(
+    key: str, status: str, spec: str, faults: str, row: str | None
+) -> dict[str, Any]:
+    """Return a row as a mapping. Raises an error if it is not a row of this format."""
+    parsed = {"key": str(key), "spec": json.loads(spec), "status": status}
+    cell_from(parsed["spec"])  # raises if a field is unknown or missing
+    if status == "done":
+        return {**parsed, **json.loads(row or "")}
+    return {**parsed, "reasons": list(map(str, json.loads(faults)))}
 
 
 class Writer:
-    """Opens one file of a ledger for writing, as its one driver, and creates it where there is none. A context.
+    """Opens one file of a ledger for writing, or creates it.
 
-    Raises InputError if another process drives it, if it is damaged, or if it cannot be written to. Then nothing is
-    left of a ledger that was not there before.
+    It is a context manager. While it is open, no other process can write to the file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: Another process writes to the file, it is damaged, or it cannot be
+            written to. New files and folders are then removed again.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._elsewhere = 0  # cells of the plan that another file has done
+        self._elsewhere = 0  # cells of the plan that are done in another file
         _check_place(self.path)
         with ExitStack() as opened:
             try:
                 made = made_folders(self.path.parent)
                 opened.push(partial(_undo_folders, made))
-                # the lock is the last to be released
+                # entered first, the lock is released last
                 opened.enter_context(_locked(self.path))
                 if not self.path.exists():
                     opened.push(partial(_undo_files, self.path))
-                self._db = opened.enter_context(
-                    closing(
-                        sqlite3.connect(
-                            self.path, timeout=OPEN_SECONDS, isolation_level=None
-                        )
-                    )
+                database = sqlite3.connect(
+                    self.path, timeout=OPEN_SECONDS, isolation_level=None
                 )
+                self._db = opened.enter_context(closing(database))
                 self._prepare()
             except (OSError, sqlite3.Error) as error:
                 raise _unwritable(self.path, error) from None
             self._opened = opened.pop_all()
 
     def _prepare(self) -> None:
-        """Check the file, bring its tables to today's form, and have each write reach the disk."""
+        """Check the file, migrate it to the current format, and make writes durable."""
         form = _check_format(self.path, self._db)
         if form:
             (whole,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
+        # This must come before the first table. A row takes more than half of a page of
+        # SQLite's usual size, so such a page would hold only one row.
+        self._db.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         self._db.executescript("PRAGMA journal_mode = WAL")
         for later in range(form + 1, FORMAT + 1):
             self._db.executescript(
                 f"BEGIN; {MIGRATIONS[later]} PRAGMA user_version = {later}; COMMIT;"
             )
-        # what is written survives the loss of power
+        # so that a committed row survives a power failure
         self._db.execute("PRAGMA synchronous = FULL")
         self._db.execute(f"PRAGMA busy_timeout = {1000 * BUSY_SECONDS:.0f}")
         self._db.execute("CREATE TEMP TABLE planned (key TEXT PRIMARY KEY)")
@@ -300,15 +323,18 @@ class Writer:
         self.close()
 
     def close(self) -> None:
-        """Let others drive it."""
+        """Close the file and release its lock."""
         self._opened.close()
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Write all that the body does, or nothing. Raises InputError where there is no room."""
+        """Write all changes of the body, or none.
+
+        Raises InputError if they cannot be written, as on a full disk.
+        """
         try:
             self._db.execute("BEGIN IMMEDIATE")
-            with self._db:  # which commits, or rolls back
+            with self._db:  # commits, or rolls back
                 yield
         except sqlite3.Error as error:
             raise _unwritable(self.path, error) from None
@@ -316,9 +342,14 @@ class Writer:
     def plan(
         self, cells: Iterable[Cell], elsewhere: Container[str] = frozenset()
     ) -> None:
-        """Add the cells of a plan, which may be there already; `planned` and `counts` are of these.
+        """Add the cells of a plan that the file does not have yet.
 
-        Those with a key in `elsewhere` are done in another file: they are counted, and not added.
+        `planned` and `counts` then refer to the cells of this plan.
+
+        Args:
+            cells: The cells of the plan.
+            elsewhere: Keys of cells that are done in another file. They are counted as
+                done, and not added.
         """
         with self.transaction():
             for cell in cells:
@@ -331,99 +362,104 @@ class Writer:
         """Add one cell of a plan."""
         self._db.execute("INSERT OR IGNORE INTO planned VALUES (?)", [cell.key])
         self._db.execute(
-            "INSERT INTO cells (key, kind, spec) VALUES (?, ?, ?) ON CONFLICT (key) DO UPDATE "
+            "INSERT INTO cells (key, kind, spec) VALUES (?, ?, ?) "
+            "ON CONFLICT (key) DO UPDATE "
             "SET spec = excluded.spec WHERE spec != excluded.spec",
             [cell.key, cell.kind, json.dumps(cell.spec)],
         )
 
     def planned(self) -> list[int]:
-        """Return the places of the plan's cells that are to run, those that failed last."""
-        query = "SELECT cells.rowid FROM planned JOIN cells USING (key) WHERE status = 'planned'"
-        return [
-            place
-            for (place,) in self._db.execute(
-                f"{query} ORDER BY length(faults) > 2 OR losses > 0, cells.rowid"
-            )
-        ]
+        """Return the places of the plan's cells to run, with failed ones at the end."""
+        # `faults` is a JSON list, and "[]" has two characters
+        query = (
+            "SELECT cells.rowid FROM planned JOIN cells USING (key) "
+            "WHERE status = 'planned' "
+            "ORDER BY length(faults) > 2 OR losses > 0, cells.rowid"
+        )
+        return [place for (place,) in self._db.execute(query)]
 
     def counts(self) -> Counter[str]:
         """Return how many of the plan's cells are planned, done and quarantined."""
-        query = "SELECT status, count(*) FROM planned JOIN cells USING (key) GROUP BY status"
+        query = (
+            "SELECT status, count(*) FROM planned JOIN cells USING (key) "
+            "GROUP BY status"
+        )
         counts = Counter(dict(self._db.execute(query).fetchall()))
         counts["done"] += self._elsewhere
         return +counts
 
     def cell(self, place: int) -> Cell:
-        """Return the cell in a place."""
-        (spec,) = self._db.execute(
-            "SELECT spec FROM cells WHERE rowid = ?", [place]
-        ).fetchone()
+        """Return the cell at a place, as `planned` returns them."""
+        query = "SELECT spec FROM cells WHERE rowid = ?"
+        (spec,) = self._db.execute(query, [place]).fetchone()
         return cell_from(json.loads(spec))
 
-    def finish(self, key: str, result: CellResult) -> bool:
-        """Write what a cell measured, and return whether it is the first: of what ran twice the first counts."""
-        row = json.dumps(
-            {name: value for name, value in result.row.items() if name not in NAMES},
-            allow_nan=False,
+    def finish(self, key: str, row: Mapping[str, Any]) -> bool:
+        """Write a cell's row, and return whether it was written.
+
+        If a cell runs twice, the first row counts.
+        """
+        figures = {name: value for name, value in row.items() if name not in NAMES}
+        text = json.dumps(figures, allow_nan=False)
+        query = (
+            "UPDATE cells SET status = 'done', row = ? "
+            "WHERE key = ? AND status != 'done'"
         )
-        query = "UPDATE cells SET status = 'done', row = ?, arrays = ? WHERE key = ? AND status != 'done'"
-        return self._db.execute(query, [row, result.joints, key]).rowcount == 1
+        return self._db.execute(query, [text, key]).rowcount == 1
 
     def fail(self, key: str, reason: str, is_own_fault: bool = True) -> bool:
-        """Note a failed attempt, and return whether the cell is in quarantine for it."""
+        """Note a failed attempt, and return whether the cell is now in quarantine."""
         faults, losses = self._db.execute(
             "SELECT faults, losses FROM cells WHERE key = ?", [key]
         ).fetchone()
-        reasons = [*json.loads(faults), reason] if is_own_fault else json.loads(faults)
-        losses += not is_own_fault
+        reasons = json.loads(faults)
+        if is_own_fault:
+            reasons.append(reason)
+        else:
+            losses += 1
         quarantined = len(reasons) >= ATTEMPTS or losses >= LOSSES
         if losses >= LOSSES:
-            reasons = [f"something outside ended it {LOSSES} times", reason]
+            reasons = [f"killed from outside {LOSSES} times", reason]
+        status = "quarantined" if quarantined else "planned"
         self._db.execute(
-            "UPDATE cells SET status = ?, faults = ?, losses = ? WHERE key = ? AND status = 'planned'",
-            [
-                "quarantined" if quarantined else "planned",
-                json.dumps(reasons),
-                losses,
-                key,
-            ],
+            "UPDATE cells SET status = ?, faults = ?, losses = ? "
+            "WHERE key = ? AND status = 'planned'",
+            [status, json.dumps(reasons), losses, key],
         )
         return quarantined
 
     def release_quarantined(self) -> int:
         """Let the plan's cells out of quarantine, and return how many."""
-        release = "UPDATE cells SET status = 'planned', faults = '[]', losses = 0 WHERE status = 'quarantined'"
-        return self._db.execute(
-            f"{release} AND key IN (SELECT key FROM planned)"
-        ).rowcount
+        query = (
+            "UPDATE cells SET status = 'planned', faults = '[]', losses = 0 "
+            "WHERE status = 'quarantined' AND key IN (SELECT key FROM planned)"
+        )
+        return self._db.execute(query).rowcount
 
     def old_specs(self) -> Iterator[Mapping[str, Any]]:
-        """Yield the specs of finished cells."""
-        return (
-            json.loads(spec)
-            for (spec,) in self._db.execute(
-                "SELECT spec FROM cells WHERE status = 'done'"
-            )
-        )
+        """Return an iterator of the specs of finished cells."""
+        query = "SELECT spec FROM cells WHERE status = 'done'"
+        return (json.loads(spec) for (spec,) in self._db.execute(query))
 
 
 def _files(path: Path) -> list[Path]:
-    """Return a ledger's files: itself, or the ledgers in a folder."""
+    """Return the path if it is a file, or all ledgers in a folder."""
     if path.is_file():
         return [path]
-    if not (found := sorted(path.glob(f"*{SUFFIX}"))):
-        came = "a folder without one" if path.is_dir() else "none"
+    ledgers = sorted(path.glob(f"*{SUFFIX}"))
+    if not ledgers:
+        found = "a folder without one" if path.is_dir() else "none"
         raise InputError(
-            f"{path}: expected a ledger, a folder or .sqlite file that posefit sweep wrote, got {came}"
+            f"{path}: expected a ledger, a folder or .sqlite file that posefit sweep "
+            f"wrote, got {found}"
         )
-    return found
+    return ledgers
 
 
 def _reader(file: Path) -> sqlite3.Connection:
-    """Return a connection that reads a file.
-
-    SQLite removes what it puts beside the file, if it may write there.
-    """
+    """Return a connection that reads a file."""
+    # To read, SQLite creates files in the same folder. It can remove them only if the
+    # connection may write.
     writable = os.access(file.parent, os.W_OK) and os.access(file, os.W_OK)
     if writable:
         mode = "rw"
@@ -441,7 +477,8 @@ def _reader(file: Path) -> sqlite3.Connection:
             database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
             if not _check_format(file, database):
                 raise InputError(
-                    f"{file}: expected a ledger that posefit sweep wrote, got an empty file"
+                    f"{file}: expected a ledger that posefit sweep wrote, "
+                    "got an empty file"
                 )
         except (sqlite3.Error, UnicodeDecodeError) as error:
             raise _unreadable(file, error) from None
@@ -450,9 +487,12 @@ def _reader(file: Path) -> sqlite3.Connection:
 
 
 def _check_format(file: Path, database: sqlite3.Connection) -> int:
-    """Return the format of a ledger, 0 of one that is still empty. Raises InputError if it is something else."""
+    """Return the format of a ledger, or 0 if it is still empty.
+
+    Raises InputError if it is not a ledger.
+    """
     tables = dict(database.execute("SELECT name, type FROM sqlite_master").fetchall())
-    # which SQLite takes for an empty one
+    # SQLite treats a file that is too short as empty
     if not tables and 0 < (size := file.stat().st_size) < MIN_FILE_BYTES:
         raise sqlite3.DatabaseError(
             f"a file of {counted(size, 'byte')}, too short to be one"
@@ -460,27 +500,29 @@ def _check_format(file: Path, database: sqlite3.Connection) -> int:
     columns = {row[1] for row in database.execute("PRAGMA table_info(cells)")}
     if tables and (tables.get("cells") != "table" or not columns >= COLUMNS):
         raise InputError(
-            f"{file}: expected a ledger that posefit sweep wrote, got another SQLite file"
+            f"{file}: expected a ledger that posefit sweep wrote, "
+            "got another SQLite file"
         )
     (form,) = database.execute("PRAGMA user_version").fetchone()
     if tables and not 1 <= form <= FORMAT:
         raise InputError(
-            f"{file}: expected a ledger of format 1 to {FORMAT}, got {form}: a newer posefit may read it"
+            f"{file}: expected a ledger of format 1 to {FORMAT}, got {form}: "
+            "a newer posefit may read it"
         )
     return int(form) if tables else 0
 
 
 def _check_place(path: Path) -> None:
+    """Raise InputError if a ledger must not be created or continued at this path."""
     folder = path.parent
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")
     if path.is_symlink() and not path.exists():
         raise InputError(f"{path}: expected a ledger, got a link that leads nowhere")
-    names = (
-        [name for name in sorted(os.listdir(folder)) if not name.startswith(".")]
-        if folder.is_dir()
-        else []
-    )
+    if not folder.is_dir():
+        return
+    names = [name for name in sorted(os.listdir(folder)) if not name.startswith(".")]
+    # a folder with other files but no ledger is probably the wrong one
     if names and not any(name.endswith((SUFFIX, DRIVER)) for name in names):
         raise InputError(
             f"{folder}: expected a new folder or a ledger, got one with {names[0]}"
@@ -488,13 +530,13 @@ def _check_place(path: Path) -> None:
 
 
 def _undo_folders(made: Iterable[Path], error: object, *_: object) -> None:
-    """Remove new folders that are empty, if there was an error: the exit of a context."""
+    """Remove new folders that are empty if there was an error. An `__exit__`."""
     if error is not None:
         remove_empty(made)
 
 
 def _undo_files(path: Path, error: object, *_: object) -> None:
-    """Remove a new ledger, if there was an error: the exit of a context."""
+    """Remove a new ledger if there was an error. An `__exit__`."""
     if error is not None:
         for suffix in ("", WAL, "-shm", "-journal"):
             Path(f"{path}{suffix}").unlink(missing_ok=True)
@@ -502,10 +544,13 @@ def _undo_files(path: Path, error: object, *_: object) -> None:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock that says that this process drives a ledger. If the body fails, a new lock file is removed.
+    """Hold a ledger's lock, so that no other process writes to the ledger.
 
-    In a folder that others may write to, its name may be a link's or another file's: nothing is written to those.
-    Raises InputError then, and if another process holds the lock.
+    If the body fails, a new lock file is removed. In a folder that others may write to,
+    its name may belong to a link or another program's file. Nothing is written to
+    these.
+
+    Raises InputError in that case, and if another process holds the lock.
     """
     name = f"{path}{DRIVER}"
     new = not os.path.lexists(name)
@@ -516,7 +561,7 @@ def _locked(path: Path) -> Iterator[None]:
         opened.callback(os.close, file)
         is_locked = lock(file)
         state = os.fstat(file)
-        # a second name is a hard link; no name is that of a driver that removed it just now
+        # Two names mean a hard link. None means that its driver has just removed it.
         if not stat.S_ISREG(state.st_mode) or state.st_nlink != 1:
             raise _no_lock_file(name)
         driver = os.read(file, 1000).decode(errors="replace")
@@ -525,8 +570,8 @@ def _locked(path: Path) -> Iterator[None]:
         if not is_locked:
             raise InputError(
                 f"{path}: expected a ledger that no other sweep writes to, "
-                f"got one that {cut(driver or 'another process')} drives; "
-                "--shard I/N writes to a file of its own"
+                f"got one that {cut(driver or 'another process')} writes to; "
+                "use --shard I/N to write to a separate file"
             )
         try:
             os.ftruncate(file, 0)
@@ -543,22 +588,29 @@ def _locked(path: Path) -> Iterator[None]:
 
 def _no_lock_file(name: str) -> InputError:
     return InputError(
-        f"{name}: expected the lock file of posefit sweep, got a link or another program's file"
+        f"{name}: expected the lock file of posefit sweep, "
+        "got a link or another program's file"
     )
 
 
 def _is_without_shared_memory(error: Exception) -> bool:
-    """Return whether a disk cannot hold the write-ahead log of a ledger, as many network disks cannot."""
+    """Return whether a disk cannot hold a ledger's write-ahead log.
+
+    Many network disks cannot.
+    """
     name = getattr(error, "sqlite_errorname", "")
     return "locking protocol" in str(error) or name.startswith("SQLITE_IOERR_SHM")
 
 
 def _is_damage(error: Exception) -> bool:
-    """Return whether an error says that a file is damaged; any other is about where it lies, or who uses it."""
-    return isinstance(error, UnicodeDecodeError) or (
-        isinstance(error, sqlite3.DatabaseError)
-        and not isinstance(error, sqlite3.OperationalError)
-    )
+    """Return whether an error means that a file is damaged.
+
+    An OperationalError is about the file's folder or disk, or about who uses it.
+    """
+    if isinstance(error, UnicodeDecodeError):
+        return True
+    is_operational = isinstance(error, sqlite3.OperationalError)
+    return isinstance(error, sqlite3.DatabaseError) and not is_operational
 
 
 def _unreadable(file: Path, error: Exception) -> InputError:
@@ -569,13 +621,18 @@ def _unreadable(file: Path, error: Exception) -> InputError:
         return _damaged(file, error)
     reason = cut(str(error))
     if "locked" in reason:
-        came = f"one in use ({reason}): try again when no other program locks it"
+        found = f"one in use ({reason}): try again when no other program locks it"
     elif _is_without_shared_memory(error):
-        came = f"one on a disk that SQLite cannot share ({reason}): copy it to a local folder and read that"
+        found = (
+            f"one on a disk that SQLite cannot share ({reason}): "
+            "copy it to a local folder and read that"
+        )
     else:
-        log = f"{file.name}{WAL}"
-        came = f"one that cannot be opened here ({reason}): copy it, with {log} if there is one, to a folder of yours"
-    return InputError(f"{file}: expected a ledger that can be read, got {came}")
+        found = (
+            f"one that cannot be opened here ({reason}): copy it, "
+            f"with {file.name}{WAL} if that exists, to a folder of yours"
+        )
+    return InputError(f"{file}: expected a ledger that can be read, got {found}")
 
 
 def _unwritable(path: Path, error: Exception) -> InputError:
@@ -584,14 +641,20 @@ def _unwritable(path: Path, error: Exception) -> InputError:
         return _damaged(path, error)
     reason = cut(str(getattr(error, "strerror", None) or error))
     if "locked" in reason:
-        came = f"one in use ({reason}): try again when no other program locks it"
+        found = f"one in use ({reason}): try again when no other program locks it"
     elif _is_without_shared_memory(error):
-        came = f"a disk that SQLite cannot share ({reason}): write to a local folder, and copy it afterwards"
+        found = (
+            f"a disk that SQLite cannot share ({reason}): "
+            "write to a local folder, and copy it afterwards"
+        )
     else:
-        came = reason
-    return InputError(f"{path}: expected a file that can be written to, got {came}")
+        found = reason
+    return InputError(f"{path}: expected a file that can be written to, got {found}")
 
 
 def _damaged(file: Path, error: Exception) -> InputError:
-    what = f"got {cut(str(error))}: take it from a copy, or save what can be read by sqlite3 {file.name} .recover"
-    return InputError(f"{file}: expected a whole SQLite file, {what}")
+    """Return the error of a damaged file."""
+    return InputError(
+        f"{file}: expected an intact SQLite file, got {cut(str(error))}: use a backup, "
+        f"or recover the readable part with sqlite3 {file.name} .recover"
+    )

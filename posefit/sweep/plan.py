@@ -1,8 +1,11 @@
-"""A plan: which cells a sweep consists of, all checked before anything runs.
+"""A plan: the cells of a sweep, all checked before anything runs.
 
-A plan is made of tables, as docs/howto/plan.md has them: `defaults` of every cell, a `product` of lists, a `grid` of
-settings, and `cells` beside it. An entry of a list is the value of a cell's field, or a table of several fields; see
-`posefit.sweep.cell` for what the fields are. A plan that names a `suite` has the lists of a product of single searches.
+docs/howto/plan.md describes a plan's tables: the `defaults` of every cell, a `product`
+of lists, a `grid` of settings, and single `cells`. An entry of a list is the value of a
+cell's field, or a table of several fields. `posefit.sweep.cell` describes the fields.
+
+A plan that names a `suite` consists of single searches. It has the lists of a product,
+but no table around them.
 """
 
 import sys
@@ -37,7 +40,7 @@ LISTS = {
     "instances": "instance",
     "seeds": "seed",
 }
-SEARCH_LISTS = {  # and what they are by default
+SEARCH_LISTS = {  # with the field of each list, and its default
     "dimensions": ("dimension", [9]),
     "functions": ("function", [function.number for function in FUNCTIONS]),
     "instances": ("instance", 15),
@@ -45,8 +48,9 @@ SEARCH_LISTS = {  # and what they are by default
     "budgets": ("budget", [EVALUATIONS]),
     "methods": ("method", []),
 }
+PARTS = {"optimisers": "optimiser", "priors": "prior"}  # the parts of a method
 TABLES = ("defaults", "product", "grid", "cells")
-DEFAULT = "default"  # the name of the plan that posefit brings along
+DEFAULT = "default"  # the name of the plan that comes with posefit
 INPUT = "-"  # the name of a plan that is read from standard input
 MAX_CELLS = 1_000_000  # cells
 MAX_BYTES = 1_000_000  # bytes
@@ -56,7 +60,14 @@ Entry = Mapping[str, Any]
 
 
 class Plan:
-    """The cells of a sweep, made as they are asked for; no two are equal."""
+    """The cells of a sweep, all different. Each iteration makes them again.
+
+    Args:
+        cells: Returns an iterator of the cells.
+
+    Raises:
+        InputError: There is no cell, or two cells are equal.
+    """
 
     def __init__(self, cells: Callable[[], Iterator[Cell]]) -> None:
         self._cells = cells
@@ -74,9 +85,17 @@ class Plan:
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
-        """Return the plan of a TOML file, posefit's own for `default`, or that on standard input for `-`.
+        """Return the plan of a TOML file.
 
-        Raises ValueError naming the file.
+        Args:
+            path: The file, `default` for posefit's own plan, or `-` for standard input.
+
+        Returns:
+            The checked plan.
+
+        Raises:
+            ValueError: The file cannot be read, or the plan is wrong. The message names
+                the file.
         """
         text = plan_text(path)
         try:
@@ -86,12 +105,21 @@ class Plan:
 
     @classmethod
     def of(cls, tables: Mapping[str, Any]) -> Self:
-        """Return the plan that a mapping describes, as the TOML file does: of tracks, or of searches of a `suite`.
+        """Return the plan that a mapping describes.
 
-        Raises ValueError where anything in it is wrong, and ImportError where a method needs a library that is not
-        installed.
+        Args:
+            tables: The tables of the TOML file by name.
+
+        Returns:
+            The checked plan: of searches if it names a `suite`, else of tracks.
+
+        Raises:
+            ValueError: Anything in the plan is wrong.
+            ImportError: A method needs a library that is not installed.
         """
-        return cls(_searches(tables) if "suite" in tables else _tracks(tables))
+        if "suite" in tables:
+            return cls(_searches(tables))
+        return cls(_tracks(tables))
 
     def __len__(self) -> int:
         return self._count
@@ -101,7 +129,11 @@ class Plan:
 
 
 def plan_text(path: str | Path) -> str:
-    """Return the text of a plan: of a file, posefit's own for `default`, or of standard input for `-`."""
+    """Return the text of a plan.
+
+    `path` is a file, `default` for posefit's own plan, or `-` for standard input.
+    Raises InputError if the text cannot be read or is too long.
+    """
     if str(path) == DEFAULT:
         return (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
     if str(path) == INPUT:
@@ -113,9 +145,10 @@ def plan_text(path: str | Path) -> str:
             ) from None
         if len(text) > MAX_BYTES:
             raise InputError(
-                f"{INPUT}: expected a plan of at most {MAX_BYTES:,} characters, got more"
+                f"{INPUT}: expected a plan of at most {MAX_BYTES:,} characters, "
+                "got more"
             )
-        return text.removeprefix("\ufeff")
+        return text.removeprefix("\ufeff")  # the byte-order mark
     if not Path(path).is_file():
         what = "a folder" if Path(path).is_dir() else "no file of that name"
         raise InputError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {what}")
@@ -123,31 +156,33 @@ def plan_text(path: str | Path) -> str:
 
 
 def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
-    """Return what makes the cells of a plan of tracks."""
+    """Return a function that makes the cells of a plan of tracks."""
     _check_names("a plan", tables, TABLES)
-    _check_names(
-        "defaults", defaults := _mapping("defaults", tables.get("defaults", {})), FIELDS
-    )
-    if not isinstance(listed := tables.get("cells", []), list | tuple):
+    defaults = _mapping("defaults", tables.get("defaults", {}))
+    _check_names("defaults", defaults, FIELDS)
+    listed = tables.get("cells", [])
+    if not isinstance(listed, list | tuple):
         raise InputError(f"cells must be a list of tables, got {quoted(listed)}")
     single = [_mapping("cells", spec) for spec in listed]
     crossed = _mapping("product", tables.get("product") or {})
-    _check_names("product", crossed, LISTS)
+    _check_names("product", crossed, [*LISTS, *PARTS])
+    if any(part in crossed for part in PARTS):
+        crossed = _with_methods(crossed)
     lists = {
         LISTS[name]: _listed(f"product.{name}", LISTS[name], values)
         for name, values in crossed.items()
     }
-    names = [
-        {name for entry in entries for name in _fields(field, entry)}
-        for field, entries in lists.items()
-    ]
+    names = []
+    for field, entries in lists.items():
+        names.append({name for entry in entries for name in _fields(field, entry)})
     for some, others in combinations(names, 2):
         if some & others:
             raise InputError(
                 f"product must say {min(some & others)} in one list, got it in two"
             )
     if "methods" in crossed:
-        # methods come last, which a product changes soonest: a sweep under way compares them on what is done
+        # A product varies its last list fastest. With the methods last, an unfinished
+        # sweep has all methods on the cases that are done.
         lists["method"] = _gridded(
             lists.pop("method"), tables.get("grid", {}), families
         )
@@ -157,49 +192,79 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     used: set[str] = set()
 
     def make(spec: Entry) -> Cell:
-        """Return a cell: of the shared settings it has those of what its method uses."""
+        """Return a cell, with the shared settings that its method has."""
         method = spec.get("method", defaults.get("method"))
         names = families(method) if shared and isinstance(method, str) else ()
-        fitting = {
+        applicable = {
             name: value
             for name, value in shared.items()
             if name.partition(".")[0] in names
         }
-        used.update(fitting)
-        return cell_of(
-            {
-                **defaults,
-                **spec,
-                "settings": fitting | flattened("settings", spec.get("settings", {})),
-            }
-        )
+        used.update(applicable)
+        settings = applicable | flattened("settings", spec.get("settings", {}))
+        return cell_of({**defaults, **spec, "settings": settings})
 
     def cells() -> Iterator[Cell]:
         yield from map(make, chain(_product(lists), single))
         if unused := [name for name in shared if name not in used]:
             raise InputError(
-                f"defaults.settings must be of the plan's methods, got {quoted(unused[0])}, which none uses"
+                "defaults.settings must be of the plan's methods, "
+                f"got {quoted(unused[0])}, which none uses"
             )
 
     _check_count(lists)
     return cells
 
 
+def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the lists of a product, with `methods` instead of optimisers and priors.
+
+    The methods pair each optimiser with each prior.
+    """
+    if "methods" in crossed or not all(part in crossed for part in PARTS):
+        raise InputError(
+            "product must hold methods, or both optimisers and priors, "
+            f"got {', '.join(crossed)}"
+        )
+    parts = []
+    for plural, singular in PARTS.items():
+        entries = _listed(f"product.{plural}", singular, crossed[plural])
+        tables = [_fields(singular, entry) for entry in entries]
+        for table in tables:
+            _check_names(f"an entry of {plural}", table, (singular, "settings"))
+            if not isinstance(table.get(singular), str):
+                raise InputError(
+                    f"an entry of {plural} must be a name, or a table with {singular}, "
+                    f"got {quoted(dict(table))}"
+                )
+        parts.append(tables)
+    methods = []
+    for optimiser, prior in product(*parts):
+        settings: dict[str, Any] = {}
+        for kind, table in (("optimiser", optimiser), ("prior", prior)):
+            name = table[kind].partition(":")[0]
+            for key, value in flattened("settings", table.get("settings", {})).items():
+                settings[key if "." in key else f"{name}.{key}"] = value
+        method = f"{optimiser['optimiser']}@{prior['prior']}"
+        methods.append({"method": method, "settings": settings})
+    lists = {name: values for name, values in crossed.items() if name not in PARTS}
+    return {**lists, "methods": methods}
+
+
 def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
-    """Return what makes the cells of a plan of searches. A dimension that a function does not have is passed over."""
+    """Return a function that makes the cells of a plan of searches.
+
+    A function has no cells in dimensions in which it does not exist.
+    """
     _check_names(
         "a plan of a suite", tables, ("suite", *SEARCH_LISTS, "infeasible", "grid")
     )
     shared = {name: tables[name] for name in ("suite", "infeasible") if name in tables}
-    lists = {
-        field: _listed(
-            name,
-            field,
-            tables.get(name, default),
-            HELD_OUT.start if name == "instances" else 0,
-        )
-        for name, (field, default) in SEARCH_LISTS.items()
-    }
+    lists = {}
+    for name, (field, default) in SEARCH_LISTS.items():
+        # instances before these may have been used to choose settings
+        first = HELD_OUT.start if name == "instances" else 0
+        lists[field] = _listed(name, field, tables.get(name, default), first)
     methods = _gridded(
         lists["method"],
         tables.get("grid", {}),
@@ -207,14 +272,25 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     )
     lists["method"] = list(map(search_method, methods))
     _check_count(lists)
-    return lambda: filter(
-        None, (search_of({**shared, **spec}) for spec in _product(lists))
-    )
+
+    def cells() -> Iterator[Cell]:
+        for spec in _product(lists):
+            cell = search_of({**shared, **spec})
+            if cell is not None:
+                yield cell
+
+    return cells
 
 
 def _product(lists: Mapping[str, Sequence[Any]]) -> Iterator[Entry]:
-    """Yield what every combination of entries of fields' lists says together; of no lists nothing."""
-    for entries in product(*lists.values()) if lists else ():
+    """Yield the fields of every combination of the lists' entries.
+
+    Without lists there are no combinations.
+    """
+    # the product of no lists would be one empty combination
+    if not lists:
+        return
+    for entries in product(*lists.values()):
         spec: dict[str, Any] = {}
         for field, entry in zip(lists, entries, strict=True):
             spec.update(_fields(field, entry))
@@ -222,16 +298,18 @@ def _product(lists: Mapping[str, Sequence[Any]]) -> Iterator[Entry]:
 
 
 def _fields(field: str, entry: Any) -> Entry:
-    """Return the fields that an entry of a field's list stands for; a corruption is itself a table."""
-    return (
-        entry
-        if isinstance(entry, Mapping) and field != "corruption"
-        else {field: entry}
-    )
+    """Return the fields that an entry of a field's list sets."""
+    # the value of a corruption is itself a table
+    if isinstance(entry, Mapping) and field != "corruption":
+        return entry
+    return {field: entry}
 
 
 def _listed(name: str, field: str, values: Any, first: int = 0) -> Sequence[Any]:
-    """Return the entries of one list; a number is so many numbers from the first on."""
+    """Return the entries of a list.
+
+    For instances and seeds a number N stands for the N numbers from `first` on.
+    """
     if field in ("instance", "seed") and type(values) is int:
         if values > MAX_CELLS:
             shown = f"{values:,}" if values < 10**SHOWN else quoted(values)
@@ -249,7 +327,16 @@ def _listed(name: str, field: str, values: Any, first: int = 0) -> Sequence[Any]
 def _gridded(
     methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequence[str]]
 ) -> list[Entry]:
-    """Return entries of methods, each once for every combination of the grid's settings that it has."""
+    """Return each method with every combination of the grid's settings that it has.
+
+    Args:
+        methods: Entries of a list of methods.
+        grid: The values of each setting by its name NAME.SETTING.
+        names_of: Returns the NAMEs of a method.
+
+    Returns:
+        The entries, each with its settings.
+    """
     lists = flattened("grid", grid) if isinstance(grid, Mapping) else {}
     if (grid and not lists) or not isinstance(grid, Mapping):
         raise InputError(f"grid must hold {GRID}, got {quoted(grid)}")
@@ -265,21 +352,21 @@ def _gridded(
         known.update(names)
         applicable = [name for name in lists if name.partition(".")[0] in names]
         entry_settings = flattened("settings", entry.get("settings", {}))
-        if twice := [
-            name
-            for name in applicable
-            if {name, name.rpartition(".")[2]} & entry_settings.keys()
-        ]:
-            raise InputError(
-                f"grid must hold what no entry of methods sets itself, got {twice[0]}, which one does"
-            )
+        for name in applicable:
+            # an entry may name its settings with or without the method's name
+            if {name, name.rpartition(".")[2]} & entry_settings.keys():
+                raise InputError(
+                    "grid must hold settings that no entry of methods sets itself, "
+                    f"got {name}, which one sets"
+                )
         used.update(applicable)
         for chosen in product(*(lists[name] for name in applicable)):
             settings = entry_settings | dict(zip(applicable, chosen, strict=True))
             entries.append({**entry, "settings": settings} if applicable else entry)
     if unused := [name for name in lists if name not in used]:
         raise InputError(
-            f"grid must hold settings of {', '.join(sorted(known))}, the plan's methods, got {quoted(unused[0])}"
+            f"grid must hold settings of {', '.join(sorted(known))}, the plan's "
+            f"methods, got {quoted(unused[0])}"
         )
     return entries
 
@@ -287,10 +374,12 @@ def _gridded(
 def _check_names(
     what: str, table: Mapping[str, Any], known: Sequence[str] | Mapping[str, str]
 ) -> None:
+    """Raise InputError if a table has an unknown name."""
     for name in table:
         if name not in known:
             raise InputError(
-                f"{what} must hold {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+                f"{what} must hold {', '.join(known)}, "
+                f"got {quoted(name)}{suggestion(name, known)}"
             )
 
 

@@ -1,4 +1,7 @@
-"""Runs cells, or other jobs, in processes of this machine, by pebble: whatever a job does ends with its process."""
+"""Runs cells, or other jobs, in processes of this machine.
+
+The processes are pebble's. Whatever a job does to its process ends with that process.
+"""
 
 import multiprocessing
 import os
@@ -24,10 +27,12 @@ from posefit.sweep.worker import (
     left_as_it_was,
 )
 
-# that a process may take to begin a job; twice as long after each time that none did
+# The longest that a process may take to begin a job. It doubles each time that none
+# did.
 START_SECONDS = 60.0
-# Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
-# out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
+# Signals that nothing in a cell raises by mistake, so they came from outside. The
+# kernel sends one too when memory runs out; but a cell reaches its own memory limit
+# first if the machine has as much memory as all cells together may take.
 EXTERNAL_SIGNALS = {
     signal.SIGKILL,
     signal.SIGTERM,
@@ -40,7 +45,14 @@ EXTERNAL_SIGNALS = {
 
 
 class Pool:
-    """An engine of so many worker processes, each of which calls `prepare` first."""
+    """An engine of worker processes on this machine.
+
+    Args:
+        workers: Number of processes.
+        limits: The longest time and the most memory of a job.
+        run: Called with a job in a worker; its result is the job's.
+        prepare: Called once in each worker before its first job.
+    """
 
     def __init__(
         self,
@@ -71,18 +83,19 @@ class Pool:
         self._running[future] = job, time.monotonic()
 
     def wait(self, seconds: float) -> list[Outcome]:
-        """Return the jobs that ended."""
+        """Return the outcomes of the jobs that ended."""
         done = wait(self._running, seconds, FIRST_COMPLETED).done
         self._context.end_orphans()
         outcomes = [
             self._outcome(future) for future in tuple(self._running) if future in done
         ]
-        late = time.monotonic() - self._start_seconds
+        latest_start = time.monotonic() - self._start_seconds
         stuck = any(
-            start < late and not future.running()
+            start < latest_start and not future.running()
             for future, (_, start) in self._running.items()
         )
-        # a worker died while it took a job from the others' queue
+        # A worker that dies while it takes a job from the common queue blocks the
+        # others. Only a new pool helps.
         if stuck or not self._pool.active:
             outcomes += [Outcome(job) for job, _ in self._running.values()]
             self._running.clear()
@@ -112,26 +125,24 @@ class Pool:
         try:
             return Outcome(job, *pickle.loads(future.result()))
         except TimeoutError:
-            return Outcome(
-                job, None, f"it ran past its limit of {self._limits.seconds:g} s"
-            )
+            reason = f"it ran past its limit of {self._limits.seconds:g} s"
+            return Outcome(job, None, reason)
         except ProcessExpired as error:
             code = error.exitcode or 0
             if code >= 0:
                 status = 0 if code == EXIT_ZERO_STATUS else code
-                return Outcome(
-                    job, None, f"its process ended itself with status {status}"
-                )
-            name = next(
-                (number.name for number in signal.Signals if number == -code),
-                f"signal {-code}",
-            )
-            return Outcome(
-                job,
-                None,
-                f"its process died of {name}",
-                is_own_fault=-code not in EXTERNAL_SIGNALS,
-            )
+                reason = f"its process ended itself with status {status}"
+                return Outcome(job, None, reason)
+            # a negative exit code is the number of the signal that killed it
+            number = -code
+            name = f"signal {number}"
+            for known in signal.Signals:
+                if known == number:
+                    name = known.name
+                    break
+            reason = f"its process died of {name}"
+            is_own_fault = number not in EXTERNAL_SIGNALS
+            return Outcome(job, None, reason, is_own_fault=is_own_fault)
         except (BrokenProcessPool, CancelledError):
             return Outcome(job)
         except Exception as error:  # a result that cannot be read
@@ -139,14 +150,20 @@ class Pool:
 
 
 def _call(run: bytes, job: bytes, gigabytes: float) -> bytes:
-    """Return, pickled, what a function makes of a job; or None, and why."""
+    """Run a job, and return a pickled pair: its result, and the reason if it failed.
+
+    Args:
+        run: The pickled function.
+        job: The pickled argument.
+        gigabytes: The most memory that this process may have meanwhile.
+    """
     try:
         with memory(gigabytes), left_as_it_was():
             result = pickle.loads(run)(pickle.loads(job))
         return cloudpickle.dumps((result, None))  # type: ignore[no-any-return]
     except MemoryError:
         reason = f"it wanted more memory than its limit of {gigabytes:g} GB"
-    # an exit too: it is the cell's, and ends nothing else
+    # also SystemExit: a cell that exits must not end its worker
     except BaseException as error:
         reason = text_of(error)
     return pickle.dumps((None, reason))
@@ -154,8 +171,6 @@ def _call(run: bytes, job: bytes, gigabytes: float) -> bytes:
 
 def cores() -> int:
     """Return how many processors this process may use."""
-    return (
-        len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else multiprocessing.cpu_count()
-    )
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return multiprocessing.cpu_count()

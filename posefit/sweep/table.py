@@ -1,10 +1,17 @@
-"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it; as CSV; or as runs of a suite.
+"""The rows of a ledger as a pandas table, as a CSV file, or as runs of a suite.
 
-Columns are `key`, `version`, `status` ("done" or "quarantined"), `reason`; the cell's spec, with `settings`,
-`corruption`, `train`, `view_degrees` and `size` as text, so that rows can be grouped by them; every figure, those of a
-kind as `error_degrees.mean`, `skill.nearest`, `baselines_degrees.mean_pose`; `joint_errors_mm.NAME` of the 27 joints;
-and `seconds`, `seconds_per_frame` and `cpu_seconds_per_frame`, the only ones that differ when a cell is run again. Rows
-are sorted by what the spec says, not by when they were finished.
+`Ledger.frame` returns the pandas table, with one row per cell. Its columns are:
+
+- `key`, `version`, `status` ("done" or "quarantined") and `reason`
+- the cell's spec, with `settings`, `corruption`, `train`, `view_degrees` and `size` as
+  text, so that rows can be grouped by them
+- every figure; a group of figures has columns such as `error_degrees.mean`,
+  `skill.nearest` and `baselines_degrees.mean_pose`
+- `joint_errors_mm.NAME` for each of the 27 joints
+- `seconds`, `seconds_per_frame` and `cpu_seconds_per_frame`, the only figures that
+  differ when a cell runs again
+
+Rows are sorted by their spec, not by the time when they were finished.
 """
 
 import csv
@@ -37,13 +44,33 @@ ORDER = (
 )
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 _TEXTS = (
-    "key", "version", "status", "reason", "kind", "method", "name", "motion", "train", "settings", "view_degrees",
+    "key",
+    "version",
+    "status",
+    "reason",
+    "kind",
+    "method",
+    "name",
+    "motion",
+    "train",
+    "settings",
+    "view_degrees",
     "corruption",
-)  # fmt: skip
+)
 
 
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
-    """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
+    """Return the pandas table of a ledger's rows, finished or quarantined.
+
+    Args:
+        rows: Rows as `posefit.sweep.ledger.Ledger.all_rows` yields them.
+
+    Returns:
+        The table. This module's docstring describes its columns.
+
+    Raises:
+        ImportError: pandas is not installed.
+    """
     pandas = import_pandas()
     table: pd.DataFrame = pandas.DataFrame(
         [{**dict.fromkeys(_TEXTS), **flat(row)} for row in rows]
@@ -54,28 +81,28 @@ def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the columns of a row of a ledger."""
+    """Return the columns of one row of a ledger, by name."""
     spec = row["spec"]
     columns: dict[str, Any] = {
         "key": row["key"],
         "version": spec["version"],
         "status": row["status"],
+        "reason": "; ".join(row.get("reasons", [])),
     }
-    columns["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
     columns |= {
         name: value for name, value in spec.items() if name not in ("files", "version")
     }
     columns["settings"] = ", ".join(settings_text(spec["settings"]))
     if spec["kind"] == "track":
-        columns |= {
-            "corruption": ", ".join(
-                f"{kind} {strength:g}"
-                for kind, strength in sorted(spec["corruption"].items())
-            ),
-            "train": ", ".join(spec["train"]),
-            "view_degrees": ", ".join(f"{view:g}" for view in spec["view_degrees"]),
-            "size": "x".join(map(str, spec["size"])),
-        }
+        corruptions = [
+            f"{kind} {strength:g}"
+            for kind, strength in sorted(spec["corruption"].items())
+        ]
+        columns["corruption"] = ", ".join(corruptions)
+        columns["train"] = ", ".join(spec["train"])
+        views = [f"{view:g}" for view in spec["view_degrees"]]
+        columns["view_degrees"] = ", ".join(views)
+        columns["size"] = "x".join(map(str, spec["size"]))
     for name, value in row.items():
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability"):
             continue
@@ -92,43 +119,52 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
-    """Write rows as a new CSV file, in UTF-8; columns are all that any row has, in the order of their first row.
+    """Write rows as a new CSV file in UTF-8.
 
-    Missing values are left empty. A text that a spreadsheet would run as a formula begins with an apostrophe. Raises
-    ValueError if there is no row, or if the file exists or cannot be written.
+    The file has all columns that any row has, in the order of their first row. Missing
+    values are empty. If a spreadsheet would run a text as a formula, an apostrophe is
+    put before it.
+
+    Args:
+        rows: The values of each row by column.
+        path: The new file.
+
+    Raises:
+        ValueError: There is no row, or the file exists or cannot be written.
     """
     table = list(rows)
     if not table:
         raise InputError("rows must be at least one, got none")
+    columns = list(dict.fromkeys(name for row in table for name in row))
     with (
         new_file(path) as building,
         building.open("w", newline="", encoding="utf-8") as file,
     ):
-        writer = csv.DictWriter(
-            file, list(dict.fromkeys(name for row in table for name in row)), restval=""
-        )
+        writer = csv.DictWriter(file, columns, restval="")
         writer.writeheader()
         for row in table:
             writer.writerow({name: _inert(value) for name, value in row.items()})
 
 
 def _inert(value: Any) -> Any:
-    """Return a value of a CSV file; names in a ledger may come from anybody, and spreadsheets run formulas."""
+    """Return a value of a CSV file that no spreadsheet runs as a formula."""
+    # names in a ledger may come from anybody
     if isinstance(value, str) and value.startswith(FORMULA_SIGNS):
         return f"'{value}"
     return value
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:
-    """Return the run of a row of a single search."""
+    """Return the suite run that a ledger's row of a single search describes."""
     spec = row["spec"]
     trace = row["trace"]
+    problem = {
+        name: value
+        for name, value in spec.items()
+        if name not in ("kind", "name", "evaluations", "version")
+    }
     return SuiteRun(
-        **{
-            name: value
-            for name, value in spec.items()
-            if name not in ("kind", "name", "evaluations", "version")
-        },
+        **problem,
         budget=spec["evaluations"],
         truth_cost=row["truth_cost"],
         targets=row["truth_cost"] + TARGETS,

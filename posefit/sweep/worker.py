@@ -1,7 +1,9 @@
-"""How a process becomes a worker of a pool. What is patched for it is here, and nowhere else.
+"""Turns a process into a worker of a pool. All patches of other libraries are here.
 
-- A spawned process would import the script that started it once more: while one is started, `__main__` names no file.
-- pebble takes a process that ends with status 0 for one that may: in a worker `os._exit(0)` has another status.
+- A spawned process would import the script that started it again. So `__main__` names
+  no file while a process is started.
+- pebble assumes that a process that ends with status 0 was allowed to. So `os._exit(0)`
+  has another status in a worker.
 """
 
 import _signal  # type: ignore[import-not-found]
@@ -17,6 +19,7 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -26,9 +29,11 @@ from posefit.errors import PluginWarning
 from posefit.limits import end_with_parent
 from posefit.sweep.engine import single_thread
 
-EXIT_ZERO_STATUS = 64  # the status of a process that a job ended with 0
+EXIT_ZERO_STATUS = 64  # the status of a process in which a job called `os._exit(0)`
 _starting = threading.Lock()
-# which a process may handle
+# By module name: its members, and a copy of its callable members from before any job.
+_functions: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
+# all signals but the two that no process can handle
 _SIGNALS = sorted(
     signal.valid_signals()
     - {getattr(signal, name, None) for name in ("SIGKILL", "SIGSTOP")}
@@ -36,7 +41,10 @@ _SIGNALS = sorted(
 
 
 class _Process(SpawnProcess):
-    """A process that imports what it runs, but not the script that started it, which may compare without a guard."""
+    """A process that does not import the script that started it.
+
+    The script may start a comparison without an `if __name__ == "__main__"`.
+    """
 
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802
@@ -54,14 +62,17 @@ class _Process(SpawnProcess):
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Start processes with Ctrl-C blocked, which they are deaf to only once they have imported what ignores it.
+    """Block Ctrl-C while the body starts processes, which inherit the block.
 
-    A terminal sends it to all processes: in between it would end a worker with a traceback. For this process it waits.
+    A terminal sends Ctrl-C to all processes. A worker ignores it only once it has
+    imported `become_worker`; before that, Ctrl-C would end it with a traceback. This
+    process receives it after the body.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # which would end with the interrupt unblocked, were it started with the first process
+    # Starting the first process would start the tracker as well, which unblocks the
+    # interrupt. So start it before the block.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -71,7 +82,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 class Context(SpawnContext):
-    """Starts such processes, and ends what they have started."""
+    """Starts worker processes, and ends the processes that they leave behind."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -80,13 +91,16 @@ class Context(SpawnContext):
     def Process(  # type: ignore[override]  # noqa: N802, as its class is called
         self, *arguments: Any, **more: Any
     ) -> _Process:
-        """Return a process that is to be started."""
+        """Return a new process, not yet started."""
         process = _Process(*arguments, **more)
         self._started.append(process)
         return process
 
     def end_orphans(self) -> None:
-        """End the processes whose worker has ended: those that a cell started are in the worker's group."""
+        """End the processes whose worker has ended.
+
+        A process that a cell started belongs to its worker's process group.
+        """
         for process in self._started.copy():
             if process.pid is not None and not _exists(process.pid):
                 self._started.remove(process)
@@ -104,10 +118,11 @@ def _exists(process: int) -> bool:
 
 @contextmanager
 def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards what the body does to this process: its folder, variables, paths, signals and random numbers.
+    """Undo afterwards what the body changes in this process.
 
-    So is what NumPy is to do about a division by zero. A worker runs cells of all methods, and what one of them leaves
-    behind would reach the others.
+    These are the folder, the environment variables, `sys.path`, the signal handlers,
+    the global random numbers and NumPy's handling of floating-point errors. A worker
+    runs cells of all methods, and the changes of one must not reach the others.
     """
     state = _first_state()
     try:
@@ -119,12 +134,12 @@ def left_as_it_was() -> Iterator[None]:
 
 @lru_cache(maxsize=1)
 def _first_state() -> "_State":
-    """Return the state that the first job finds; each later job finds the same."""
+    """Return the state before the first job, to which each job returns."""
     return _State()
 
 
 class _State:
-    """The state of this process at the moment, to which it can return; after most jobs nothing has to be undone."""
+    """The state of this process when the object was made, to which it can return."""
 
     def __init__(self) -> None:
         self._folder = os.getcwd()
@@ -136,8 +151,9 @@ class _State:
         self._numpy = np.random.get_state()  # noqa: NPY002
 
     def restore(self) -> None:
-        """Undo what has changed since."""
+        """Undo all changes since then."""
         os.chdir(self._folder)
+        # most jobs change nothing, and a comparison is faster than writing everything
         if dict(os.environ) != self._variables:
             os.environ.clear()
             os.environ.update(self._variables)
@@ -146,7 +162,7 @@ class _State:
             for number, before, now in zip(
                 _SIGNALS, self._handlers, handlers, strict=True
             ):
-                # None is a handler that is not Python's
+                # None stands for a handler that Python did not install
                 if before is not None and now != before:
                     signal.signal(number, before)
         random.setstate(self._numbers)
@@ -155,27 +171,62 @@ class _State:
         np.random.set_state(self._numpy)  # noqa: NPY002
 
 
+@contextmanager
+def functions_kept() -> Iterator[None]:
+    """Put back afterwards the functions and classes of modules that the body replaces.
+
+    A plugin that replaces `numpy.linalg.norm`, for example, would change the results of
+    the next method in this process. Modules that the body itself loads do not change.
+    """
+    for name, module in tuple(sys.modules.items()):
+        if name in _functions or not isinstance(module, ModuleType):
+            continue
+        members = vars(module)
+        functions = {
+            member: value for member, value in members.items() if callable(value)
+        }
+        _functions[name] = members, functions
+    try:
+        yield
+    finally:
+        for members, functions in _functions.values():
+            for member, function in functions.items():
+                if members.get(member) is not function:
+                    members[member] = function
+
+
 def _handlers() -> list[Any]:
-    """Return the handler of each signal. `signal.getsignal` looks for its name as well, which takes much longer."""
+    """Return the handler of each signal."""
+    # `signal.getsignal` also looks up the handler's name, which takes much longer
     return list(map(_signal.getsignal, _SIGNALS))
 
 
 def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
-    """Make this process a worker: one thread, deaf to Ctrl-C, which is the driver's, and ended with its parent."""
+    """Make this process a worker.
+
+    It has one thread, ignores Ctrl-C, which the driver handles, and ends with its
+    parent.
+
+    Args:
+        parent: The process id of the driver.
+        path: The driver's `sys.path`.
+        prepare: A pickled function to call first, or a pickled None.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # what a cell starts is not to inherit that it is blocked
+    # a process that a cell starts must not inherit the block
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    # so that a kill from outside looks like one
+    # a handler of the parent's would hide that the worker was killed from outside
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    # a group of its own: what a terminal or a script sends to the driver is not for it
+    # in another process group, it does not receive the signals sent to the driver's
     with suppress(AttributeError):
         os.setpgid(0, 0)
     sys.path[:] = path
-    # the driver has warned of them
+    # the driver has already issued these warnings
     warnings.simplefilter("ignore", PluginWarning)
     leave = os._exit
-    os._exit = lambda status: leave(status or EXIT_ZERO_STATUS)  # see above
+    # the module's docstring says why
+    os._exit = lambda status: leave(status or EXIT_ZERO_STATUS)
     single_thread()
     end_with_parent(parent)
     if (called := pickle.loads(prepare)) is not None:

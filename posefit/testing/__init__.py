@@ -1,4 +1,4 @@
-"""Is a plugin right? Checks for optimisers, priors, trackers, starts and segmenters, for an author's own tests.
+"""Checks for optimisers, priors, trackers, starts and segmenters, for your own tests.
 
     from posefit.testing import check_optimiser
 
@@ -6,9 +6,10 @@
         report = check_optimiser(Mine)
         assert report, str(report)
 
-The same checks run for an installed plugin as `posefit check optimiser NAME`, in a process of its own: there a plugin
-that ends or hangs its process has failed a check, where here it ends or hangs the caller's. A factory with the
-attribute `baseline = True` is chance itself, and need not beat it.
+`posefit check optimiser NAME` runs the same checks on an installed plugin, in a
+separate process. There a plugin that ends or hangs its process fails a check; here it
+ends or hangs the caller. Set the attribute `baseline = True` on a factory that searches
+at random: it is then not asked to beat chance.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,36 +40,81 @@ Settings = Mapping[str, Any] | None
 def check_optimiser(
     factory: Factory, *, next_frame: "NextFrame" = "start", settings: Settings = None
 ) -> Report:
-    """Return the report on an optimiser's factory, true where no check failed; `next_frame` as it is registered."""
+    """Return the report on an optimiser's factory.
+
+    Args:
+        factory: takes (space, rng) and keyword-only settings.
+        next_frame: what the optimiser does at a new frame, as it is registered.
+        settings: passed to the factory.
+
+    Returns:
+        The report. It is true if no check failed.
+    """
     return run_checks(factory, checks_of("optimiser", factory, settings, next_frame))
 
 
 def check_prior(factory: Factory, *, settings: Settings = None) -> Report:
-    """Return the report on a prior's factory, true where no check failed."""
+    """Return the report on a prior's factory.
+
+    Args:
+        factory: takes keyword-only settings.
+        settings: passed to the factory.
+
+    Returns:
+        The report. It is true if no check failed.
+    """
     return run_checks(factory, checks_of("prior", factory, settings))
 
 
 def check_tracker(
     factory: Factory, *, looks_ahead: bool = False, settings: Settings = None
 ) -> Report:
-    """Return the report on a tracker's factory, true where no check failed; `looks_ahead` as it is registered."""
+    """Return the report on a tracker's factory.
+
+    Args:
+        factory: takes (task) and keyword-only settings.
+        looks_ahead: whether the tracker reads later frames first, as it is registered.
+        settings: passed to the factory.
+
+    Returns:
+        The report. It is true if no check failed.
+    """
     return run_checks(factory, checks_of("tracker", factory, settings, looks_ahead))
 
 
 def check_start(factory: Factory, *, settings: Settings = None) -> Report:
-    """Return the report on a start's factory, true where no check failed."""
+    """Return the report on a start's factory.
+
+    Args:
+        factory: takes (task) and keyword-only settings.
+        settings: passed to the factory.
+
+    Returns:
+        The report. It is true if no check failed.
+    """
     return run_checks(factory, checks_of("start", factory, settings))
 
 
 def check_segmenter(factory: Factory, *, settings: Settings = None) -> Report:
-    """Return the report on a segmenter's factory, true where no check failed."""
+    """Return the report on a segmenter's factory.
+
+    Args:
+        factory: takes (film) and keyword-only settings.
+        settings: passed to the factory.
+
+    Returns:
+        The report. It is true if no check failed.
+    """
     return run_checks(factory, checks_of("segmenter", factory, settings))
 
 
 def checks_of(
     kind: str, factory: Factory, settings: Settings = None, *registered: Any
 ) -> list[Check]:
-    """Return the checks of a kind of plugin: each of its rules, which are loaded when they are needed."""
+    """Return the checks of a kind of plugin, one per rule.
+
+    The rules of a kind are imported only when they are needed.
+    """
     rules = import_module(f"posefit.testing.{kind}_rules")
     case = rules.Case(factory, dict(settings or {}), *registered)
     return [Check(rule.__name__, partial(rule, case)) for rule in rules.RULES]

@@ -1,4 +1,4 @@
-"""The rules that plugins of several kinds share, and what their other rules are made of."""
+"""Rules that several kinds of plugins share, and what the other rules are made of."""
 
 import copy
 import inspect
@@ -24,23 +24,23 @@ from posefit.testing.results import BrokenError, SkippedError, expect
 class PluginCase:
     """A factory with its settings."""
 
-    # that a factory of the kind takes by position
+    # names of the positional arguments of a factory of the kind
     arguments: ClassVar[tuple[str, ...]] = ()
 
     factory: Callable[..., Any]
     settings: dict[str, Any] = field(default_factory=dict)
 
     def build(self, **more: Any) -> Any:
-        """Return a new plugin, with more settings or others."""
+        """Return a new plugin, with additional or replaced settings."""
         return self.factory(**{**self.settings, **more})
 
     def use(self, **more: Any) -> object:
-        """Build a plugin, and use it where a setting that makes no sense may show only then."""
+        """Build a plugin and use it a little: some invalid settings show only then."""
         return self.build(**more)
 
     @property
     def random_unchanged(self) -> bool:
-        """Whether a first use, once for all rules, has left the global random generators alone."""
+        """Whether an earlier use left the global random generators unchanged."""
         return False
 
     def use_fully(self) -> object:
@@ -49,21 +49,21 @@ class PluginCase:
 
 
 def construction(case: PluginCase) -> None:
-    """A factory takes what its kind is given, and keyword-only settings."""
+    """A factory takes the arguments of its kind, and keyword-only settings."""
     parameters = inspect.signature(case.factory).parameters
-    kinds = [parameter.kind for parameter in parameters.values()]
-    expect(
-        inspect.Parameter.VAR_KEYWORD not in kinds,
-        "settings must be named, got **settings that swallow mistakes",
-    )
-    by_position = [
-        name
-        for name, kind in zip(parameters, kinds, strict=True)
-        if kind is not inspect.Parameter.KEYWORD_ONLY
-    ]
+    by_position = []
+    for name, parameter in parameters.items():
+        expect(
+            parameter.kind is not inspect.Parameter.VAR_KEYWORD,
+            "settings must be named, got **settings that swallow mistakes",
+        )
+        if parameter.kind is not inspect.Parameter.KEYWORD_ONLY:
+            by_position.append(name)
     taken = ", ".join(case.arguments)
     more = ", ".join(by_position[len(case.arguments) :])
-    came = f"{more} before the *" if more else f"({', '.join(by_position)})"
+    came = f"({', '.join(by_position)})"
+    if more:
+        came = f"{more} before the *"
     expect(
         len(by_position) == len(case.arguments),
         f"a factory must take ({taken}) and keyword-only settings, got {came}",
@@ -72,24 +72,27 @@ def construction(case: PluginCase) -> None:
         if setting.annotation is inspect.Parameter.empty:
             kind = type(setting.default).__name__
             raise BrokenError(
-                f"a setting must have a type, such as {setting.name}: {kind} = {setting.default}, got none"
+                "a setting must have a type, "
+                f"such as {setting.name}: {kind} = {setting.default}, got none"
             )
         expect(
             hints.checkable(setting.annotation),
-            f"the type of the setting {setting.name} must be {hints.KNOWN}, got {setting.type}",
+            f"the type of the setting {setting.name} must be {hints.KNOWN}, "
+            f"got {setting.type}",
         )
         if setting.default is not inspect.Parameter.empty:
             try:
                 hints.fitted(setting.annotation, setting.default)
             except hints.UnfitError:
                 raise BrokenError(
-                    f"the default of {setting.name} must be {setting.type}, got {setting.default!r}"
+                    f"the default of {setting.name} must be {setting.type}, "
+                    f"got {setting.default!r}"
                 ) from None
     case.build()
 
 
 def silence(case: PluginCase) -> None:
-    """Nothing is printed."""
+    """The plugin prints nothing."""
     with redirect_stdout(io.StringIO()) as printed:
         case.use()
     expect(
@@ -99,15 +102,15 @@ def silence(case: PluginCase) -> None:
 
 
 def global_randomness(case: PluginCase) -> None:
-    """The global random generators are neither used nor changed."""
-    # a library that was imported meanwhile may have seeded them
+    """The plugin neither uses nor changes the global random generators."""
+    # a library that was imported during the first use may have seeded them
     if not case.random_unchanged:
         with left_alone():
             case.use_fully()
 
 
 def unknown_setting(case: PluginCase) -> None:
-    """A setting that does not exist is refused."""
+    """The factory refuses an unknown setting."""
     try:
         case.build(no_such_setting=1)
     except TypeError:
@@ -116,21 +119,22 @@ def unknown_setting(case: PluginCase) -> None:
 
 
 def nonsense_settings(case: PluginCase, *, harmless: bool = False) -> str:
-    """Nonsense in a setting is refused."""
+    """The plugin refuses invalid values of its settings."""
     tried = 0
     refused = list[str]()
     for setting in settings_of(case.factory):
-        kind = (
-            setting.annotation
-            if setting.annotation is not inspect.Parameter.empty
-            else type(setting.default)
-        )
-        choice = bool(hints.choices_of(kind)) or setting.name == "variant"
-        if not choice and kind not in (int, float):
+        kind = setting.annotation
+        if kind is inspect.Parameter.empty:
+            kind = type(setting.default)
+        nonsense: object
+        if hints.choices_of(kind) or setting.name == "variant":
+            nonsense = "no such choice"
+        elif kind is int:
+            nonsense = -1
+        elif kind is float:
+            nonsense = float("nan")
+        else:
             continue
-        nonsense: object = (
-            "no such choice" if choice else -1 if kind is int else float("nan")
-        )
         tried += 1
         try:
             case.use(**{setting.name: nonsense})
@@ -146,7 +150,16 @@ def nonsense_settings(case: PluginCase, *, harmless: bool = False) -> str:
 
 
 def check_speed(what: str, limit: float, work: Callable[[int], int]) -> str:
-    """Check that one of what `work` makes takes less than so many seconds; it returns how many it made in a turn."""
+    """Check the time that `work` takes for each item it makes.
+
+    Args:
+        what: the item, as the messages name it.
+        limit: seconds that an item may take, in the fastest of three turns.
+        work: takes the number of the turn; returns how many items it made.
+
+    Returns:
+        The time for an item, as text.
+    """
     seconds = np.inf
     for turn in range(3):
         began = time.perf_counter()
@@ -160,7 +173,7 @@ def check_speed(what: str, limit: float, work: Callable[[int], int]) -> str:
 
 
 def duplicates(plugin: Any) -> dict[str, Any]:
-    """Return a deep copy of a plugin, and what comes out of its pickle."""
+    """Return a deep copy and an unpickled copy of a plugin, by name."""
     ways: dict[str, Callable[[Any], Any]] = {
         "a deep copy": copy.deepcopy,
         "a pickle": lambda original: pickle.loads(pickle.dumps(original)),
@@ -177,13 +190,13 @@ def duplicates(plugin: Any) -> dict[str, Any]:
 
 
 def unchanged(*arrays: NDArray[Any]) -> Callable[[], bool]:
-    """Return a function that returns whether arrays are still as they are now."""
+    """Return a function that tells whether the arrays still have their values."""
     before = [array.copy() for array in arrays]
     return lambda: all(map(np.array_equal, before, arrays))
 
 
 def global_random_state() -> tuple[object, ...]:
-    """Return the state of the global random generators, to be compared."""
+    """Return the state of the global random generators, for comparison."""
     numpy_state = np.random.get_state(legacy=False)  # noqa: NPY002
     words = numpy_state["state"]
     return (

@@ -1,4 +1,4 @@
-"""Is an optimiser right: the protocol, the box, costs of every kind, repetition, and does it search?"""
+"""Rules of an optimiser: protocol, box, costs of every kind, repetition, success."""
 
 import pickle
 import subprocess
@@ -21,22 +21,23 @@ from posefit.testing.problem import pose_problem
 from posefit.testing.results import BrokenError, SkippedError, expect
 from posefit.testing.toy import Toy, ball, shell, slope, sphere
 
-EVALUATIONS = 400  # a search's budget where a check needs no special one
-# of a search as long as that of a frame, and populations of it at most
+EVALUATIONS = 400  # budget of a search unless a check needs a special one
+# budget of a search as long as a frame's, and the most populations it may have
 LONG = 2_440
 LONG_ASKS = 100
 BUDGET = 800  # of the searches that have to beat chance
 SEEDS = range(5)
-MAX_SHARE_OF_CHANCE = 0.95  # a cost below so much of chance's beats it
-# of a search for a corner of a box with nine dimensions, as many as the SAPSO paper
-# gives a frame; one that stops short of the sides keeps a fifth of what chance leaves
+MAX_SHARE_OF_CHANCE = 0.95  # a cost beats chance if it is below this share of it
+# for the search in a corner of a nine-dimensional box, with the budget that the SAPSO
+# paper gives a frame: an optimiser that stops short of the sides keeps a fifth of
+# chance's cost
 SIDES_BUDGET = 2_440
 MAX_SHARE_AT_SIDES = 0.15
 SIDES_SEEDS = range(3)
-MAX_SECONDS = 0.05  # a proposal: twenty thousand times what a pose costs
-TURNS = 24  # populations after which costs that are right have to show
+MAX_SECONDS = 0.05  # for a proposal: twenty thousand times what a pose costs
+TURNS = 24  # populations after which true costs must have helped
 LOADED = b"loaded"
-# what the new process runs: what it prints goes to standard error
+# the program of the new process; what the plugin prints goes to standard error
 TRACING = f"""
 import os, pickle, sys
 out = os.fdopen(os.dup(1), "wb", 0)
@@ -54,7 +55,7 @@ Evaluate = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Case(PluginCase):
-    """An optimiser's factory with its settings, and what it is registered to do when the next frame comes."""
+    """An optimiser's factory with its settings and its registered `next_frame`."""
 
     arguments = "space", "rng"
 
@@ -86,7 +87,10 @@ class Case(PluginCase):
     def steps(
         self, optimiser: Optimiser, space: Space, evaluate: Evaluate, count: int
     ) -> Iterator[tuple[Array, Array]]:
-        """Yield up to `count` populations with their costs; a filter that has none left goes on to a next frame."""
+        """Yield up to `count` populations with their costs.
+
+        A filter that has finished a frame advances to the next one.
+        """
         for _ in range(count):
             proposals = optimiser.ask()
             if not len(proposals) and self.next_frame == "carry":
@@ -96,7 +100,8 @@ class Case(PluginCase):
                 return
             expect(
                 len(proposals) <= BUDGET,
-                f"ask must return at most the budget of {BUDGET} proposals, got {len(proposals)}",
+                f"ask must return at most the budget of {BUDGET} proposals, "
+                f"got {len(proposals)}",
             )
             costs = np.asarray(evaluate(proposals), dtype=np.float64)
             yield proposals.copy(), costs.copy()
@@ -112,7 +117,7 @@ class Case(PluginCase):
     def best(
         self, space: Space, evaluate: Evaluate, seed: int, evaluations: int
     ) -> float:
-        """Return the lowest cost of a search; of a filter, in the last of ten frames with the same costs."""
+        """Return the lowest cost of a search, for a filter over ten frames."""
         optimiser = self.build(space, seed, evaluations)
         lowest = np.inf
         for frame in range(10 if self.next_frame == "carry" else 1):
@@ -124,7 +129,7 @@ class Case(PluginCase):
         return lowest
 
     def valid(self, space: Space, evaluate: Evaluate, count: int = 6) -> str:
-        """Check that every proposal of a search is allowed in the space; return how many there were."""
+        """Check that every proposal of a search is allowed, and count them."""
         total = 0
         for proposals, _ in self.steps(self.build(space), space, evaluate, count):
             check_population(proposals, space)
@@ -146,15 +151,16 @@ def check_population(proposals: Array, space: Space) -> None:
     )
     far = float(np.abs(proposals).max(initial=0.0))
     expect(far <= 1.0, f"ask must stay in [-1, 1], got {far:.6g} from the middle")
-    broken = int(np.count_nonzero(~space.feasible(proposals)))
+    infeasible = int(np.count_nonzero(~space.feasible(proposals)))
     expect(
-        not broken,
-        f"ask must return feasible proposals, got {broken} of {len(proposals)} that are not",
+        not infeasible,
+        "ask must return feasible proposals, "
+        f"got {infeasible} of {len(proposals)} that are not",
     )
 
 
 def same(first: list[Array], second: list[Array]) -> bool:
-    """Return whether two traces are bit for bit the same."""
+    """Return whether two traces are the same bit for bit."""
     return len(first) == len(second) and all(
         np.array_equal(a, b) for a, b in zip(first, second, strict=True)
     )
@@ -185,7 +191,7 @@ def dtype(case: Case) -> None:
 
 
 def box(case: Case) -> str:
-    """Every proposal lies in [-1, 1]^d, with coordinates that wrap around and from a start on the edge too."""
+    """Every proposal is in [-1, 1]^d, also for a start at the edge or periodic axes."""
     case.valid(Toy(6, wrapping=2), lambda x: 1.0 - np.abs(x[:, 0]), 12)
     case.valid(
         Toy(5, start=Start(np.ones(5), np.full(5, 0.5), np.full(5, 0.3))), sphere
@@ -194,23 +200,23 @@ def box(case: Case) -> str:
 
 
 def feasible(case: Case) -> str:
-    """Every proposal is feasible where a third of the box is."""
+    """Every proposal is feasible in a box of which a third is feasible."""
     return case.valid(Toy(4, ball), lambda x: -x.sum(axis=1), 12)
 
 
 def hardly_feasible(case: Case) -> str:
-    """Every proposal is feasible, and the search goes on, where a few in a thousand are feasible."""
+    """Every proposal is feasible, and the search continues, in a very thin region."""
     return case.valid(Toy(3, shell), sphere)
 
 
 def dimensions(case: Case) -> None:
-    """Spaces of one dimension and of 66 are searched."""
+    """The optimiser searches spaces of 1 and of 66 dimensions."""
     for d in (1, 66):
         case.valid(Toy(d), sphere)
 
 
 def costs(case: Case) -> None:
-    """Costs that are nan, infinite, equal or as large as 1e300 do no harm, one or all."""
+    """The optimiser survives costs that are nan, infinite, equal or up to 1e300."""
     kinds: dict[str, Evaluate] = {
         "some nan": lambda x: np.where(np.arange(len(x)) % 2, np.nan, sphere(x)),
         "all nan": lambda x: np.full(len(x), np.nan),
@@ -227,7 +233,7 @@ def costs(case: Case) -> None:
 
 
 def budget(case: Case) -> str:
-    """A search uses its budget, in whole populations."""
+    """A search uses at least three quarters of its budget."""
     used = 0
     optimiser = case.build()
     while len(proposals := optimiser.ask()) and used + len(proposals) <= EVALUATIONS:
@@ -241,7 +247,7 @@ def budget(case: Case) -> str:
 
 
 def late(case: Case) -> str:
-    """A search goes on, however many populations it has had, until its budget is used or it ends itself."""
+    """A search still works after many populations, until its budget is used."""
     used = 0
     asked = 0
     optimiser = case.build(evaluations=LONG)
@@ -266,7 +272,7 @@ def late(case: Case) -> str:
 
 
 def evaluations(case: Case) -> None:
-    """All evaluations are the search's: neither ask nor tell draws poses of its own."""
+    """The optimiser evaluates no poses by itself in ask or tell."""
     problem = pose_problem()
     checked = Checked(case.build(problem.space), "the optimiser", problem.space)
     try:
@@ -295,13 +301,14 @@ def order(case: Case) -> str:
         raise SkippedError("it ignores the costs, or has one proposal at a time")
     expect(
         np.median(good) < 0.8 * np.median(bad),
-        f"true costs must help more than shuffled ones, got mean costs {np.median(good):.3g} and {np.median(bad):.3g}",
+        "true costs must help more than shuffled ones, got mean costs "
+        f"{np.median(good):.3g} and {np.median(bad):.3g}",
     )
     return f"mean cost {np.median(good):.3g}, shuffled {np.median(bad):.3g}"
 
 
 def nonsense_settings(case: Case) -> str:
-    """Nonsense in a setting is refused or harmless."""
+    """Invalid values of a setting are refused or harmless."""
     return common.nonsense_settings(case, harmless=True)
 
 
@@ -330,7 +337,8 @@ def new_process(case: Case) -> None:
         raise SkippedError("the factory cannot be imported in another process")
     expect(
         trace,
-        f"it must work in a new process, got one that ended in the middle {ran.stderr.decode()[-300:]}",
+        "it must work in a new process, got one that ended in the middle "
+        f"{ran.stderr.decode()[-300:]}",
     )
     expect(
         same(case.trace(), pickle.loads(trace)),
@@ -339,7 +347,7 @@ def new_process(case: Case) -> None:
 
 
 def inputs(case: Case) -> None:
-    """The method tell leaves its arguments as they were."""
+    """The method tell does not modify its arguments."""
     optimiser = case.build(SPACE)
     for _ in range(4):
         proposals = optimiser.ask()
@@ -357,7 +365,7 @@ def inputs(case: Case) -> None:
 
 
 def copies(case: Case) -> None:
-    """A deep copy, and what comes out of a pickle, go on as the original does, each on its own."""
+    """A deep copy and an unpickled copy continue as the original would."""
 
     def rest(optimiser: Optimiser) -> list[Array]:
         return [proposals for proposals, _ in case.steps(optimiser, SPACE, sphere, 3)]
@@ -371,7 +379,7 @@ def copies(case: Case) -> None:
         for what, twin in twins.items():
             expect(
                 same(original, rest(twin)),
-                f"{what} must go on as the original, got another after {count}",
+                f"{what} must continue as the original, got another after {count}",
             )
 
 
@@ -384,7 +392,8 @@ def start(case: Case) -> str:
     away = float(np.median(np.abs(first - mean)))
     expect(
         away < 0.1,
-        f"the first population must be around the start, spread 0.02, got {away:.3g} away from it",
+        "the first population must be around the start, spread 0.02, "
+        f"got {away:.3g} away from it",
     )
     return f"{away:.3g} away, spread 0.02"
 
@@ -397,7 +406,7 @@ def next_frame(case: Case) -> str:
     optimiser = case.build(space)
     expect(
         hasattr(optimiser, "advance"),
-        "what is registered to carry must have advance(space), got none",
+        "an optimiser registered to carry must have advance(space), got none",
     )
     for _ in range(3):
         while len(proposals := optimiser.ask()):
@@ -412,18 +421,19 @@ def next_frame(case: Case) -> str:
     chance = sphere(draw_population(space, np.random.default_rng(0), 1000)).mean()
     expect(
         near < 0.7 * chance,
-        f"particles must be carried, got a mean cost of {near:.3g} where chance has {chance:.3g}",
+        f"particles must be carried, got a mean cost of {near:.3g} "
+        f"where chance has {chance:.3g}",
     )
     return f"mean cost {near:.3g}, by chance {chance:.3g}"
 
 
 def sphere_problem(case: Case) -> str:
-    """A sphere is solved better than by chance."""
+    """A search on a sphere beats chance."""
     return _beats_chance(case, Toy(6), sphere)
 
 
 def sides(case: Case) -> str:
-    """A best that lies on sides of the box, in a corner, is come near to."""
+    """A search comes near a minimum that lies in a corner of the box."""
     _skip_baseline(case)
     draws = [
         draw_population(BOX, np.random.default_rng(seed), SIDES_BUDGET)
@@ -435,13 +445,14 @@ def sides(case: Case) -> str:
     best = float(np.median(lowest))
     expect(
         best < below,
-        f"the median cost in a corner must fall below {below:.3g}, of chance's {chance:.3g}, got {best:.3g}",
+        f"the median cost in a corner must fall below {below:.3g}, "
+        f"of chance's {chance:.3g}, got {best:.3g}",
     )
     return f"below {below:.3g}, by chance {chance:.3g}, {SIDES_BUDGET} evaluations"
 
 
 def _lowest(case: Case, seed: int, enough: float) -> float:
-    """Return the lowest cost of a search for the corner; it ends once that is low enough."""
+    """Return the lowest cost of a search for the corner, ended when low enough."""
     optimiser = case.build(BOX, seed, SIDES_BUDGET)
     lowest = np.inf
     for frame in range(10 if case.next_frame == "carry" else 1):
@@ -459,7 +470,7 @@ def _lowest(case: Case, seed: int, enough: float) -> float:
 
 
 def real_problem(case: Case) -> str:
-    """A real pose problem is solved better than by chance."""
+    """A search on a real pose problem beats chance."""
     problem = pose_problem()
     return _beats_chance(case, problem.space, problem)
 
@@ -475,11 +486,13 @@ def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     for seed in SEEDS:
         lowest.append(case.best(space, evaluate, seed, BUDGET))
         if sum(cost < below for cost in lowest) > len(SEEDS) // 2:
-            break  # whatever the other seeds give, the median is below, too
+            # the median is below whatever the other seeds give
+            break
     best = float(np.median(lowest))
     expect(
         best < below,
-        f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {best:.4g}",
+        f"the median cost after {BUDGET} must beat chance's {chance:.4g}, "
+        f"got {best:.4g}",
     )
     return f"cost {best:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
 

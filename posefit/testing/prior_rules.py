@@ -1,4 +1,4 @@
-"""Is a prior right: shapes, ranges, the same bits for a row whatever stands beside it, and does it learn anything?"""
+"""Rules of a prior: shapes, ranges, independence of rows, repetition, success."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +26,7 @@ from posefit.testing.results import BrokenError, expect
 
 ROWS = 100
 MAX_SECONDS = 5e-3  # to recover a pose
-# the share of a first population that may be copies before there is a warning
+# share of copies in a first population above which a warning is given
 MAX_COPIES = 0.1
 
 
@@ -45,7 +45,10 @@ class Case(PluginCase):
 
     @cached_property
     def first(self) -> Fitting:
-        """The prior after it has learned the built-in walks: once for all rules, as that may take minutes."""
+        """The prior after one fit to the built-in walks.
+
+        All rules share it, because a fit may take minutes.
+        """
         prior: Prior = self.build()
         angles = walking_angles()
         inputs_unchanged = unchanged(angles)
@@ -56,7 +59,7 @@ class Case(PluginCase):
         )
 
     def use(self, **more: Any) -> Prior:
-        """Return another prior that has learned the same."""
+        """Return a new prior, fitted to the same poses."""
         prior: Prior = self.build(**more)
         return prior.fit(walking_angles(), built_in.average_skeleton())
 
@@ -67,12 +70,12 @@ class Case(PluginCase):
 
     @property
     def fitted(self) -> Prior:
-        """The prior that has learned, as `fit` returned it."""
+        """The fitted prior, as `fit` returned it."""
         return self.first.returned
 
     @property
     def latents(self) -> Array:
-        """Some latents (ROWS, m) within the range."""
+        """Random latents (ROWS, m) within the range."""
         low = np.asarray(self.fitted.low)
         high = np.asarray(self.fitted.high)
         return np.random.default_rng(0).uniform(low, high, (ROWS, len(low)))
@@ -135,7 +138,7 @@ def transform(case: Case) -> None:
 
 
 def inverse(case: Case) -> None:
-    """Latents (n, m) become finite joint angles (n, 63), in every corner of the range too."""
+    """Latents (n, m), corners of the range too, become finite joint angles (n, 63)."""
     prior = case.fitted
     corners = np.where(
         np.random.default_rng(1).random((64, len(prior.low))) < 0.5,
@@ -151,7 +154,7 @@ def inverse(case: Case) -> None:
 
 
 def fixed_axes(case: Case) -> None:
-    """Joints turn about their free axes only: other angles of a pose are 0, in all of the range."""
+    """Joints turn about their free axes only; the other angles of a pose are 0."""
     prior = case.fitted
     axes = FreeAxes(built_in.average_skeleton(), [walking_angles()])
     for latents in (prior.transform(walking_angles()), case.latents):
@@ -167,14 +170,15 @@ def training_in_range(case: Case) -> None:
     out = (latents < np.asarray(prior.low) - slack) | (
         latents > np.asarray(prior.high) + slack
     )
+    outside = int(out.any(axis=1).sum())
     expect(
-        not out.any(),
-        f"training poses must lie in low to high, got {int(out.any(axis=1).sum())} that do not",
+        not outside,
+        f"training poses must lie in low to high, got {outside} that do not",
     )
 
 
 def training_feasible(case: Case) -> str:
-    """Nine of ten training poses are feasible."""
+    """At least 90 % of the training poses are feasible."""
     prior = case.fitted
     feasible = np.asarray(prior.feasible(prior.transform(walking_angles())))
     expect(
@@ -185,15 +189,16 @@ def training_feasible(case: Case) -> str:
         feasible.dtype == np.bool_,
         f"feasible must return booleans, got {feasible.dtype}",
     )
+    percent = f"{100 * feasible.mean():.0f} %"
     expect(
         feasible.mean() >= 0.9,
-        f"90 % of the training poses must be feasible, got {100 * feasible.mean():.0f} %",
+        f"90 % of the training poses must be feasible, got {percent}",
     )
-    return f"{100 * feasible.mean():.0f} %"
+    return percent
 
 
 def same_bits(case: Case) -> None:
-    """A row has the same bits whatever rows stand beside it."""
+    """A row has the same bits whatever the other rows are."""
     prior = case.fitted
     latents = case.latents
     whole = prior.inverse_transform(latents)
@@ -202,7 +207,8 @@ def same_bits(case: Case) -> None:
         same = np.array_equal(prior.inverse_transform(latents[rows]), whole[rows])
         expect(
             same,
-            "inverse_transform must give a row the same bits in any company, got others",
+            "inverse_transform must give a row the same bits whatever the other rows, "
+            "got others",
         )
         expect(
             np.array_equal(prior.feasible(latents[rows]), feasible[rows]),
@@ -211,7 +217,7 @@ def same_bits(case: Case) -> None:
 
 
 def same_again(case: Case) -> None:
-    """Learning the same poses again gives the same space."""
+    """Fitting to the same poses again gives the same space."""
     again = case.use()
     same = np.array_equal(case.fitted.low, again.low) and _same(
         case.fitted, again, case.latents
@@ -220,7 +226,7 @@ def same_again(case: Case) -> None:
 
 
 def inputs(case: Case) -> None:
-    """Methods leave their arguments as they were."""
+    """The methods do not modify their arguments."""
     prior = case.fitted
     angles = walking_angles()
     latents = case.latents
@@ -241,7 +247,7 @@ def global_randomness(case: Case) -> None:
 
 
 def copies(case: Case) -> None:
-    """A deep copy and what comes out of a pickle are the same space."""
+    """A deep copy and an unpickled copy are the same space."""
     for what, twin in duplicates(case.fitted).items():
         expect(
             _same(twin, case.fitted, case.latents),
@@ -250,7 +256,7 @@ def copies(case: Case) -> None:
 
 
 def learns(case: Case) -> str:
-    """Training poses come back nearer than their mean is."""
+    """Transformed and back, training poses are nearer than the mean pose."""
     prior = case.fitted
     angles = walking_angles()
     back = prior.inverse_transform(prior.transform(angles))
@@ -283,7 +289,7 @@ def bad_input(case: Case) -> None:
 
 
 def searchable(case: Case) -> str:
-    """A search space on it can be drawn from."""
+    """A search space on the prior can be sampled."""
     prior = case.fitted
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
     drawn = draw_population(space, np.random.default_rng(0), ROWS)
@@ -297,7 +303,10 @@ def searchable(case: Case) -> str:
     text = f"{100 * share:.3g} % of the box is feasible"
     if copies <= MAX_COPIES:
         return text
-    return f"warning: only {text}: of a first population about {100 * copies:.0f} % are copies of the others"
+    return (
+        f"warning: only {text}: "
+        f"of a first population about {100 * copies:.0f} % are copies of the others"
+    )
 
 
 def speed(case: Case) -> str:

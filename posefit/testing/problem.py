@@ -20,14 +20,17 @@ COMPONENTS = 6  # m of the SAPSO paper, section 2.1
 
 
 def walking_angles() -> Array:
-    """Return the joint angles (T, 63) of the built-in walks but `walk` itself."""
+    """Return the joint angles (T, 63) of the built-in walks other than `walk`."""
     return np.concatenate(
         [built_in.motion(style).poses[:, 3:] for style in built_in.other_styles("walk")]
     )
 
 
 def principal(angles: Array) -> Components:
-    """Return the principal components of joint angles (T, 63), and their range: the kit needs no plugin's prior."""
+    """Return the principal components of joint angles (T, 63), and their range.
+
+    With these the kit needs no plugin's prior.
+    """
     mean = angles.mean(axis=0)
     _, _, directions = np.linalg.svd(angles - mean, full_matrices=False)
     components = directions[:COMPONENTS]
@@ -36,7 +39,7 @@ def principal(angles: Array) -> Components:
 
 
 def pose_problem(budget: int | None = None) -> Problem:
-    """Return the problem: known translation, six components of the walks, viewed from 45 degrees."""
+    """Return the problem: known translation, six components, seen from 45 degrees."""
     cost = _pose_cost()
     return Problem(cost, cost.space, budget)
 

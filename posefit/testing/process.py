@@ -1,8 +1,9 @@
-"""Checks an installed plugin in a process of its own, so that whatever it does becomes a result.
+"""Checks an installed plugin in a separate process, so that no plugin stops a report.
 
-`python -m posefit.testing.process` is that process: it reads what to check as JSON, and writes a line of JSON before
-and after each check. What the plugin prints goes to standard error. A check in which the process ends or hangs has
-failed, and another process goes on with the next one.
+`python -m posefit.testing.process` is that process. It reads what to check as JSON,
+and writes a line of JSON before and after each check. What the plugin prints goes to
+standard error. If the process ends or hangs during a check, that check has failed, and
+another process continues with the next one.
 """
 
 import faulthandler
@@ -23,16 +24,23 @@ from posefit.limits import end_with_parent, memory
 from posefit.testing import checks_of, results
 from posefit.testing.results import Check, Report, Result, not_run
 
-GIGABYTES = 4.0  # what a check may need
-OVERRUN_SECONDS = 5.0  # that a check may overrun its limit before its process is ended
+GIGABYTES = 4.0  # memory limit of a check
+OVERRUN_SECONDS = 5.0  # how long a check may overrun before its process is ended
 
 
 def check_in_process(
     kind: Any, name: str, settings: Sequence[str] = (), only: Sequence[str] = ()
 ) -> Report:
-    """Return the report on an installed plugin with settings such as `population_size=20`; `only` names the checks.
+    """Return the report on an installed plugin.
 
-    Raises ValueError where a setting or a check is wrong, or the plugin cannot be loaded.
+    Args:
+        kind: kind of plugin, such as "optimiser".
+        name: its registered name.
+        settings: texts such as `population_size=20`.
+        only: names of the checks to run, all by default.
+
+    Raises:
+        ValueError: a setting or a check is wrong, or the plugin cannot be loaded.
     """
     task: dict[str, Any] = {
         "kind": kind,
@@ -54,7 +62,7 @@ def check_in_process(
             raise InputError(plugin["mistake"])
         if "checks" not in plugin:
             raise InputError(
-                f"{kind} {name!r}: it must load in a process of its own; {blame}"
+                f"{kind} {name!r}: it must load in a separate process; {blame}"
             )
         done += [Result(**message) for message in messages if "outcome" in message]
         if "outcome" not in messages[-1]:
@@ -71,7 +79,10 @@ def check_in_process(
 
 
 def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
-    """Return what a process writes that checks a plugin, and why it ended; nothing that it starts is left."""
+    """Return the messages of a checking process, and why it ended.
+
+    Processes that the plugin started are killed with it.
+    """
     with tempfile.TemporaryFile() as written:
         process = subprocess.Popen(
             [sys.executable, "-m", __name__],
@@ -95,10 +106,11 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
 
 
 def _check() -> None:
-    """Check what standard input asks for, and end this process."""
+    """Run the checks that standard input asks for, and end this process."""
     faulthandler.enable()
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what the plugin prints is no message
+    # what the plugin prints must not mix with the messages
+    os.dup2(2, 1)
     task = json.load(sys.stdin)
     end_with_parent(task["parent"])
 
@@ -126,7 +138,8 @@ def _check() -> None:
             done.append(not_run(check.name, done) or check.run(task["seconds"]))
             send(**vars(done[-1]))
     sys.stdout.flush()
-    os._exit(0)  # whatever the plugin left running
+    # threads that the plugin left running would keep an ordinary exit waiting
+    os._exit(0)
 
 
 def _checks(
@@ -142,12 +155,13 @@ def _checks(
             for plugin in rivals
         )
         raise InputError(
-            f"{kind} {name!r} must be of one plugin, got that of {offer.distribution}, which is used, and that of "
-            f"{theirs}, which is left out: give it another name"
+            f"{kind} {name!r} must be of one plugin, "
+            f"got that of {offer.distribution}, which is used, "
+            f"and that of {theirs}, which is left out: give it another name"
         )
     settings = parse_texts(offer.name, offer.factory, texts)
     if kind == "prior" and settings:
-        # a value that makes no sense is one mistake, not one a check
+        # check here: each check would report the same invalid value
         offer.factory(**settings)
     registered = {"optimiser": "next_frame", "tracker": "looks_ahead"}
     more = [getattr(offer, registered[kind])] if kind in registered else []

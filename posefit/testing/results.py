@@ -1,4 +1,4 @@
-"""The rules of a kind of plugin as checks, and their results: passed, failed with the reason, or skipped with it."""
+"""Checks of the rules of a plugin, and their results: passed, failed or skipped."""
 
 import re
 import traceback
@@ -9,22 +9,22 @@ from typing import Any, Literal
 
 from posefit import limits
 
-# how long a check may take before its plugin counts as one that never returns
+# how long a check may take before its plugin counts as hanging
 SECONDS = 60.0
-POSEFIT = Path(__file__).parents[1]  # whose frames of a traceback are not a plugin's
-SAME_CAUSE = 2  # checks that fail for the same cause before the others are not run
+POSEFIT = Path(__file__).parents[1]  # frames of a traceback in here are not a plugin's
+SAME_CAUSE = 2  # failures with the same cause after which the other checks are skipped
 
 
 class BrokenError(AssertionError):
-    """A rule is broken; the message has what was expected and what came."""
+    """A rule is broken. The message says what was expected and what came."""
 
 
 class SkippedError(Exception):
-    """A rule does not apply; the message is the reason."""
+    """A rule does not apply. The message is the reason."""
 
 
 def expect(holds: object, message: str) -> None:
-    """Raise BrokenError with the message where something does not hold."""
+    """Raise BrokenError with the message unless `holds` is true."""
     if not holds:
         raise BrokenError(message)
 
@@ -36,7 +36,7 @@ class Result:
     name: str
     outcome: Literal["passed", "failed", "skipped"]
     detail: str = ""
-    traceback: str = ""  # of what the plugin raised, from where its own code begins
+    traceback: str = ""  # of what the plugin raised, from its first own frame
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,14 @@ class Check:
     body: Callable[[], str | None] = field(repr=False)
 
     def run(self, seconds: float | None = None) -> Result:
-        """Return the result of the check within a time, by default `SECONDS`; nothing that a plugin raises escapes."""
+        """Return the result of the check.
+
+        Args:
+            seconds: time limit, `SECONDS` by default.
+
+        Returns:
+            The result. An exception of the plugin becomes a failure.
+        """
         seconds = SECONDS if seconds is None else seconds
         try:
             with limits.timed(seconds):
@@ -70,7 +77,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Report:
-    """The results of all checks of one plugin. It is true where none failed."""
+    """The results of all checks of one plugin. It is true if none failed."""
 
     plugin: str
     results: tuple[Result, ...]
@@ -90,7 +97,7 @@ class Report:
             lines.append(
                 f"  {result.outcome:8} {result.name:{width}}  {result.detail}".rstrip()
             )
-            # one traceback a cause
+            # one traceback per cause
             if result.traceback and _cause(result.detail) not in causes:
                 lines += [
                     f"           {line}".rstrip()
@@ -109,37 +116,35 @@ class Report:
 
 
 def run_checks(plugin: str | Callable[..., Any], checks: Iterable[Check]) -> Report:
-    """Return the results of the checks of a plugin, under its name or its factory's.
+    """Return the results of the checks of a plugin.
 
-    Once two failed for one cause, the others are not run.
+    Once two checks failed with the same cause, the others are skipped.
+
+    Args:
+        plugin: its label, or its factory, which gives its name.
+        checks: the checks, in the order in which they run.
     """
-    function = getattr(plugin, "func", plugin)
     results: list[Result] = []
     for check in checks:
         results.append(not_run(check.name, results) or check.run())
-    return Report(
-        plugin
-        if isinstance(plugin, str)
-        else getattr(function, "__name__", repr(plugin)),
-        tuple(results),
-    )
+    if isinstance(plugin, str):
+        return Report(plugin, tuple(results))
+    function = getattr(plugin, "func", plugin)  # of a partial, the function itself
+    return Report(getattr(function, "__name__", repr(plugin)), tuple(results))
 
 
 def not_run(name: str, earlier: Sequence[Result]) -> Result | None:
-    """Return the result of a check that need not run, as so many failed for one cause; None where it has to."""
+    """Return a skipped result if earlier checks failed with the same cause, or None."""
     causes: dict[str, list[str]] = {}
     for result in earlier:
         if result.outcome == "failed":
             causes.setdefault(_cause(result.detail), []).append(result.name)
-    failed = next(
-        (names[:SAME_CAUSE] for names in causes.values() if len(names) >= SAME_CAUSE),
-        None,
-    )
-    return (
-        Result(name, "skipped", f"not run: {' and '.join(failed)} fail for one cause")
-        if failed
-        else None
-    )
+    for names in causes.values():
+        if len(names) >= SAME_CAUSE:
+            failed = " and ".join(names[:SAME_CAUSE])
+            reason = f"not run: {failed} fail for one cause"
+            return Result(name, "skipped", reason)
+    return None
 
 
 def _cause(detail: str) -> str:
@@ -148,7 +153,7 @@ def _cause(detail: str) -> str:
 
 
 def _plugin_traceback(error: BaseException) -> str:
-    """Return an error's traceback from the plugin's first frame on, without those of posefit that called it."""
+    """Return an error's traceback without the leading frames of posefit."""
     rest = error.__traceback__
     while rest is not None:
         if POSEFIT not in Path(rest.tb_frame.f_code.co_filename).parents:

@@ -1,4 +1,4 @@
-"""Is a segmenter right: two masks of the image's size, the same again, and do they show the person?"""
+"""Rules of a segmenter: two masks of the image's size, repetition, a visible person."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -20,12 +20,12 @@ from posefit.testing.common import PluginCase, check_speed, unchanged
 from posefit.testing.results import SkippedError, expect
 
 SIZE = (320, 240)
-# frames of an empty scene, then frames of a person who walks through
+# the film shows an empty scene first, then a person who walks through it
 EMPTY = 8
 FRAMES = 40
-# of the person and the mask: half of what a poor background model reaches
+# IoU of mask and person: half of what a poor background model reaches
 OVERLAP = 0.3
-MAX_SECONDS = 1.0  # for a picture of that size
+MAX_SECONDS = 1.0  # for a picture of SIZE
 # blue, green, red
 SKIN = (150.0, 175.0, 225.0)
 SHIRT = (235.0, 235.0, 235.0)
@@ -48,7 +48,7 @@ class PaintedFilm:
         return (image.copy() for image in self.images[start:stop:step])
 
     def picture(self, _path: str) -> Image:
-        """Return the first frame, which is empty, whatever the path."""
+        """Return the first frame, which shows nobody, whatever the path."""
         return self.images[0].copy()
 
 
@@ -72,19 +72,17 @@ def painted() -> tuple[PaintedFilm, list[Mask]]:
     images = []
     for mask in masks:
         rows = np.flatnonzero(mask.any(axis=1))
-        down = ((np.arange(SIZE[1]) - rows.min(initial=SIZE[1])) / max(1, len(rows)))[
-            :, None, None
-        ]
+        below = np.arange(SIZE[1]) - rows.min(initial=SIZE[1])  # rows below the head
+        height = max(1, len(rows))
+        down = (below / height)[:, None, None]  # 0 at the head, 1 at the feet
         colour = np.where(down < 0.14, SKIN, np.where(down < 0.5, SHIRT, TROUSERS))
         depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)[..., None]
-        # rounded, as a body is
+        # darker towards the outline, as a round body is
         person = colour * (0.7 + 0.3 * np.minimum(1.0, depth / 6.0))
-        image = np.where(mask[..., None], person, wall) + rng.normal(
-            0.0, 2.0, (*mask.shape, 3)
-        )
-        images.append(
-            np.clip(cv2.GaussianBlur(image, (0, 0), 0.6), 0.0, 255.0).astype(np.uint8)
-        )
+        noise = rng.normal(0.0, 2.0, (*mask.shape, 3))
+        image = np.where(mask[..., None], person, wall) + noise
+        blurred = cv2.GaussianBlur(image, (0, 0), 0.6)
+        images.append(np.clip(blurred, 0.0, 255.0).astype(np.uint8))
     return PaintedFilm(images), masks
 
 
@@ -119,7 +117,7 @@ class Case(PluginCase):
 
     @cached_property
     def masks(self) -> list[tuple[Mask, Mask]]:
-        """What `use_fully` returns, once for all rules."""
+        """What `use_fully` returns. All rules share it."""
         return self.use_fully()
 
 
@@ -134,7 +132,7 @@ def masks(case: Case) -> None:
 
 
 def overlap(case: Case) -> str:
-    """The mask shows the person in half of the frames at least."""
+    """The mask shows the person in at least half of the frames."""
     true = painted()[1][::4]
     overlaps = [
         float((estimate & mask).sum() / (estimate | mask).sum())
@@ -144,7 +142,8 @@ def overlap(case: Case) -> str:
     middle = float(np.median(overlaps))
     expect(
         middle > OVERLAP,
-        f"the mask must show the person, got an overlap of {middle:.2f} in half of the frames",
+        "the mask must show the person, "
+        f"got an overlap of {middle:.2f} in half of the frames",
     )
     return f"overlap {middle:.2f}"
 
@@ -156,7 +155,7 @@ def same_again(case: Case) -> None:
 
 
 def inputs(case: Case) -> None:
-    """The image stays as it was."""
+    """The method segment does not modify the image."""
     image = painted()[0].images[20].copy()
     same = unchanged(image)
     case.build().segment(image)
@@ -164,7 +163,7 @@ def inputs(case: Case) -> None:
 
 
 def background(case: Case) -> str:
-    """A background that is shown is a picture of the film's size."""
+    """The background, if the segmenter gives one, is a picture of the film's size."""
     shown = getattr(case.build(), "background", None)
     if shown is None:
         raise SkippedError("it shows no background")
@@ -177,7 +176,7 @@ def background(case: Case) -> str:
 
 
 def landmarks(case: Case) -> str:
-    """Landmarks are a column, a row and a confidence, 0 or more, of each joint."""
+    """Each joint's landmark is a column, a row and a confidence of 0 or more."""
     segmenter = case.build()
     segmenter.segment(painted()[0].images[20].copy())
     given = getattr(segmenter, "landmarks", None)

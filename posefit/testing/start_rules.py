@@ -1,4 +1,4 @@
-"""Is a start right: weighted poses or None for whatever a camera shows, the same again, and does a search gain?"""
+"""Rules of a start: weighted poses or None, repetition, and a gain for the search."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from posefit.testing.results import SkippedError, expect
 from posefit.testing.tracker_rules import scene
 from posefit.uncertainty.modes import Posterior
 
-# of the walk, and of its camera, metres
+# frames of the walk, and the camera's distance in metres
 FRAMES = (0, 4, 8)
 DISTANCE = 5.0
 POPULATION = 40
@@ -31,7 +31,7 @@ MAX_SECONDS = 2.0  # for a frame
 
 @lru_cache(maxsize=1)
 def images() -> tuple[Task, Sequence[Observation]]:
-    """Return a task whose first yaw is unknown, and what one camera shows of three frames of the built-in walk."""
+    """Return a task of unknown first yaw, and three frames of the walk in one view."""
     task, motion, _ = scene()
     camera = Camera.around(motion.translations[0], 0.8, DISTANCE, SIZE)
     masks = [
@@ -63,7 +63,7 @@ class Case(PluginCase):
 
     @cached_property
     def first(self) -> list[Posterior | None]:
-        """What a start guesses of each frame, once for all rules."""
+        """The guess for each frame. All rules share it."""
         start = self.build()
         return [start.posterior(observation) for observation in images()[1]]
 
@@ -84,14 +84,17 @@ def posterior(case: Case) -> str:
     """A frame gives a Posterior of finite poses, or None."""
     for guess in case.first:
         _check_guess(guess)
-    return f"{', '.join('none' if guess is None else str(len(guess)) for guess in case.first)} poses of a frame"
+    counts = ["none" if guess is None else str(len(guess)) for guess in case.first]
+    return f"{', '.join(counts)} poses of a frame"
 
 
 def several_views(case: Case) -> None:
-    """Cameras that show a part of the person, or nothing, and several of them, are no reason to fail."""
+    """A start survives several cameras, and views of a part of the person or none."""
     task, (observation, *_) = images()
-    # which the feet are below
-    (near,), parts = scene()[0].cameras, scene()[2][0].silhouettes
+    # in this view the feet are below the image
+    near_task, _, near_observations = scene()
+    (near,) = near_task.cameras
+    parts = near_observations[0].silhouettes
     whole = observation.silhouettes
     empty = [Silhouette.of(np.zeros(SIZE[::-1], dtype=bool))]
     for cameras, shown in (
@@ -105,9 +108,9 @@ def several_views(case: Case) -> None:
 
 
 def same_again(case: Case) -> None:
-    """The same frame gives the same poses and weights."""
+    """The same frame gives the same poses and weights, whatever came before."""
     start = case.build()
-    for observation in [images()[1][-1], *images()[1]]:  # whatever came before
+    for observation in [images()[1][-1], *images()[1]]:
         guess = start.posterior(observation)
     again = guess
     first = case.first[-1]
@@ -121,7 +124,7 @@ def same_again(case: Case) -> None:
 
 
 def inputs(case: Case) -> None:
-    """Observations and task stay as they were."""
+    """The start does not modify observations or task."""
     task, (observation, *_) = images()
     same = unchanged(observation.silhouettes[0].mask, task.anchor)
     case.build().posterior(observation)
@@ -129,7 +132,7 @@ def inputs(case: Case) -> None:
 
 
 def gain(case: Case) -> str:
-    """The best of a population drawn from its modes costs less than that of one from anywhere."""
+    """Populations drawn from its modes have a cheaper best than uniform ones."""
     task, observations = images()
     prior = principal(walking_angles())
     space = SearchSpace(
@@ -152,14 +155,16 @@ def gain(case: Case) -> str:
     guided, blind = np.mean(costs, axis=0)
     expect(
         guided < blind,
-        f"the best of a population must cost less than {blind:.1f}, from anywhere, got {guided:.1f}",
+        f"the best of a population must cost less than {blind:.1f}, from anywhere, "
+        f"got {guided:.1f}",
     )
     return f"cost {guided:.1f}, from anywhere {blind:.1f}"
 
 
 def speed(case: Case) -> str:
     """A frame takes less than two seconds."""
-    start, (observation, *_) = case.build(), images()[1]
+    start = case.build()
+    observation = images()[1][0]
     return check_speed(
         "a frame", MAX_SECONDS, lambda _: len([start.posterior(observation)])
     )

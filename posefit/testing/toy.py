@@ -1,4 +1,4 @@
-"""Small spaces to try an optimiser in, of any dimension, and costs to minimise in them."""
+"""Small spaces of any dimension to try an optimiser in, and costs to minimise there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from posefit.fitting.box import Start
 
 Rule = Callable[[Array], NDArray[np.bool_]]
 
-# every coordinate of where `sphere` is least: not the centre, which is too easy
+# every coordinate of the minimum of `sphere`: the centre would be too easy
 TARGET = 0.3
 
 
@@ -21,28 +21,40 @@ def anywhere(proposals: Array) -> NDArray[np.bool_]:
 
 
 def ball(proposals: Array) -> NDArray[np.bool_]:
-    """Return which proposals (n, d) lie in a ball whose radius lets about a third of the box in, the target too."""
+    """Return which proposals (n, d) lie in a ball.
+
+    It holds about a third of the box, the target included.
+    """
     return np.asarray((proposals**2).mean(axis=1) < 0.3)
 
 
 def shell(proposals: Array) -> NDArray[np.bool_]:
-    """Return which proposals (n, d) lie in a thin shell around the target: a few in a thousand."""
+    """Return which proposals (n, d) lie in a thin shell: a few in a thousand.
+
+    The shell surrounds the target.
+    """
     return np.asarray(np.abs(((proposals - TARGET) ** 2).mean(axis=1) - 0.1) < 2e-3)
 
 
 def sphere(proposals: Array) -> Array:
-    """Return 50 times the mean squared distance (n,) of proposals (n, d) from the target: 0 to 100, as costs are."""
+    """Return the costs (n,) of proposals (n, d): 0 at the target, at most 100.
+
+    They are 50 times the mean squared distance from the target.
+    """
     return np.asarray(50.0 * ((proposals - TARGET) ** 2).mean(axis=1))
 
 
 def slope(proposals: Array) -> Array:
-    """Return costs (n,) of proposals (n, d) that fall towards a corner of the box, from 100 to 0."""
+    """Return costs (n,) of proposals (n, d) that fall to 0 in a corner of the box."""
     return np.asarray(50.0 * (1.0 + proposals.mean(axis=1)))
 
 
 @dataclass(frozen=True, eq=False)
 class Toy:
-    """A box of `dimensions` in which `rule` says what is allowed; the first `wrapping` coordinates are periodic."""
+    """A box of `dimensions` in which `rule` says what is allowed.
+
+    The first `wrapping` coordinates are periodic.
+    """
 
     dimensions: int
     rule: Rule = anywhere

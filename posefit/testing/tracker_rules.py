@@ -1,4 +1,4 @@
-"""Is a tracker right: a frame for each observation as it comes, whole and honest frames, the same again, no leaks?"""
+"""Rules of a tracker: one whole, honest frame per observation, repetition, no leaks."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ EVALUATIONS = 800
 
 @lru_cache(maxsize=1)
 def scene() -> tuple[Task, Motion, Sequence[Observation]]:
-    """Return a task, the true motion, and its observations: twelve frames of the built-in walk."""
+    """Return a task, the true motion and its observations: 12 frames of a walk."""
     motion = built_in.motion("walk", frames=FRAMES)
     body = Body.of(motion.skeleton)
     camera = Camera.around(motion.translations.mean(axis=0), 0.8, 3.5, SIZE)
@@ -48,12 +48,21 @@ def scene() -> tuple[Task, Motion, Sequence[Observation]]:
 
 
 class Tracked(NamedTuple):
-    """The frames of a tracker, and how it came to them."""
+    """The frames of a tracker, and how it came to them.
+
+    Attributes:
+        tracker: the tracker, after its first track.
+        frames: one per observation.
+        taken: how many observations it had taken when it gave each frame.
+        warnings: of the audit.
+        inputs_unchanged: whether masks and anchor are as before.
+        random_unchanged: whether the global random generators are as before.
+    """
 
     tracker: Tracker
     frames: list[Frame]
-    taken: list[int]  # observations that it had taken when it gave each frame
-    warnings: list[str]  # of the audit
+    taken: list[int]
+    warnings: list[str]
     inputs_unchanged: bool
     random_unchanged: bool
 
@@ -77,7 +86,7 @@ class Case(PluginCase):
 
     @property
     def random_unchanged(self) -> bool:
-        """Whether the first track has left the global random generators alone."""
+        """Whether the first track left the global random generators unchanged."""
         return self.first.random_unchanged
 
     def use_fully(self) -> bool:
@@ -93,7 +102,10 @@ class Case(PluginCase):
 
     @cached_property
     def first(self) -> Tracked:
-        """The audited track of a new tracker: once for all rules, as it may take minutes."""
+        """The audited track of a new tracker.
+
+        All rules share it, because a track may take minutes.
+        """
         task, _, observations = scene()
         tracker = self.build()
         audit = Audit("the tracker", BETA)
@@ -111,9 +123,8 @@ class Case(PluginCase):
         inputs_unchanged = unchanged(*masks, task.anchor)
         random = global_random_state()
         try:
-            for frame in drive(
-                tracker, task, stream(), np.random.default_rng(0), audit
-            ):
+            rng = np.random.default_rng(0)
+            for frame in drive(lambda _task: tracker, audit, task, stream(), rng):
                 frames.append(frame)
                 taken.append(count)
         except BrokenRuleError as broken:
@@ -125,17 +136,18 @@ class Case(PluginCase):
 
 
 def one_frame_each(case: Case) -> str:
-    """Every observation gives one frame: a pose (66,), a translation (3,), evaluations and seconds."""
+    """Every observation gives one frame, with all that belongs to a frame."""
     return f"{len(case.first.frames)} frames"
 
 
 def as_they_come(case: Case) -> None:
-    """A frame is given before the observation after the next is taken, unless the tracker is one that looks ahead."""
+    """A frame comes before the observation after the next, unless it looks ahead."""
     for given, taken in enumerate(case.first.taken, 1):
         late = taken > given + 1 and not case.looks_ahead
         expect(
             not late,
-            f"frames must come as observations do, got frame {given} after {taken} of them",
+            "frames must come as observations do, "
+            f"got frame {given} after {taken} of them",
         )
 
 
@@ -146,9 +158,10 @@ def no_observation(case: Case) -> None:
 
 
 def audit(case: Case) -> str:
-    """Cost and areas of a frame are those of its pose; it counts every pose it draws, and keeps the budget."""
+    """Cost and areas fit the pose; every pose is counted and the budget is kept."""
     expect(not case.first.warnings, "; ".join(case.first.warnings))
-    return f"at most {max(frame.evaluations for frame in case.first.frames)} of {EVALUATIONS} evaluations"
+    most = max(frame.evaluations for frame in case.first.frames)
+    return f"at most {most} of {EVALUATIONS} evaluations"
 
 
 def same_seed(case: Case) -> None:
@@ -157,7 +170,7 @@ def same_seed(case: Case) -> None:
 
 
 def used_twice(case: Case) -> None:
-    """A tracker that has tracked before does the same again."""
+    """A tracker that has tracked before gives the same track again."""
     expect(
         case.same(case.first.tracker),
         "a second track must be as the first, got another",
@@ -165,7 +178,7 @@ def used_twice(case: Case) -> None:
 
 
 def inputs(case: Case) -> None:
-    """Observations and task stay as they were."""
+    """The tracker does not modify observations or task."""
     expect(
         case.first.inputs_unchanged,
         "observations and task must stay as they are, got others",

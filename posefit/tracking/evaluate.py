@@ -1,17 +1,17 @@
 """The last step: errors or signs of trust of a track, and what a user should know before they trust it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.evaluation.errors import LOST, Table, evaluated, unseen
+from posefit.evaluation.measures import Effort
 from posefit.evaluation.trust import trust_of
 from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
-from posefit.measuring.gait import backwards_warning, gait_of, walks_backwards
+from posefit.measuring.gait import Gait, backwards_warning, gait_of, walks_backwards
 from posefit.output.content import Setup, TrackingLog
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
@@ -30,14 +30,11 @@ def evaluate(
     method: Method,
     task: Task,
     options: TrackOptions,
-    clock: Array,
-    effort: Mapping[str, int],
+    effort: Effort,
 ) -> Track:
     """Return a track with errors against the truth where it is known, else signs of trust.
 
-    `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took,
-    from the first mask that was read, and `effort` the evaluations of each stage. The build is that of `scene`; that
-    of `task` is from before smoothing.
+    `frames` are those of `tracked`, smoothed. The build is that of `scene`; that of `task` is from before smoothing.
     """
     skeleton = scene.body.skeleton
     posteriors = [
@@ -51,7 +48,7 @@ def evaluate(
     ]
     training = None if scene.truth is None else task.angles
     table, measures = evaluated(
-        scene, frames, method.prior, training, method.audit.beta, clock, effort
+        scene, frames, method.prior, training, method.audit.beta, effort
     )
     trust = None
     if scene.truth is None:
@@ -106,7 +103,9 @@ def evaluate(
         warnings=warnings,
         guesses=[*scene.guesses],
     )
-    gait = gait_of(motion, unseen(table))
+    gait = Gait(why="one frame is no walk")
+    if len(frames) > 1:
+        gait = gait_of(motion, unseen(table))
     return Track(motion, frames, table, measures, trust, gait, setup, log, modes, scene)
 
 

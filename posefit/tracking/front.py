@@ -9,14 +9,14 @@ from typing import Any, TypeGuard
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
-from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
 from posefit.footage.source import (
     Footage,
+    Resolved,
     check_used,
-    kind_of,
+    first_of,
+    resolve,
     scene_of,
-    sources_of,
 )
 from posefit.motion import built_in
 from posefit.motion.clips import (
@@ -26,6 +26,7 @@ from posefit.motion.clips import (
     training_motions,
 )
 from posefit.motion.motion import Motion
+from posefit.output.files import chosen_kinds
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
@@ -36,17 +37,24 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
-_ARGUMENTS = ("out", "force", "resume", "progress")  # of a track, besides its options
+_ARGUMENTS = (
+    "out",
+    "force",
+    "resume",
+    "write",
+    "progress",
+)  # of a track, besides its options
 # options that may name files, whose content counts
 _FILES = ("source", "train", "asf", "camera", "extraction")
 
 
 def track(
-    source: Footage | Scene | Sequence[Any] = "walk",
+    source: Footage | Scene | Resolved | Sequence[Any] = "walk",
     *,
     out: str | Path | None = None,
     force: bool = False,
     resume: bool = False,
+    write: str | Sequence[str] = (),
     progress: Progress | None = None,
     **options: Any,
 ) -> Track:
@@ -58,26 +66,29 @@ def track(
     Other options are listed below; `posefit.tracking.defaults.completed` has the defaults that depend on the source.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
-    not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
-    go to `progress`, by default a terminal or a notebook. Raises InputError for any mistake in the arguments or files.
+    not at all. `write` chooses some of these files, such as "bvh,trc" or ["bvh", "trc"]. The frames of a track that
+    ended too early are kept, and `resume` goes on from there. Messages and bars go to `progress`, by default a terminal
+    or a notebook. Raises InputError for any mistake in the arguments or files.
     """
     _check_names("track", options, [option.name for option in fields(TrackOptions)])
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
-    sources = _sources(source)
+    resolved = _resolved(source)
     changed = [
         name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)
     ]
     if scene is not None and changed:
         raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
-    kind = kind_of(sources[0])
-    check_used(kind, chosen.view)
-    _check_for_kind(chosen, kind == "motion", [*sources, *chosen.train])
-    followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
-    chosen = completed(chosen, followed if kind == "motion" else None)
+    check_used(resolved.medium, chosen.view)
+    known = resolved.medium == "motion"
+    _check_for_kind(chosen, known, [*resolved.named, *chosen.train])
+    named = resolved.named[0]
+    followed = named if isinstance(named, str | Path | Motion) else None
+    chosen = completed(chosen, followed if known else None)
     # before the work, as a name may be wrong
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)
-    for name, value in (("resume", resume), ("force", force)):
+    kinds = chosen_kinds(write)
+    for name, value in (("resume", resume), ("force", force), ("write", len(write))):
         if value and out is None:
             raise InputError(
                 f"{name} must be given with out, the folder of the track, got none"
@@ -89,13 +100,14 @@ def track(
             out,
             force,
             resume,
-            _identity(sources, chosen, options.get("train", ())),
+            _identity(resolved, chosen, options.get("train", ())),
             progress.log,
+            kinds,
         )
     with recorder:
         with progress.phase("masks"):
             start = clocks()
-            scene = scene or scene_of(sources, progress, **chosen.view)
+            scene = scene or scene_of(resolved, progress, **chosen.view)
             # a known motion is drawn frame by frame, as it is tracked
             if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
@@ -105,14 +117,11 @@ def track(
         track = track_scene(
             scene, training, chosen, recorder=recorder, progress=progress
         )
-        names = [
-            each.name if isinstance(each, Motion) else name_of(each) for each in sources
-        ]
         # numbers of Python, whatever kind they were given as
         view_degrees = list(chosen.view_degrees) or None  # type: ignore[arg-type]
         setup = replace(
             track.setup,
-            source=names,
+            source=list(resolved.names),
             frames_chosen=list(chosen.frames),
             view_degrees=view_degrees,
         )
@@ -123,11 +132,19 @@ def track(
 
 
 def fit(
-    source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any
+    source: Footage | Sequence[Any] = "walk",
+    *,
+    frame: int | None = None,
+    **options: Any,
 ) -> Fit:
-    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
+    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`.
+
+    The frame has its number as filmed, of a motion that after resampling; by default it is the first.
+    """
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])
+    if frame is None:
+        frame = first_of(_resolved(source))
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
 
@@ -139,15 +156,15 @@ def _check_names(function: str, options: Iterable[str], known: Sequence[str]) ->
         raise TypeError(f"{function} has no option {unknown[0]!r}{hint}")
 
 
-def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
-    """Return one source a camera, or the motion of a scene."""
+def _resolved(source: Footage | Scene | Resolved | Sequence[Any]) -> Resolved:
+    """Return what a source is; of a scene, its motion."""
     if not isinstance(source, Scene):
-        return sources_of(source)
+        return resolve(source)
     if source.truth is None:
         raise InputError(
             f"a scene must be of a known motion, got {source.name}, whose truth is unknown"
         )
-    return [source.truth]
+    return resolve(source.truth)
 
 
 def _check_for_kind(
@@ -186,7 +203,7 @@ def _is_captured(motion: Footage) -> TypeGuard[str | Path]:
 
 
 def _identity(
-    sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]
+    source: Resolved, options: TrackOptions, train: Sequence[Source]
 ) -> dict[str, Digest]:
     """Return what a track must have in common with one that it goes on with."""
     values = {
@@ -194,16 +211,16 @@ def _identity(
         for option in fields(options)
         if declared(option).identifies
     }
-    values |= {"source": sources, "train": train, "version": __version__}
+    values |= {"source": source.named, "train": train, "version": __version__}
     # the skeleton beside an .amc counts as if it were given
     if beside := [
         skeleton_file(Path(motion), options.asf)
-        for motion in (*sources, *options.train)
+        for motion in (*source.named, *options.train)
         if isinstance(motion, str | Path) and _is_captured(motion)
     ]:
         values["asf"] = beside
     # a folder of that name is not read
-    named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()
+    named = source.medium == "motion" and source.named[0] in built_in.names()
     return {
         name: digest_of(
             value, files=name in _FILES and not (named and name == "source")

@@ -1,5 +1,6 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,7 +10,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import NAMES, SPREAD, Shape, fit_shape
-from posefit.fitting.tracker import Frame, Task
+from posefit.fitting.tracker import Follow, Frame, Observation, Task, guessed_modes
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -23,13 +24,13 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import (
     TRIAL_FRAMES,
     TRIAL_STRIDE,
-    Follow,
     best_restart,
     first_shown_whole,
     usable_observations,
 )
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility
+from posefit.uncertainty.modes import Posterior
 
 MIN_BODY_FRAMES = 5
 # ours: within which a walker hardly turns farther than a search reaches, 45 degrees
@@ -78,9 +79,15 @@ def initialise(
     compile_for(scene, task)
     start = clocks()
     shape = None
-    if scene.count == 1:  # it is one search, by the tracker itself
-        return Initialised(task, None, start, {})
     effort = dict[str, int]()
+    if scene.count == 1:  # it is one search, by the tracker itself
+        if method.prior is not None and task.start is not None:
+            shown = next(iter(scene.observations))
+            modes, used = guessed(task, shown)
+            effort["first_pose"] = used
+            left = task.evaluations - used
+            task = replace(task, modes=modes, start=None, evaluations=left)
+        return Initialised(task, None, start, effort)
     body_frames = options.body_frames or 0
     if options.restarts:
         searched = scene.observations, method.follow, options.restarts, options.seed
@@ -108,6 +115,16 @@ def initialise(
         effort["build"] = round(drawn.poses / len(scene.cameras))
         task = replace(task, body=shape.body, cameras=cameras)
     return Initialised(task, shape, start, effort)
+
+
+def guessed(
+    task: Task, observation: Observation
+) -> tuple[Sequence[tuple[float, Posterior]], int]:
+    """Return modes of what one picture may show, and the evaluations that these took."""
+    drawn = PoseCount()
+    with drawn.counting():
+        modes = guessed_modes(task, observation)
+    return modes, math.ceil(drawn.poses / len(task.cameras))
 
 
 def fitted_build(

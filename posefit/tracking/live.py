@@ -16,12 +16,11 @@ from threadpoolctl import threadpool_limits
 from posefit.errors import InputError
 from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.cameras import CameraView, calibrated, combined
-from posefit.footage.live import LiveMask, Stream, live_masks
-from posefit.footage.masks import PackedMasks, Views, undistorted
+from posefit.footage.cameras import calibrated, combined, straightening
+from posefit.footage.live import Stream, live_views
 from posefit.footage.scene import Scene
 from posefit.footage.source import body_of, check_used, logged
-from posefit.geometry.calibration import Calibration
+from posefit.footage.views import Observations, View, joined
 from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress
 from posefit.tracking.defaults import completed
@@ -83,20 +82,20 @@ def track_live(
     chosen = completed(chosen.changed(body_frames=0, smooth=False), None)
     clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
-    masks = live_masks(stream, chosen.extraction, progress.log)
-    first = list(islice(masks, TRIAL_FRAMES * TRIAL_STRIDE))
+    views = live_views(stream, chosen.extraction, progress.log)
+    first = list(islice(views, TRIAL_FRAMES * TRIAL_STRIDE))
     scene, observed = _scene_of(first, source, chosen.fps or stream.rate, chosen)
     training = training_motions(clips, scene.fps)
     scene = with_notes(logged(scene, progress), training)
     for warning in scene.warnings:
         progress.warn(warning)
-    waiting: deque[LiveMask] = deque()
+    waiting: deque[View] = deque()
 
     def coming() -> Iterator[Observation]:
         for live, observation in zip(first, scene.observations, strict=True):
             waiting.append(live)
             yield observation
-        for live in masks:
+        for live in views:
             waiting.append(live)
             yield observed(live)
 
@@ -109,60 +108,38 @@ def track_live(
             hypothesis, method, coming(), method.relocalise_gap
         ):
             live = waiting.popleft()
-            arrived = live.source.arrived
-            start = first[0].source.arrived
+            arrived = float(live.times[0])
             yield LiveFrame(
-                live.source.number,
-                arrived - start,
+                int(live.numbers[0]),
+                arrived - float(first[0].times[0]),
                 time.perf_counter() - arrived,
-                live.usable,
+                bool(live.usable[0]),
                 frame,
             )
 
 
 def _scene_of(
-    first: Sequence[LiveMask], name: str, fps: float | None, options: TrackOptions
-) -> tuple[Scene, Callable[[LiveMask], Observation]]:
+    first: Sequence[View], name: str, fps: float | None, options: TrackOptions
+) -> tuple[Scene, Callable[[View], Observation]]:
     """Return the scene of the first frames, and the function that makes an observation of a later one."""
-    check_used(
-        "masks" if first and first[0].source.image.ndim == 2 else "pictures",
-        options.view,
-    )
-    if not any(live.usable for live in first):
+    masks = not first or first[0].pictures is None
+    check_used("masks" if masks else "pictures", options.view)
+    if not any(view.usable[0] for view in first):
         raise InputError(
             f"{name}: expected a person in the first {len(first)} frames, got none"
         )
-    size = (first[0].mask.shape[1], first[0].mask.shape[0])
-
-    def packed(frames: Sequence[LiveMask]) -> PackedMasks:
-        names = [f"{name}, frame {live.source.number}" for live in frames]
-        masks = np.packbits([live.mask.ravel() for live in frames], axis=1)
-        valid = np.packbits([live.valid.ravel() for live in frames], axis=1)
-        usable = np.array([live.usable for live in frames])
-        landmarks = np.array([live.landmarks for live in frames])
-        known = landmarks if landmarks[..., 2].any() else None
-        return PackedMasks(names, size, masks, valid, usable, landmarks=known)
-
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
     body, notes, of_height = body_of(
         options.asf, options.height, None if known else options.unit
     )
-    view = CameraView(packed(first), notes, name)
+    view = replace(joined(first), warnings=notes)
     scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
     scene = replace(scene, guesses=[*scene.guesses, *of_height])
-    bent = next(
-        (
-            (each, each.maps(size))
-            for each in known
-            if isinstance(each, Calibration) and each.distorted
-        ),
-        None,
-    )
+    _, how, _ = straightening(known[0], view.size) if known else (None, None, None)
 
-    def observed(live: LiveMask) -> Observation:
-        masks = packed([live])
-        return Views([masks if bent is None else undistorted(masks, *bent)])[0]  # type: ignore[no-any-return]
+    def observed(live: View) -> Observation:
+        return Observations([live if how is None else how.of(live)])[0]  # type: ignore[no-any-return]
 
     return scene, observed
 

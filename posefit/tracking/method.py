@@ -1,8 +1,9 @@
 """A method by its one string, `sapso@pca`, `cma`, `@loose` or a tracker's name: settings checked, plugins watched."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,13 +17,11 @@ from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Latents, Prior
 from posefit.fitting.tracker import (
     RELOCALISE_GAP,
-    Frame,
+    Follow,
     InitialiserFactory,
-    Observation,
     Prediction,
     SynthesisTracker,
     Task,
-    Tracker,
 )
 from posefit.fitting.validation import (
     Checked,
@@ -90,7 +89,7 @@ def offers_of(method: Any) -> tuple[Offer, str | Prior | None]:
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A method ready to track: its prior has learned, and `build` makes a tracker of a task."""
+    """A method ready to track: its prior has learned, and `follow` yields a frame for each observation of a task."""
 
     name: str
     # which has learned; None for a tracker that is a plugin itself
@@ -101,15 +100,10 @@ class Method:
     # frames of a gap in footage after which it relocalises, 0 for never
     relocalise_gap: int
     audit: Audit  # what its trackers reported wrongly so far
-    build: Callable[[Task], Tracker] = field(repr=False)
+    # see `posefit.fitting.driving.drive`, whose tracker and audit are the method's
+    follow: Follow = field(repr=False)
     # guesses first poses; None for blind searches
     start: InitialiserFactory | None = field(default=None, repr=False)
-
-    def follow(
-        self, task: Task, observations: Iterable[Observation], rng: np.random.Generator
-    ) -> Iterator[Frame]:
-        """Yield a frame for each observation, as a task asks."""
-        return drive(self.build(task), task, observations, rng, self.audit)
 
     def dimensions(self, task: Task) -> int | None:
         """Return how many coordinates a proposal has; None for a tracker that is a plugin itself."""
@@ -165,29 +159,31 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     )
     tilt = prediction.tilted(learned, task.training)
 
-    def build(task: Task) -> Tracker:
-        def optimiser_of(
-            space: Space, rng: np.random.Generator, evaluations: int = task.evaluations
-        ) -> Optimiser:
-            # schedules follow the budget
-            values = settings.planned(optimiser.factory, stated, evaluations)
-            with _rules(optimiser):
-                made = optimiser.factory(space, rng, **values)
-            return Checked(made, optimiser.label, space, evaluations)
+    def make(space: Space, rng: np.random.Generator, evaluations: int) -> Optimiser:
+        # schedules follow the budget
+        values = settings.planned(optimiser.factory, stated, evaluations)
+        with _rules(optimiser):
+            made = optimiser.factory(space, rng, **values)
+        return Checked(made, optimiser.label, space, evaluations)
 
-        return SynthesisTracker(
-            task, learned, optimiser_of, optimiser.next_frame, prediction, tilt
-        )
-
+    searching = partial(
+        SynthesisTracker,
+        prior=learned,
+        make=make,
+        next_frame=optimiser.next_frame,
+        prediction=prediction,
+        tilt=tilt,
+    )
     label = f"{optimiser.name}@{name}"
+    audit = Audit(label, prediction.beta)
     return Method(
         name=label,
         prior=learned,
         settings=plugin_settings,
         looks_ahead=False,
         relocalise_gap=prediction.relocalise_gap,
-        audit=Audit(label, prediction.beta),
-        build=build,
+        audit=audit,
+        follow=partial(drive, searching, audit),
         start=start_of(prediction.start),
     )
 
@@ -280,19 +276,16 @@ def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> 
     beta = {"beta": BETA, **defaults, **plugin_settings}["beta"]
     beta = float(beta) if isinstance(beta, float | int) else BETA
 
-    def build(task: Task) -> Tracker:
-        with _rules(offer):
-            tracker: Tracker = offer.factory(task, **plugin_settings)
-        return tracker
-
+    audit = Audit(offer.label, beta)
+    tracker = partial(offer.factory, **plugin_settings)
     return Method(
         name=offer.name,
         prior=None,
         settings={"tracker": plugin_settings},
         looks_ahead=offer.looks_ahead,
         relocalise_gap=0 if offer.looks_ahead else RELOCALISE_GAP,
-        audit=Audit(offer.label, beta),
-        build=build,
+        audit=audit,
+        follow=partial(drive, tracker, audit),
         start=start_of(),
     )
 

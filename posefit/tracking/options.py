@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from posefit.fitting.prior import Prior
     from posefit.fitting.space import Translation
     from posefit.fitting.tracker import TrackerFactory
-    from posefit.footage.masks import Range
     from posefit.footage.people import Choice
     from posefit.footage.segmentation import Extraction
+    from posefit.footage.views import Range
     from posefit.geometry.calibration import Up
     from posefit.geometry.camera import Camera
     from posefit.geometry.units import Unit

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from posefit.evaluation.measures import Effort
 from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
@@ -33,6 +34,7 @@ from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import Method, prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.polish import (
+    beyond_prior,
     polish_evaluations,
     polished,
     with_one_mode,
@@ -155,8 +157,15 @@ def track_scene(
         frames = tracked.frames
         if polishing:
             shown = next(iter(scene.observations))
-            frames = [polished(task, frames[0], shown, polishing, method.audit.beta)]
+            assert method.prior is not None
+            search = replace(task, start=method.start if task.yaw is None else None)
+            known = shown, polishing, method.audit.beta
+            frames = [polished(search, frames[0], *known)]
             effort["frames"] = _evaluations(frames)
+            left = beyond_prior(method.prior, task.body.skeleton, frames[0].pose)
+            if left:
+                progress.warn(left)
+                scene = replace(scene, warnings=[*scene.warnings, left])
         elif alone and method.prior is not None and frames[0].posterior is None:
             frames = [with_one_mode(frames[0])]
         smoothed = Smoothed(scene, frames, shape)
@@ -192,9 +201,17 @@ def track_scene(
             progress.log(guess)
         # what a track is compared with is no effort of the method
         with progress.phase("evaluate"), uncounted():
-            clock = clocks() - start_clocks + scene.reading_seconds
+            taken = clocks() - start_clocks + scene.reading_seconds
+            seconds, cpu_seconds = taken.tolist()
             track = evaluate(
-                scene, frames, tracked, shape, method, task, options, clock, effort
+                scene,
+                frames,
+                tracked,
+                shape,
+                method,
+                task,
+                options,
+                Effort(seconds, cpu_seconds, effort),
             )
     for warning in track.log.warnings[len(scene.warnings) :]:
         progress.warn(warning)

@@ -24,7 +24,7 @@ from posefit.arrays import Array
 from posefit.fitting.carried import with_carried
 from posefit.fitting.driving import with_evaluations
 from posefit.fitting.space import ROOT_RANGE_DEGREES
-from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
+from posefit.fitting.tracker import Follow, Frame, Observation, Task, guessed_modes
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
@@ -74,8 +74,6 @@ VOTES_PER_SECOND = 30.0
 EXCESS_TURN_VOTES = 30.0  # that a radian costs which is turned faster than a person can
 SEARCHED = "searched"
 SEARCHED_AGAIN = "searched again"
-
-Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
 def stream(

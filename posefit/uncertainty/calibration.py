@@ -1,4 +1,7 @@
-"""Calibration of probabilities and intervals: their corrections, which `docs/studies/posterior.py` learns."""
+"""Corrections that calibrate probabilities and intervals.
+
+`docs/studies/posterior.py` learns them.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,25 +14,43 @@ from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, JOINTS
 
 LEVELS = (0.5, 0.8, 0.95)  # of intervals
-MAIN_LEVEL = LEVELS.index(0.8)  # of the one interval that is drawn and judged by
-# ours: left and right are unknown from this probability on that they are exchanged
+MAIN_LEVEL = LEVELS.index(0.8)  # the index of the level that is drawn and judged
+# ours: left and right are unknown if they are exchanged with at least this probability
 SECOND_SIDE = 0.2
-DIGITS = 6  # of what a file holds
+DIGITS = 6  # of numbers in a file
 BINS = 10  # of probabilities
 
 
 @dataclass(frozen=True, eq=False)
 class Recalibration:
-    """Corrections of a posterior's intervals and probabilities, learned on clips whose truth is known."""
+    """Corrections of a posterior's intervals and probabilities.
 
-    # standard deviations of joints (metres, each axis) and angles (radians) about every pose
-    # (27,)
+    They are learned from clips with a known truth.
+
+    Attributes:
+        joint_spreads: Standard deviation of each joint (27,) about every pose, along
+            each axis, in metres.
+        angle_spreads: Standard deviation of each angle (66,) about every pose, in
+            radians.
+        joint_factors: Factors of the intervals of joints (levels, 27).
+        angle_factors: Factors of the intervals of angles (levels, 66).
+        second_side: Left and right are unknown if they are exchanged with at least this
+            probability.
+        sharpness: The power of modes' weights. Below 1, the likeliest mode has less
+            than its share of samples.
+        none: The probability that no mode is right.
+        place_spreads: Like `joint_spreads`, but of the joints' places in the world.
+        depth: Standard deviation of the distance from a single camera, as a share of
+            the distance.
+
+    Raises:
+        InputError: A value has another shape, or is out of its range.
+    """
+
     joint_spreads: Array = field(
         default_factory=lambda: np.zeros(len(JOINTS)), repr=False
     )
-    # (66,)
     angle_spreads: Array = field(default_factory=lambda: np.zeros(ANGLES), repr=False)
-    # factors of the intervals of each level
     joint_factors: Array = field(
         default_factory=lambda: np.ones((len(LEVELS), len(JOINTS))), repr=False
     )
@@ -37,15 +58,11 @@ class Recalibration:
         default_factory=lambda: np.ones((len(LEVELS), ANGLES)), repr=False
     )
     second_side: float = SECOND_SIDE
-    # the power of modes' weights: below 1, modes are less sure than their share of
-    # samples
     sharpness: float = 1.0
-    none: float = 0.0  # the probability that no mode is right
-    # (27,) in the world
+    none: float = 0.0
     place_spreads: Array = field(
         default_factory=lambda: np.zeros(len(JOINTS)), repr=False
     )
-    # standard deviation of the distance from a camera that is alone, a share of it
     depth: float = 0.0
 
     def __post_init__(self) -> None:
@@ -57,11 +74,8 @@ class Recalibration:
             "angle_factors",
         ):
             length = ANGLES if name.startswith("angle") else len(JOINTS)
-            value = frozen(
-                name,
-                getattr(self, name),
-                (length,) if name.endswith("spreads") else (len(LEVELS), length),
-            )
+            shape = (length,) if name.endswith("spreads") else (len(LEVELS), length)
+            value = frozen(name, getattr(self, name), shape)
             if value.min() < 0.0:
                 raise InputError(f"{name} must be 0 or more, got {value.min():g}")
             object.__setattr__(self, name, value)
@@ -77,7 +91,7 @@ class Recalibration:
                 )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON holds it; its names are those that it is made from."""
+        """Return the constructor's arguments as values that JSON has."""
         return {
             name: np.round(value, DIGITS).tolist() for name, value in vars(self).items()
         }
@@ -86,15 +100,23 @@ class Recalibration:
 def reliability(
     probabilities: Array, right: NDArray[np.bool_]
 ) -> list[tuple[int, float, float]]:
-    """Return the number of probabilities (n,) in each bin that has any, their mean, and the share that is right."""
+    """Return how often predictions are right, by bins of their probability.
+
+    Args:
+        probabilities: The probability of each prediction (n,).
+        right: Whether each prediction is right (n,).
+
+    Returns:
+        For each bin that is not empty: the number of predictions, their mean
+        probability, and the share of right ones.
+    """
     predicted = np.asarray(probabilities, dtype=np.float64)
     observed = np.asarray(right, dtype=np.float64)
     bin_of = np.minimum((predicted * BINS).astype(np.int64), BINS - 1)
-    return [
-        (
-            int((bin_of == k).sum()),
-            float(predicted[bin_of == k].mean()),
-            float(observed[bin_of == k].mean()),
-        )
-        for k in np.unique(bin_of)
-    ]
+    bins = []
+    for k in np.unique(bin_of):
+        inside = bin_of == k
+        mean_predicted = float(predicted[inside].mean())
+        mean_observed = float(observed[inside].mean())
+        bins.append((int(inside.sum()), mean_predicted, mean_observed))
+    return bins

@@ -1,4 +1,4 @@
-"""Intervals of joints and angles from weighted poses, each blurred by the model's error."""
+"""Intervals of joints and angles from weighted poses, blurred by the model's error."""
 
 from typing import Literal
 
@@ -10,48 +10,72 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.uncertainty.calibration import LEVELS, Recalibration
 from posefit.uncertainty.modes import Posterior
 
-HALVINGS = 12  # of where a radius may be: to a quarter of a thousandth of the widest
-NARROWEST = 1e-6  # metres or radians: the least error of every pose
-FARTHEST = 6.0  # spreads: the widest radius searched
-CLOSE = 1e-3  # spreads: the least distance that a difference is divided by
+HALVINGS = 12  # of the range of a radius: a precision of a 4,096th of the widest
+NARROWEST = 1e-6  # metres or radians; the smallest spread about a pose
+FARTHEST = 6.0  # spreads that the widest radius reaches beyond the farthest pose
+CLOSE = 1e-3  # spreads; the smallest distance by which anything is divided
 
 
 def joint_intervals(
     skeleton: Skeleton, posterior: Posterior, pose: Array, world: bool = False
 ) -> Array:
-    """Return the radii (levels, 27), metres, of the balls about the joints of a `pose` (66,) that hold the true ones.
+    """Return the radii of balls about the joints of a pose that hold the true joints.
 
-    Joints are relative to the root, or in the `world`. A radius is the quantile, at each of the `LEVELS`, of the
-    distance to a joint of a pose drawn by weight, with a normal error along each axis, times a factor; the posterior's
-    recalibration has both. Where two modes are likely, the wider balls reach from one to the other.
+    A radius is a quantile of the distance to the joint of a random pose of the
+    posterior, which has a normal error along each axis. The quantile is multiplied by a
+    factor. The posterior's recalibration has the errors and the factors. If two modes
+    are likely, the wider balls reach from one to the other.
+
+    Args:
+        skeleton: The skeleton.
+        posterior: The weighted poses.
+        pose: The pose (66,).
+        world: Whether the joints are in the world instead of relative to the root.
+
+    Returns:
+        The radii (levels, 27) in metres, for each of the `LEVELS`.
     """
     model = posterior.recalibration or Recalibration()
     spreads = model.place_spreads if world else model.joint_spreads
-    distances = np.linalg.norm(
-        skeleton.joints(posterior.poses) - skeleton.joints(pose), axis=2
-    )
-    return np.asarray(
-        model.joint_factors * quantiles(distances, posterior.weights, spreads, 3)
-    )
+    offsets = skeleton.joints(posterior.poses) - skeleton.joints(pose)  # (K, 27, 3)
+    distances = np.linalg.norm(offsets, axis=2)
+    radii = quantiles(distances, posterior.weights, spreads, 3)
+    return np.asarray(model.joint_factors * radii)
 
 
 def angle_intervals(posterior: Posterior, pose: Array) -> Array:
-    """Return the intervals (levels, 66), radians, to either side of the angles of a `pose` (66,) for the true ones.
+    """Return the intervals of a pose's angles that hold the true angles.
 
-    As for joints, but an interval is never more than half a turn to either side.
+    They are computed in the same way as the radii of `joint_intervals`.
+
+    Args:
+        posterior: The weighted poses.
+        pose: The pose (66,).
+
+    Returns:
+        The width of the interval to either side of each angle (levels, 66) in radians,
+        at most half a turn.
     """
     model = posterior.recalibration or Recalibration()
     distances = np.abs(wrapped(posterior.poses - pose))
-    halves = model.angle_factors * quantiles(
-        distances, posterior.weights, model.angle_spreads, 1
-    )
-    return np.asarray(np.minimum(halves, np.pi))
+    widths = quantiles(distances, posterior.weights, model.angle_spreads, 1)
+    return np.asarray(np.minimum(model.angle_factors * widths, np.pi))
 
 
 def quantiles(
     distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]
 ) -> Array:
-    """Return the radii (levels, n) that hold such shares of normal errors about points at distances (K, n)."""
+    """Return the radii that hold certain shares of normal errors about weighted points.
+
+    Args:
+        distances: The distances of the points (K, n) from the centres of n balls.
+        weights: The weights of the points (K,).
+        spreads: The standard deviations of the errors (n,) along each axis.
+        dimensions: The number of axes.
+
+    Returns:
+        The radii (levels, n), for each of the `LEVELS`.
+    """
     from scipy.special import ndtr
 
     spread = np.maximum(spreads, NARROWEST)
@@ -61,16 +85,13 @@ def quantiles(
     high = np.tile(away.max(axis=0) + FARTHEST * spread, (len(LEVELS), 1))
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        near, far = ((middle[:, None] + sign * away) / spread for sign in (-1.0, 1.0))
+        near = (middle[:, None] - away) / spread  # (levels, K, n)
+        far = (middle[:, None] + away) / spread
         inside = ndtr(near) - ndtr(-far)
-        # the law of the noncentral chi with three degrees of freedom
+        # the distribution of the noncentral chi with three degrees of freedom
         if dimensions == 3:
-            inside -= (
-                spread
-                / away
-                * (np.exp(-0.5 * near**2) - np.exp(-0.5 * far**2))
-                / np.sqrt(2.0 * np.pi)
-            )
+            densities = np.exp(-0.5 * near**2) - np.exp(-0.5 * far**2)
+            inside -= spread / away * densities / np.sqrt(2.0 * np.pi)
         within = np.einsum("k,lkn->ln", weights, inside) >= levels
         low = np.where(within, low, middle)
         high = np.where(within, middle, high)

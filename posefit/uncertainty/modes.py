@@ -1,4 +1,4 @@
-"""Weighted poses of a frame, their modes, and how likely it is that left and right are exchanged."""
+"""Weighted poses of a frame, their modes, and the probability of exchanged sides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,7 +21,8 @@ from posefit.geometry.skeleton import (
 )
 from posefit.uncertainty.calibration import Recalibration
 
-# ours: metres, the mean over joints, beyond which poses are of different modes; a mirrored stride is 0.15 to 0.2 off
+# ours: poses of one mode are at most so far apart, in metres, the mean over joints; a
+# mirrored stride is 0.15 to 0.2 away
 APART = 0.1
 DIGITS = 6  # of radians, metres and weights in a file
 ARRAYS = ("poses", "translations", "weights")
@@ -29,36 +30,55 @@ ARRAYS = ("poses", "translations", "weights")
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """A possible pose of a frame, with its probability."""
+    """A possible pose of a frame, with its probability.
+
+    Attributes:
+        weight: The probability.
+        pose: The pose (66,).
+        translation: The place of the root (3,) in metres.
+    """
 
     weight: float
-    pose: Array = field(repr=False)  # (66,)
-    translation: Array = field(repr=False)  # (3,) metres
+    pose: Array = field(repr=False)
+    translation: Array = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
 class TrackMode:
-    """A possible track of all frames, with its probability."""
+    """A possible track of all frames, with its probability.
+
+    Attributes:
+        weight: The probability.
+        poses: The poses (T, 66).
+        translations: The places of the root (T, 3) in metres.
+    """
 
     weight: float
-    poses: Array = field(repr=False)  # (T, 66)
-    translations: Array = field(repr=False)  # (T, 3) metres
+    poses: Array = field(repr=False)
+    translations: Array = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """The possible poses of one frame, each with its weight; weights are divided by their sum.
+    """The possible poses of one frame with their weights.
 
-    Where it is `coherent`, row k of all frames is one possible track.
+    Attributes:
+        poses: The poses (K, 66).
+        translations: The places of the root (K, 3) in metres.
+        weights: The weights (K,). They are divided by their sum.
+        coherent: Whether row k of all frames of a track is one possible track.
+        recalibration: Learned corrections of the poses' errors.
+        modes: The result of `modes_of`, which is filled in for the frames of a track.
+
+    Raises:
+        InputError: An array has another shape, or a weight is negative, or all are 0.
     """
 
-    poses: Array = field(repr=False)  # (K, 66)
-    translations: Array = field(repr=False)  # (K, 3) metres
-    weights: Array = field(repr=False)  # (K,) which sum to 1
+    poses: Array = field(repr=False)
+    translations: Array = field(repr=False)
+    weights: Array = field(repr=False)
     coherent: bool = False
-    # learned corrections of these poses' errors
     recalibration: Recalibration | None = field(default=None, repr=False)
-    # see `modes_of`, which the frames of a track have filled in
     modes: Sequence[Mode] = ()
 
     def __post_init__(self) -> None:
@@ -68,15 +88,14 @@ class Posterior:
             ("translations", (count, 3)),
             ("weights", (count,)),
         ):
-            object.__setattr__(
-                self, name, frozen(f"{name} of a posterior", getattr(self, name), shape)
-            )
+            value = frozen(f"{name} of a posterior", getattr(self, name), shape)
+            object.__setattr__(self, name, value)
         total = float(self.weights.sum())
         least = float(self.weights.min(initial=0.0))
         if least < 0.0 or not total > 0.0:
-            came = f"{least:g}, sum {total:g}"
             raise InputError(
-                f"weights of a posterior must be 0 or more, with a sum above 0, got {came}"
+                "weights of a posterior must be 0 or more, with a sum above 0, "
+                f"got {least:g}, sum {total:g}"
             )
         object.__setattr__(self, "weights", self.weights / total)
 
@@ -84,61 +103,75 @@ class Posterior:
         return len(self.weights)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON holds it, to a millionth."""
+        """Return the posterior, rounded to a millionth, as values that JSON has.
+
+        The modes are not part of the result.
+        """
         arrays = {name: getattr(self, name).round(DIGITS).tolist() for name in ARRAYS}
-        corrections = (
-            None if self.recalibration is None else self.recalibration.as_dict()
-        )
+        corrections = None
+        if self.recalibration is not None:
+            corrections = self.recalibration.as_dict()
         return {**arrays, "coherent": self.coherent, "recalibration": corrections}
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
-        """Return the posterior that `as_dict` gave."""
-        corrections = (
-            None
-            if stored["recalibration"] is None
-            else Recalibration(**stored["recalibration"])
-        )
-        poses, translations, weights = (np.array(stored[name]) for name in ARRAYS)
+        """Return the posterior from the result of `as_dict`."""
+        corrections = None
+        if stored["recalibration"] is not None:
+            corrections = Recalibration(**stored["recalibration"])
         return cls(
-            poses,
-            translations,
-            weights,
+            poses=np.array(stored["poses"]),
+            translations=np.array(stored["translations"]),
+            weights=np.array(stored["weights"]),
             coherent=stored["coherent"],
             recalibration=corrections,
         )
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
-    """Return the modes of a frame, the likeliest first: similar poses are one mode.
+    """Return the modes of a frame, the likeliest first.
 
-    Poses are similar where they are at most a tenth of a metre from each other, see `poses_apart`. The pose of a mode
-    is its medoid; a mean might be no possible pose. Weights are shares of the poses' weight, raised to the sharpness of
-    the posterior's recalibration; they sum to 1, less its probability that no mode is right.
+    Poses at most a tenth of a metre from each other are one mode, see `poses_apart`.
+    The pose of a mode is its medoid, because a mean may be an impossible pose.
+
+    Args:
+        skeleton: The skeleton.
+        posterior: The weighted poses.
+
+    Returns:
+        The modes. A weight is the sum of the poses' weights, raised to the sharpness of
+        the posterior's recalibration. The weights sum to 1 minus its probability that
+        no mode is right.
     """
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
-    clusters = [
-        (weight, row)
-        for weight, row, _ in clusters_of(distances, posterior.weights, APART)
-    ]
+    clusters = clusters_of(distances, posterior.weights, APART)
+    weights = [weight for weight, _, _ in clusters]
     if posterior.recalibration is not None:
         # temperature scaling
-        powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]
+        powers = [weight**posterior.recalibration.sharpness for weight in weights]
         share = (1.0 - posterior.recalibration.none) / sum(powers)
-        clusters = [
-            (share * power, row)
-            for power, (_, row) in zip(powers, clusters, strict=True)
-        ]
-    return [
-        Mode(weight, posterior.poses[row], posterior.translations[row])
-        for weight, row in clusters
-    ]
+        weights = [share * power for power in powers]
+    modes = []
+    for weight, (_, row, _) in zip(weights, clusters, strict=True):
+        mode = Mode(weight, posterior.poses[row], posterior.translations[row])
+        modes.append(mode)
+    return modes
 
 
 def other_modes(
     skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0
 ) -> list[Mode]:
-    """Return the modes with weights above `above` but the one nearest to a pose (66,), the likeliest first."""
+    """Return all modes but the nearest one to a pose, the likeliest first.
+
+    Args:
+        skeleton: The skeleton.
+        modes: The modes of a frame.
+        pose: The pose (66,).
+        above: Only modes with a weight above this are returned.
+
+    Returns:
+        The other modes.
+    """
     if len(modes) < 2:
         return []
     nearest = _nearest(skeleton, modes, skeleton.joints(pose))[0]
@@ -151,32 +184,43 @@ def other_modes(
 def other_mode(
     skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0
 ) -> Mode | None:
-    """Return the likeliest of the `other_modes`; None where there are none."""
+    """Return the likeliest of the `other_modes`, or None if there are none."""
     return next(iter(other_modes(skeleton, modes, pose, above)), None)
 
 
 def likeliest_is_right(
     skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART
 ) -> bool:
-    """Return whether true joints (27, 3) are nearest to the likeliest mode, and at most `apart` metres from it."""
-    nearest, off = _nearest(skeleton, modes, joints)
-    return (
-        nearest == max(range(len(modes)), key=lambda k: modes[k].weight)
-        and off <= apart
-    )
+    """Return whether the likeliest mode is right.
+
+    Args:
+        skeleton: The skeleton.
+        modes: The modes of a frame.
+        joints: The true joints (27, 3) in metres.
+        apart: The largest distance of a right mode from the truth, in metres.
+
+    Returns:
+        Whether the likeliest mode is the nearest one to the truth, and near enough.
+    """
+    nearest, distance = _nearest(skeleton, modes, joints)
+    likeliest = max(range(len(modes)), key=lambda k: modes[k].weight)
+    return nearest == likeliest and distance <= apart
 
 
 def _nearest(
     skeleton: Skeleton, modes: Sequence[Mode], joints: Array
 ) -> tuple[int, float]:
-    """Return the nearest mode to joints (27, 3), and how far it is away, in metres."""
+    """Return the nearest mode to joints (27, 3), and its distance in metres."""
     centres = skeleton.joints(np.array([mode.pose for mode in modes]))
     distances = joint_distances(centres, joints).mean(axis=-1)
     return int(distances.argmin()), float(distances.min())
 
 
 def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
-    """Return the distances (n, K), metres, of poses (n, 66) from others (K, 66): the mean over joints, root-centred."""
+    """Return the distances (n, K) of poses (n, 66) from others (K, 66), in metres.
+
+    A distance is the mean over joints, with both roots at one point.
+    """
     joints = skeleton.joints(poses)
     targets = skeleton.joints(others)
     distances = np.empty((len(joints), len(targets)))
@@ -187,9 +231,16 @@ def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
 def track_modes(
     skeleton: Skeleton, posteriors: Sequence[Posterior | None], apart: float = APART
 ) -> list[TrackMode]:
-    """Return the possible tracks of a clip, the likeliest first, by the posteriors of its frames.
+    """Return the possible tracks of a clip, the likeliest first.
 
-    Tracks are similar as poses are in `modes_of`, by the mean over frames. There are none where rows are no tracks.
+    Args:
+        skeleton: The skeleton.
+        posteriors: The posterior of each frame, or None.
+        apart: The largest distance of tracks of one mode in metres. It is the mean over
+            frames of the distance of their poses, see `poses_apart`.
+
+    Returns:
+        The tracks. There are none unless the posteriors of all frames are coherent.
     """
     coherent = [frame for frame in posteriors if frame is not None and frame.coherent]
     if len(coherent) < len(posteriors) or len({len(frame) for frame in coherent}) != 1:
@@ -210,10 +261,18 @@ def track_modes(
 def clusters_of(
     distances: Array, weights: Array, apart: float
 ) -> list[tuple[float, int, NDArray[np.intp]]]:
-    """Return the weight, the medoid and all rows of each cluster, the heaviest first.
+    """Return clusters of weighted points, the heaviest first.
 
-    A centre is the row with the greatest weight near it among those that are near no earlier centre; then every row
-    joins its nearest centre.
+    The next centre is always the row with the greatest weight near it, among the rows
+    that are not near an earlier centre. Then every row joins its nearest centre.
+
+    Args:
+        distances: The distances between the points (K, K).
+        weights: Their weights (K,).
+        apart: Points are near if they are at most so far apart.
+
+    Returns:
+        The weight, the medoid and all rows of each cluster.
     """
     near = distances <= apart
     remaining = weights > 0.0
@@ -237,47 +296,65 @@ _PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
 def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15.
+    """Return whether joints are nearer to targets when mirrored. Interpretation S15.
 
-    In a side view a pose and its mirror image have nearly one silhouette.
+    In a side view a pose and its mirror image have nearly the same silhouette.
+
+    Args:
+        targets: The target joints (T, 27, 3).
+        joints: The joints (T, 27, 3).
+
+    Returns:
+        Whether the mirrored joints are nearer (T,).
     """
     return mirrored_gain(targets, joints) > 0.0
 
 
 def mirrored_gain(targets: Array, joints: Array) -> Array:
-    """Return how much nearer (T,) joints (T, 27, 3) are to targets (T, 27, 3) when they are mirrored, metres.
+    """Return how much nearer joints are to targets when they are mirrored.
 
-    The mirror is the plane through the root between the hips; left and right are exchanged. Roots are at one point, and
-    only joints that have a counterpart count.
+    The mirror is the plane through the root between the hips. Left and right are
+    exchanged, and both roots are at one point. Only joints with a counterpart count.
+
+    Args:
+        targets: The target joints (T, 27, 3) in metres.
+        joints: The joints (T, 27, 3) in metres.
+
+    Returns:
+        The mean distance of the joints minus the one of the mirrored joints (T,),
+        metres.
     """
     targets = root_centred(targets)
     joints = root_centred(joints)
     across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
-    across /= np.maximum(
-        np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny
-    )
-    mirrored = (
-        joints
-        - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
-    )
-    direct = np.linalg.norm(targets[:, _PAIRED] - joints[:, _PAIRED], axis=-1).mean(
-        axis=1
-    )
-    exchanged = np.linalg.norm(
-        targets[:, _PAIRED] - mirrored[:, np.array(MIRROR)[_PAIRED]], axis=-1
-    ).mean(axis=1)
-    return np.asarray(direct - exchanged)
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    across /= np.maximum(lengths, np.finfo(float).tiny)  # (T, 3), unit vectors
+    heights = np.einsum(
+        "tjk,tk->tj", joints, across
+    )  # (T, 27), from the mirror's plane
+    mirrored = joints - 2.0 * heights[..., None] * across[:, None]
+    counterparts = np.array(MIRROR)[_PAIRED]
+    direct = targets[:, _PAIRED] - joints[:, _PAIRED]
+    exchanged = targets[:, _PAIRED] - mirrored[:, counterparts]
+    direct_distances = np.linalg.norm(direct, axis=-1).mean(axis=1)
+    exchanged_distances = np.linalg.norm(exchanged, axis=-1).mean(axis=1)
+    return np.asarray(direct_distances - exchanged_distances)
 
 
 def second_side(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:
-    """Return the probability that left and right of a pose (66,) are exchanged: the weight of poses nearer to it so."""
+    """Return the probability that left and right of a pose (66,) are exchanged.
+
+    It is the weight of the posterior's poses that are nearer to the mirrored pose.
+    """
     reported = np.repeat(skeleton.joints(pose)[None], len(posterior), axis=0)
-    return float(
-        posterior.weights @ nearer_mirrored(skeleton.joints(posterior.poses), reported)
-    )
+    is_exchanged = nearer_mirrored(skeleton.joints(posterior.poses), reported)
+    return float(posterior.weights @ is_exchanged)
 
 
 def unknown_sides(skeleton: Skeleton, posterior: Posterior, pose: Array) -> bool:
-    """Return whether left and right of a pose (66,) are unknown: the other way round is too likely."""
+    """Return whether left and right of a pose (66,) are unknown.
+
+    They are if it is too likely that they are exchanged.
+    """
     model = posterior.recalibration or Recalibration()
     return second_side(skeleton, posterior, pose) >= model.second_side

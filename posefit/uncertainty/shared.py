@@ -1,7 +1,8 @@
-"""What joints of footage are off in all frames alike: the build, joint centres, the calibration, and depth.
+"""Errors of joints that all frames of footage share.
 
-A posterior's samples share these errors with the reported pose. `docs/studies/bodies.py` learned them from 160
-tracks.
+They come from the build, the joint centres, the calibration, and depth. The samples of
+a posterior and the reported pose share them as well, so the samples do not show them.
+`docs/studies/bodies.py` learned them from 160 tracks.
 """
 
 import math
@@ -24,7 +25,8 @@ PARTS: Mapping[str, Sequence[str]] = {  # joints, named after the bones that end
     "head": ("upperneck", "head"),
     "arms": ("humerus", "radius", "wrist", "hand"),
 }
-# Standard deviations of each axis in millimetres, by one camera, by two and by more: about the root, and in the world.
+# Standard deviations along each axis in millimetres, about the root and in the world.
+# The three numbers are by one camera, by two and by more.
 SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "pelvis": ((0, 0, 0), (0, 35, 25)),
     "hips": ((0, 15, 15), (0, 35, 25)),
@@ -34,36 +36,59 @@ SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "head": ((15, 20, 15), (0, 35, 20)),
     "arms": ((0, 25, 30), (0, 50, 40)),
 }
-# of the distance from a camera that is alone, where the person's height is given
+# Standard deviation of the distance from a single camera, as a share, if the person's
+# height is given.
 DEPTH = 0.015
-# of adults' height; a person who is a tenth taller than assumed is a tenth farther away
+# Standard deviation of adults' height, as a share. A person who is a tenth taller than
+# assumed is a tenth farther away.
 STATURE = 0.054
 
 
 def in_footage(model: Recalibration, cameras: int, height_known: bool) -> Recalibration:
-    """Return corrections of what so many cameras show, which are right about the errors of single frames."""
-    depth = 0.0 if cameras > 1 else math.hypot(DEPTH, 0.0 if height_known else STATURE)
-    shared, placed = (shared_spreads(cameras, world) for world in (False, True))
-    spreads = (
-        np.hypot(model.joint_spreads, shared),
-        np.hypot(model.joint_spreads, placed),
-    )
-    return replace(
-        model, joint_spreads=spreads[0], place_spreads=spreads[1], depth=depth
-    )
+    """Return corrections that include the errors shared by all frames of footage.
+
+    Args:
+        model: Corrections of the errors of single frames.
+        cameras: The number of cameras.
+        height_known: Whether the person's height is given.
+
+    Returns:
+        The corrections.
+    """
+    depth = 0.0
+    if cameras < 2:
+        depth = math.hypot(DEPTH, 0.0 if height_known else STATURE)
+    about_root = np.hypot(model.joint_spreads, shared_spreads(cameras))
+    in_world = np.hypot(model.joint_spreads, shared_spreads(cameras, world=True))
+    return replace(model, joint_spreads=about_root, place_spreads=in_world, depth=depth)
+
+
+_PART_OF = {name: part for part, names in PARTS.items() for name in names}
+_PARTS_OF_JOINTS = [_PART_OF[kind(joint)] for joint in JOINTS]
 
 
 def shared_spreads(cameras: int, world: bool = False) -> Array:
-    """Return by how much joints (27,) are off, metres on each axis: about the root, or in the world but for depth."""
-    part_of = {name: part for part, names in PARTS.items() for name in names}
+    """Return the standard deviations (27,) of joints' shared errors, in metres.
+
+    They are along each axis about the root, or in the world without the error of depth.
+    """
     column = min(cameras, 3) - 1
     return np.array(
-        [1e-3 * SHARED_MM[part_of[kind(joint)]][world][column] for joint in JOINTS]
+        [1e-3 * SHARED_MM[part][world][column] for part in _PARTS_OF_JOINTS]
     )
 
 
 def depth_halves(model: Recalibration, camera: Camera, place: Array) -> Array:
-    """Return how far (levels, 1) a root at `place` (3,) may be nearer or farther than a camera alone shows, metres."""
+    """Return how much nearer or farther a root may be than a single camera shows.
+
+    Args:
+        model: The corrections.
+        camera: The camera.
+        place: The estimated place of the root (3,) in metres.
+
+    Returns:
+        The distances (levels, 1) in metres, for each of the `LEVELS`.
+    """
     from scipy.special import ndtri
 
     deviation = model.depth * float(camera.project(place)[1])

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import posefit
+import posefit.cli
 from posefit.cli import main
 from posefit.cli.output import say
 from posefit.errors import InputError
@@ -685,6 +685,35 @@ def test_a_mistake_is_a_traceback_for_who_debugs_and_a_fault_of_the_program_alwa
     fault = ValueError("operands could not be broadcast together")
     monkeypatch.setattr("posefit.tracking.front.track_scene", Mock(side_effect=fault))
     assert type(run("track", "walk", "--frames", "0:1").exception) is ValueError
+
+
+@each(
+    "words, called",
+    [
+        (["track", "walk"], "posefit.tracking.front.track"),
+        (["fit", "walk"], "posefit.tracking.front.fit"),
+        (["extract", "a.mp4", "--out", "a"], "posefit.footage.extract.extract"),
+        (["sweep", "default", "--out", "a"], "posefit.sweep.plan.Plan.of"),
+        (["report", "a"], "posefit.report.write.write_report"),
+        (["suite", "run", "sapso"], "posefit.suites.running.run_on"),
+        (["plugins"], "posefit.cli.inspection.listing"),
+    ],
+)
+def test_ctrl_c_while_a_command_runs_is_one_line_and_a_status(
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    words: list[str],
+    called: str,
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.chdir(tmp_path)
+        patch.setattr(called, Mock(side_effect=KeyboardInterrupt))
+        patch.setattr(sys, "argv", ["posefit", *words])
+        with pytest.raises(SystemExit) as end:
+            posefit.cli.run()
+    assert end.value.code == 130
+    assert "Aborted!" in capfd.readouterr().err.splitlines()
 
 
 def test_ctrl_c_while_posefit_is_imported_is_one_line_and_a_status() -> None:

@@ -153,7 +153,7 @@ def test_the_films_of_each_layout(
             write_cmu,
             "16/notes",
             "",
-            "--activity must be given for films that do not say it, such as",
+            "--activity must be given for films with names that do not state it",
         ),
     ],
 )

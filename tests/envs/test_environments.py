@@ -156,7 +156,7 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
     following = iter(populations)
     made = instance(env.world, 5, 3, 4)
     tracker = SynthesisTracker(
-        made.task, env.world.learned, lambda space, rng: OnePopulation(next(following))
+        made.task, env.world.learned, lambda *_: OnePopulation(next(following))
     )
     frames = list(tracker.track(made.observations, np.random.default_rng(0)))
     poses = []
@@ -195,7 +195,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"prior": "pcb"}, "prior must be one of .* did you mean 'pca'"),
         ({"train": ["wakl"]}, "did you mean 'walk'"),
         ({"split": "dev"}, "split must be one of train, test, got 'dev'"),
-        ({"noise": {"rain": 0.5}}, "noise must be of occluder, .*, got 'rain'"),
+        ({"noise": {"rain": 0.5}}, "noise must be one of occluder, .*, got 'rain'"),
         (
             {"noise": {"holes": 2.0}},
             "noise holes must have a strength of 0 to 1, got 2.0",
@@ -237,7 +237,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"generations": (0, 5)}, "generations must be at least 1, got 0"),
         (
             {"generations": (5, 4)},
-            "generations must be the least and the largest, got 5 and 4",
+            "generations must be the smallest and the largest budget, got 5 and 4",
         ),
     ],
 }
@@ -310,7 +310,8 @@ def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
     other.reset(seed=0)
     size = (env.action_space.shape or ())[0]
     with pytest.warns(
-        UserWarning, match=r"actions must lie in \[-1, 1\], got 3 from 0; it is clipped"
+        UserWarning,
+        match=r"actions must lie in \[-1, 1\], got 3 from 0: actions are clipped",
     ):
         clipped = env.step(np.full(size, 3.0))
     assert data_equivalence(clipped, other.step(np.ones(size)))

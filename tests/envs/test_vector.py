@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium import error
 from gymnasium.utils.env_checker import data_equivalence
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import posefit_envs
 from posefit_envs import to_sb3_vec_env
@@ -236,7 +236,7 @@ def test_by_disabled_the_caller_resets_what_has_ended(name: str) -> None:
     with pytest.raises(error.ResetNeeded, match="the episode has ended"):
         vector.step(actions)
     vector.reset(options={"reset_mask": np.array([True, False, True])})
-    with pytest.raises(error.ResetNeeded, match=r"got \[1\] that have ended"):
+    with pytest.raises(error.ResetNeeded, match=r"ended environments: \[1\]"):
         vector.step(actions)
     vector.reset(options={"reset_mask": np.array([False, True, False])})
     assert not vector.step(actions)[3].any()
@@ -340,6 +340,27 @@ def test_stable_baselines3_gets_the_last_observation_of_an_episode(
     adapted.close()
 
 
+def test_an_attribute_is_set_as_in_gymnasiums_own_vectors() -> None:
+    vector = gym.make_vec("posefit/Race-v0", num_envs=3)
+    plain = SyncVectorEnv([lambda: gym.make("posefit/Race-v0")] * 3)
+    for values in ([1, 2, 3], ("a", "b", "c"), [[1], [2], [3]], 7, "abc", None):
+        for each_vector in (vector, plain):
+            each_vector.set_attr("note", values)
+            assert each_vector.get_attr("note") == vector.get_attr("note")
+    world = vector.get_attr("world")[0]
+    vector.set_attr("world", [world] * 3)
+    assert vector.get_attr("world") == (world,) * 3
+    for name, values, wrong in (
+        ("note", [1, 2], "values must be one for each of the 3 environments, got 2"),
+        ("threads", [1, 2, 3], "threads must be the same in all environments"),
+        ("number", 5, "number must be set by the options of reset"),
+    ):
+        with pytest.raises(error.Error, match=wrong):
+            vector.set_attr(name, values)
+    vector.close()
+    plain.close()
+
+
 def test_stable_baselines3_chooses_environments_by_indices() -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     vector = gym.make_vec("posefit/Race-v0", num_envs=3, render_mode="rgb_array")
@@ -348,6 +369,9 @@ def test_stable_baselines3_chooses_environments_by_indices() -> None:
     assert adapted.get_attr("world", indices=[0, 2]) == [vector.unwrapped.world] * 2  # type: ignore[attr-defined]
     adapted.set_attr("note", "common")
     assert adapted.get_attr("note") == ["common"] * 3
+    # of Stable-Baselines3 a list is one value, which each environment gets
+    adapted.set_attr("note", [1, 2])
+    assert adapted.get_attr("note") == [[1, 2]] * 3
     for call in (
         lambda: adapted.set_attr("note", "own", indices=1),
         lambda: adapted.env_method("close", indices=[1]),

@@ -22,11 +22,11 @@ from posefit.fitting.landmarks import (
     side_odds,
     usually_exchanged,
 )
-from posefit.footage.masks import Views
-from posefit.footage.readers import read_masks
+from posefit.footage.views import Observations
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, MIRROR
 from posefit.motion import built_in
+from tests.footage.conftest import read_masks
 
 WALK = built_in.motion("walk-a", frames=8)
 CAMERA = Camera.around(WALK.translations[3], 1.2, 4.0, (160, 120))
@@ -139,10 +139,10 @@ def test_landmarks_are_read_with_their_masks(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", masks=masks, landmarks=landmarks)
     np.savez(tmp_path / "b.npz", masks=masks)
     given, silent = (read_masks(tmp_path / name, (1, 3)) for name in ("a.npz", "b.npz"))
-    observation = Views([given, silent])[0]
+    observation = Observations([given, silent])[0]
     np.testing.assert_allclose(observation.landmarks[0], landmarks[1])
     assert not observation.landmarks[1].any()
-    assert Views([silent])[0].landmarks is None
+    assert Observations([silent])[0].landmarks is None
     for wrong, message in (
         (landmarks[:2], "landmarks must be of shape"),
         (np.full_like(landmarks, np.nan), "finite"),

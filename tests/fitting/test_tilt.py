@@ -1,6 +1,7 @@
 """The root's pitch and roll: learned with the latents, followed from pose to pose, never a box around upright."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -156,7 +157,8 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     learned = PCA().fit(task.angles)
 
     def tilt(choice: TrackOptions) -> Tilt | None:
-        tracker = prepare(choice, task).build(task)
+        follow: Any = prepare(choice, task).follow
+        tracker = follow.args[0](task)
         assert isinstance(tracker, SynthesisTracker)
         return (
             Predictor(task, learned, tracker.prediction, tracker.tilt)

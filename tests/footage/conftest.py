@@ -13,6 +13,8 @@ import pytest
 
 import posefit
 from posefit.footage import segmentation
+from posefit.footage.source import resolve, views_of_masks
+from posefit.footage.views import Range, View
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.registry import Offer
@@ -81,6 +83,12 @@ def stack(path: Path, masks: Sequence[Any], **more: Any) -> Path:
     """Write masks to an .npz file."""
     np.savez(path, masks=np.stack(masks), **more)
     return path
+
+
+def read_masks(source: Any, frames: Range = ALL, label: int | None = None) -> View:
+    """Return the view of masks as they are read, before they are cleaned."""
+    (view,) = views_of_masks(resolve(source), frames, label)
+    return view
 
 
 @pytest.fixture(scope="session", name="walk")

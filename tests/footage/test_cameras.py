@@ -29,6 +29,7 @@ from tests.footage.conftest import (
     walk,
 )
 from tests.footage.test_footage import toml
+from tests.geometry import programs
 
 AZIMUTHS = (np.pi / 2, 0.6)
 
@@ -98,6 +99,58 @@ def test_the_unit_of_one_camera_is_recognised_by_its_distance(
         "40",
     ]
     assert printed("track", "walk", *words)["guesses"] == list(scene.guesses)
+
+
+@each("unit", [1.0, 0.001, 0.37, 41.0])
+def test_a_scene_that_was_reconstructed_has_the_scale_of_the_person(
+    tmp_path: Path, unit: float
+) -> None:
+    known = [
+        replace(
+            one,
+            scale="free",
+            translation=one.translation / unit,
+            upright=False,
+        )
+        for one in (Calibration.of(camera(a), f"c{a:.1f}") for a in AZIMUTHS)
+    ]
+    scene = scene_of(views(tmp_path), camera=known, up="y", height=1.74)
+    distances = [np.linalg.norm(one.position) for one in scene.cameras]
+    usual = [np.linalg.norm(camera(a).position) for a in AZIMUTHS]
+    if unit in (1.0, 0.001):  # a unit that files have
+        np.testing.assert_allclose(distances, usual, rtol=1e-9)
+        return
+    # the masks are about as tall as the person
+    np.testing.assert_allclose(distances, usual, rtol=0.2)
+    (said,) = [guess for guess in scene.guesses if "by the person's height" in guess]
+    assert said.startswith("the calibration's unit is ")
+
+
+def test_a_file_in_millimetres_by_its_program_needs_no_unit(tmp_path: Path) -> None:
+    path = tmp_path / "a.xcp"
+    path.write_text(programs.vicon())
+    masks = np.zeros((2, 480, 640), dtype=bool)
+    masks[:, 100:400, 280:340] = True
+    scene = scene_of([masks], camera=[path], height=1.7)
+    np.testing.assert_allclose(scene.cameras[0].position, [0, 1, 4], atol=1e-6)
+    assert not [guess for guess in scene.guesses if "calibration is in" in guess]
+    with pytest.raises(
+        ValueError, match="unit must be left out for 'left', whose file"
+    ):
+        scene_of([masks], camera=[path], height=1.7, unit="mm")
+
+
+def test_a_camera_under_the_floor_is_doubted(tmp_path: Path) -> None:
+    path = tmp_path / "left.json"
+    masks = np.zeros((2, 480, 640), dtype=bool)
+    masks[:, 100:400, 280:340] = True
+    for tvec, doubted in (([0.0, 1.0, 4.0], False), ([0.0, -4.0, 1.0], True)):
+        path.write_text(programs.opencv(tvec=tvec))
+        scene = scene_of([masks], camera=[path], height=1.7)
+        said = [
+            guess for guess in scene.guesses if "is its translation its place" in guess
+        ]
+        assert bool(said) == doubted
 
 
 def test_a_height_half_or_twice_the_usual_is_no_other_unit() -> None:

@@ -10,7 +10,6 @@ import pytest
 import posefit
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.extract import extract
-from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
@@ -28,6 +27,7 @@ from tests.footage.conftest import (
     Film,
     encoded,
     iou,
+    read_masks,
     stack,
     truth,
 )
@@ -282,7 +282,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
             {"usable": np.zeros(12, dtype=bool)},
             "expected a frame that is usable, got none from 0 to 12",
         ),
-        ({"fps": np.array(0.0)}, "fps must be a number up to 1000, got 0"),
+        ({"fps": np.array(0.0)}, r"fps must lie in 0.001 to 1e\+06, got 0"),
     ],
 )
 def test_masks_that_contradict_themselves_are_named(
@@ -442,13 +442,8 @@ def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_ther
     filmed: Film, segmenter: Any
 ) -> None:
     segmenter("box", Box)
-    masks = (
-        Segmentation(
-            Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)
-        )
-        .read()
-        .masks
-    )
+    how = Extraction("box", roi=(20, 10, 120, 100))
+    masks, *_ = Segmentation(Video.of(filmed[0]), how, (0, 3)).read()
     assert masks.landmarks is not None
     assert masks.landmarks.shape == (3, len(JOINTS), 3)
     assert not masks.landmarks[0, :, 2].any()
@@ -465,7 +460,7 @@ def test_a_segmenter_gets_the_roi_alone_and_its_masks_and_landmarks_are_put_ther
         Segmentation(Video.of(filmed[0]), how, (0, 3)).read()
 
 
-def test_pictures_are_extracted_and_masks_and_motions_are_not(
+def test_pictures_are_extracted_masks_cleaned_and_motions_drawn(
     filmed: Film, tmp_path: Path
 ) -> None:
     (tmp_path / "film").mkdir()
@@ -475,12 +470,27 @@ def test_pictures_are_extracted_and_masks_and_motions_are_not(
     result = run("extract", tmp_path / "film", *words, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.stderr
     masks = read_masks(tmp_path / "out" / "masks.npz", ALL)
-    assert (masks.first, len(masks)) == (10, 15)
+    assert masks.numbers.tolist() == [*range(10, 25)]
     (tmp_path / "masks").mkdir()
     for k, mask in enumerate(filmed[1][EMPTY : EMPTY + 3]):
         cv2.imwrite(str(tmp_path / "masks" / f"{k}.png"), 255 * mask.astype(np.uint8))
-    for source in (tmp_path / "masks", tmp_path / "out" / "masks.npz"):
-        error = error_of("extract", source, "--out", tmp_path / "new")
-        assert "source must be a film to extract masks from, got" in error
-    with pytest.raises(ValueError, match="source must be one film, got 2"):
+    for name, source in (
+        ("again", tmp_path / "out" / "masks.npz"),
+        ("white", tmp_path / "masks"),
+        ("motion", "walk"),
+    ):
+        words = ["--frames", "11:13"] if name == "again" else ["--frames", "1:3"]
+        done = run("extract", source, *words, "--out", tmp_path / name)
+        assert done.exit_code == 0, done.stderr
+        written = read_masks(tmp_path / name / "masks.npz", ALL)
+        assert written.numbers.tolist() == ([11, 12] if name == "again" else [1, 2])
+        assert (tmp_path / name / "preview.mp4").is_file()
+        assert not (tmp_path / name / "quality.csv").exists()
+    error = error_of(
+        "extract", tmp_path / "masks", "--width", "320", "--out", tmp_path / "new"
+    )
+    assert "width must be given for video only, got 320 for masks" in error
+    with pytest.raises(ValueError, match="extraction must be given for video only"):
+        extract(tmp_path / "masks", tmp_path / "new", Extraction("median"))
+    with pytest.raises(ValueError, match="source must be of one camera, got 2"):
         extract([filmed[0], filmed[0]], tmp_path / "new")

@@ -14,11 +14,10 @@ import pytest
 import posefit
 from posefit.fitting import metrics
 from posefit.footage.extract import extract
-from posefit.footage.masks import Views, undistorted
-from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import CameraMotion, Extraction
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
+from posefit.footage.views import Observations, undistorted
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.rotation import wrapped
 from posefit.progress import Progress
@@ -35,6 +34,7 @@ from tests.footage.conftest import (
     encoded,
     film,
     iou,
+    read_masks,
     stack,
     truth,
     walk,
@@ -136,7 +136,7 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(
         stack(tmp_path / "a.npz", side, usable=usable),
         stack(tmp_path / "b.npz", front),
     ]
-    views = Views([read_masks(path, ALL) for path in paths])
+    views = Observations([read_masks(path, ALL) for path in paths])
     assert [views[k].usable for k in range(6)] == [True] * 6
     assert not views[2].silhouettes[0].valid.any()
     assert views[2].silhouettes[1].valid.all()

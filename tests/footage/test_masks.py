@@ -4,6 +4,7 @@ import json
 import struct
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +14,16 @@ import pytest
 from PIL.PngImagePlugin import PngInfo
 
 from posefit.footage import images
-from posefit.footage.cameras import CameraView, combined
+from posefit.footage.cameras import combined
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import read_image, read_marks
-from posefit.footage.masks import PackedMasks
-from posefit.footage.readers import read_masks
-from posefit.footage.source import body_of, scene_of
+from posefit.footage.readers import Images
+from posefit.footage.source import body_of, resolve, scene_of
+from posefit.footage.views import View
 from posefit.tracking.options import text_person
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.footage.conftest import ALL, NOBODY, SIZE, camera, stack
+from tests.footage.conftest import ALL, NOBODY, SIZE, camera, read_masks, stack
 
 QUICK = [
     "--method",
@@ -45,13 +46,14 @@ def folder(path: Path, images: Sequence[Any], suffix: str = ".png") -> Path:
     return path
 
 
-def read(path: Path, label: int | None = None) -> tuple[PackedMasks, list[str]]:
-    return cleaned(read_masks(path, ALL, label), path, holes=0.0)
+def read(path: Path, label: int | None = None) -> tuple[View, list[str]]:
+    view = cleaned(read_masks(path, ALL, label), holes=0.0)
+    return view, list(view.warnings)
 
 
 def check(
     path: Path, wanted: Sequence[Any], label: int | None = None
-) -> tuple[PackedMasks, list[str]]:
+) -> tuple[View, list[str]]:
     masks, warnings = read(path, label)
     assert len(masks) == len(wanted)
     for k, mask in enumerate(wanted):
@@ -227,7 +229,7 @@ def test_an_edge_between_two_values_is_no_label(
         (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
         (
             ["EMPTY"],
-            "0000.png: expected a mask with a person before a background, got an empty one first, and no other",
+            "empty: expected a mask with a person before a background, got an empty one first, and no other",
         ),
         (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
     ],
@@ -269,7 +271,9 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
             str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8)
         )
     (path / "._mask1.png").write_bytes(b"what a Mac puts beside it")
-    assert [Path(name).name for name in read_masks(path, ALL).names] == [
+    (images,) = resolve(path).places
+    assert isinstance(images, Images)
+    assert [file.name for file in images.files] == [
         f"mask{k}.png" for k in (1, 2, 10, 100)
     ]
 
@@ -339,7 +343,7 @@ def test_of_several_people_the_nearest_to_the_last_one_is_followed(
         np.testing.assert_array_equal(
             followed.silhouette(k).mask, blob(walker[k], tall=64), err_msg=str(k)
         )
-    places = "1 at 40,60 in a.npz[0]; 2 at 100,58 in a.npz[0]"
+    places = "1 at 40,60 in frame 0; 2 at 100,58 in frame 0"
     assert warning.endswith(
         f": 2 people: {places}; person 1 is followed, --person N another"
     )
@@ -364,9 +368,8 @@ def test_who_is_in_the_film_longest_is_followed_or_who_is_chosen(
 ) -> None:
     masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60))] * 2
     path = stack(tmp_path / "a.npz", masks)
-    clean, _ = cleaned(
-        read_masks(path, ALL), path, choice=text_person(*words) if words else None
-    )
+    choice = text_person(*words) if words else None
+    clean = cleaned(read_masks(path, ALL), choice=choice)
     np.testing.assert_array_equal(
         clean.silhouette(0).mask, blob(followed, tall=64 if followed[0] == 40 else 60)
     )
@@ -411,7 +414,7 @@ def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
     path = stack(tmp_path / "a.npz", [holed] * 2)
 
     def filled(holes: float | None) -> Any:
-        return cleaned(read_masks(path, ALL), path, holes)[0].silhouette(0).mask
+        return cleaned(read_masks(path, ALL), holes).silhouette(0).mask
 
     assert filled(None)[51, 51]
     assert not filled(None)[65, 60]
@@ -443,7 +446,7 @@ def test_views_of_videos_end_with_the_shortest(walk: list[Any], tmp_path: Path) 
     views = []
     for name, count in (("a", 6), ("b", 4)):
         masks, _ = read(stack(tmp_path / f"{name}.npz", walk[:count]))
-        views.append(CameraView(masks, [], f"{name}.mp4", filmed=SIZE))
+        views.append(replace(masks, name=f"{name}.mp4", filmed=SIZE))
     scene = combined(
         views,
         "a",
@@ -463,7 +466,7 @@ def test_masks_beyond_the_memory_are_refused(
 ) -> None:
     path = stack(tmp_path / "a.npz", walk)
     monkeypatch.setattr(
-        "posefit.footage.masks.allowed_bytes", lambda: 6 * SIZE[0] * SIZE[1] // 8 - 1
+        "posefit.footage.views.allowed_bytes", lambda: 6 * SIZE[0] * SIZE[1] // 8 - 1
     )
     with pytest.raises(
         ValueError,

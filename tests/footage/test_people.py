@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage.cleaning import people_in
 from posefit.footage.people import People, person_indices, planes_of
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
-from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.pieces import people_in
 from tests.cases import each
 from tests.footage.conftest import EMPTY, NOBODY, film, iou
 
@@ -59,7 +58,8 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     people = People(30.0)
     true = []
     for image, shown, together in crossing(seed):
-        people.add(people_in(Silhouette.of(together)) if together.any() else [], image)
+        blobs = people_in(together, np.ones_like(together))
+        people.add([blob.mask for blob in blobs], image)
         true.append(shown)
     followed, other = people.persons()
     shares = []
@@ -128,7 +128,7 @@ def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followe
     segmenter("one", factory, still_background=False)
     alone = Extraction("one", person=person)
     among = Extraction(background=f"0:{EMPTY}", person=person)
-    masks = Segmentation(video, alone, (None, None), among).read().masks
+    masks, *_ = Segmentation(video, alone, (None, None), among).read()
     shares = np.array(
         [
             [iou(masks.silhouette(k).mask, each) for each in pair]
@@ -194,9 +194,7 @@ def test_parts_that_take_turns_are_no_time_apart() -> None:
     sides[0, 20:100, 20:50] = sides[1, 20:100, 115:145] = True
     # the other part begins in frame 2, thirty frames before the first one ends
     for k in range(50):
-        people.add(
-            people_in(Silhouette.of(sides[int(k % 3 == 2 if k < 32 else k > 32)])), None
-        )
+        people.add([sides[int(k % 3 == 2 if k < 32 else k > 32)]])
     assert [len(person) for person in people.persons()] == [2]
 
 

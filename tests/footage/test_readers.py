@@ -10,11 +10,11 @@ from PIL import Image
 
 from posefit.errors import InputError
 from posefit.footage.cleaning import cleaned
-from posefit.footage.readers import numbered, read_masks
-from posefit.footage.source import kind_of, scene_of, sources_of
+from posefit.footage.readers import numbered
+from posefit.footage.source import resolve, scene_of, sources_of
 from posefit.progress import Progress
 from tests.cases import each
-from tests.footage.conftest import ALL
+from tests.footage.conftest import ALL, read_masks
 
 
 def drawn(walk: list[Any], value: int = 255) -> list[Any]:
@@ -44,10 +44,7 @@ def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) 
     check((tmp_path / name,), walk)
     check(tmp_path, walk)
     masks = read_masks((tmp_path / name,), (2, 4))
-    assert [Path(path).name for path in masks.names] == [
-        f"{name}, page 2",
-        f"{name}, page 3",
-    ]
+    assert masks.numbers.tolist() == [2, 3]
     np.testing.assert_array_equal(masks.silhouette(1).mask, walk[3])
 
 
@@ -74,7 +71,7 @@ def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(
         image.save(tmp_path / f"{k:03}{suffix}")
     wanted = [read_by_pillow(tmp_path / f"{k:03}{suffix}") for k in range(len(walk))]
     check(tmp_path, wanted)
-    assert kind_of(tmp_path) == "masks"
+    assert resolve(tmp_path).medium == "masks"
 
 
 def test_an_animated_png_is_refused(walk: list[Any], tmp_path: Path) -> None:
@@ -113,8 +110,8 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
         f"{tmp_path}: 3 of the frames 7 to 15 are missing, and are held"
     ]
     assert len(read_masks(tmp_path, (3, 7))) == 4
-    clean, warnings = cleaned(masks, tmp_path)
-    assert (clean.usable.tolist(), warnings) == (masks.usable.tolist(), [])
+    clean = cleaned(masks)
+    assert (clean.usable.tolist(), clean.warnings) == (masks.usable.tolist(), [])
     messages: list[str] = []
     scene = scene_of([tmp_path], Progress(messages.append))
     assert (scene.count, scene.observations[2].usable) == (9, False)
@@ -252,6 +249,18 @@ def test_logits_are_cut_at_zero_and_degrees_half_way(
         np.save(tmp_path / "a.npy", degrees)
         (guess,) = check(tmp_path / "a.npy", list(degrees > threshold))
         assert guess.endswith(f"are degrees: the person is above {threshold:g}")
+
+
+@each("kind", [np.uint8, np.int32, np.float32])
+@each("most", [100.0, 80.0])
+def test_percentages_are_cut_at_fifty(
+    walk: list[Any], tmp_path: Path, kind: Any, most: float
+) -> None:
+    soft = [cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) for mask in walk]
+    percentages = (most * np.stack(soft)).astype(kind)
+    np.save(tmp_path / "a.npy", percentages)
+    (guess,) = check(tmp_path / "a.npy", list(percentages > 50.0))
+    assert guess.endswith("are percentages: the person is above 50")
 
 
 def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) -> None:

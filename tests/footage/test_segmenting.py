@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from posefit.errors import InputError
+from posefit.errors import InputError, NoPersonError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage import source
 from posefit.footage.cameras import yaws_of
@@ -19,11 +19,11 @@ from posefit.footage.quality import FrameQuality, Verdict, moved_pixels, verdict
 from posefit.footage.segmentation import (
     Extraction,
     Segmentation,
-    Segmented,
     facings_on_the_spot,
 )
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
+from posefit.footage.views import View
 from posefit.geometry.camera import Camera
 from posefit.progress import QUIET
 from posefit.registry import Registry, registry
@@ -54,9 +54,9 @@ def films(
 
 def segmented(
     path: Path, how: Extraction, frames: Any = (None, None)
-) -> tuple[Segmented, list[Any]]:
-    result = Segmentation(Video.of(path), how, frames).read()
-    return result, [result.masks.silhouette(k).mask for k in range(len(result.masks))]
+) -> tuple[View, list[Any]]:
+    view, *_ = Segmentation(Video.of(path), how, frames).read()
+    return view, [view.silhouette(k).mask for k in range(len(view))]
 
 
 def overlap(masks: list[Any], true: list[Any]) -> float:
@@ -147,9 +147,9 @@ def test_with_an_empty_picture_the_person_is_segmented_whatever_they_do(
         path, Extraction(background=str(path.with_name("empty.png")))
     )
     assert overlap(masks, true) > 0.8
-    assert segmentation.verdict is None
+    assert not segmentation.doubt
     # of 60; a person who leaves is not whole in the last 11
-    assert segmentation.masks.usable.sum() >= 49
+    assert segmentation.usable.sum() >= 49
 
 
 @each("method", ["mixture", "median"])
@@ -160,7 +160,7 @@ def test_a_person_who_passes_by_causes_no_warning(
     segmentation, masks = segmented(path, Extraction(method))
     assert overlap(masks, true) > 0.8
     assert segmentation.warnings == []
-    assert segmentation.masks.usable.sum() > 55
+    assert segmentation.usable.sum() > 55
 
 
 @mediapipe
@@ -169,7 +169,7 @@ def test_mediapipe_needs_no_background(films: dict[str, Any], kind: Kind) -> Non
     path, true = films[kind]
     segmentation, masks = segmented(path, Extraction("mediapipe"))
     assert overlap(masks, true) > 0.85
-    assert segmentation.verdict is None
+    assert not segmentation.doubt
 
 
 @pytest.mark.slow
@@ -181,7 +181,7 @@ def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_i
     jumper = ((380, 0, 600, 450), (0, 160))
     segmentation, masks = segmented(DEMO, Extraction(roi=walker[0]), walker[1])
     assert segmentation.warnings == []
-    assert segmentation.masks.usable.sum() >= 110
+    assert segmentation.usable.sum() >= 110
     assert (
         segmented(DEMO, Extraction("median", roi=walker[0]), walker[1])[0].warnings
         == []
@@ -206,8 +206,8 @@ def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_i
         segmentation, _ = segmented(
             DEMO, Extraction("mediapipe", roi=jumper[0]), jumper[1]
         )
-        assert segmentation.verdict is None
-        assert segmentation.masks.usable.sum() > 150
+        assert not segmentation.doubt
+        assert segmentation.usable.sum() > 150
 
 
 def figure(shift: int = 0, tall: int = 60, wide: int = 22) -> tuple[Any, Any]:
@@ -268,8 +268,8 @@ def test_before_a_camera_that_pans_masks_that_need_no_still_background_are_usabl
     for still, usable in ((True, 1), (False, 24)):  # of the first there is none before
         segmenter("network", Network, still_background=still)
         segmentation, _ = segmented(path, Extraction("network"))
-        assert segmentation.masks.usable.sum() == usable
-        assert segmentation.camera_moves
+        assert segmentation.usable.sum() == usable
+        assert segmentation.moves
         assert any("outside" in text for text in segmentation.warnings) == still
 
 
@@ -553,16 +553,44 @@ def test_the_way_that_is_doubted_least_takes_the_person_out(
 ) -> None:
     ways = [SimpleNamespace(name=name) for name in ("first", "second")]
     how = SimpleNamespace(ways=lambda cameras: ways)
-    results = iter(
-        (None if doubt is not None and doubt.refused else Taken(way.name), doubt)
-        for way, doubt in zip(ways, doubts, strict=False)
-    )
+    results = iter(zip(ways, doubts, strict=False))
+
+    def taken_out(*_: Any) -> Any:
+        way, doubt = next(results)
+        if doubt is not None and doubt.refused:
+            raise NoPersonError(doubt.text)
+        return [SimpleNamespace(name=way.name, doubt="" if doubt is None else "jumpy")]
+
     monkeypatch.setattr(source, "Segmentation", lambda *_: None)
-    monkeypatch.setattr(source, "_taken_out", lambda *_: next(results))
-    taken = source._filmed([None], [], how, (None, None), QUIET, None)
+    monkeypatch.setattr(source, "_taken_out", taken_out)
+    taken = source._of_films(
+        [None],
+        [],
+        how,
+        (None, None),
+        QUIET,
+        lambda views: Taken(views[0].name),
+    )
     assert taken.name == used
     assert bool(taken.warnings) == (used == "second")
     assert next(results, None) is None  # all that had to be tried were
+
+
+def test_only_masks_without_the_person_have_another_way_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    how = SimpleNamespace(ways=lambda cameras: [SimpleNamespace(name="a")] * 2)
+    tried = []
+
+    def taken_out(*_: Any) -> Any:
+        tried.append(None)
+        raise InputError("frames of another size")
+
+    monkeypatch.setattr(source, "Segmentation", lambda *_: None)
+    monkeypatch.setattr(source, "_taken_out", taken_out)
+    with pytest.raises(InputError, match="of another size"):
+        source._of_films([None], [], how, (None, None), QUIET, None)
+    assert len(tried) == 1
 
 
 @each(

@@ -98,13 +98,13 @@ def test_more_than_the_memory_holds_is_refused_before_a_motion_is_made(
         clips_of_sources, "allowed_bytes", lambda: 3 * poses * POSE_BYTES
     )
     assert len(training_motions(clips[:1], 120.0)) == 1
-    message = f"the 0.6 GB of memory that there may be, got 0.8 GB for {4 * poses:,} poses at 120 frames a second"
+    message = f"the 0.6 GB of memory that posefit may use, got 0.8 GB for {4 * poses:,} poses at 120 frames a second"
     with pytest.raises(ValueError, match=message):
         training_motions(clips, 120.0)
     monkeypatch.setattr(clips_of_sources, "allowed_bytes", lambda: 100_000_000)
     error = error_of("track", "walk", "--train", "library")
     assert error.startswith(
-        "posefit: train must take at most the 0.1 GB of memory that there may be, got 0.1 GB"
+        "posefit: train must take at most the 0.1 GB of memory that posefit may use, got 0.1 GB"
     )
 
 

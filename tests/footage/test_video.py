@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from posefit.files import opencv_name
-from posefit.footage.source import kind_of, scene_of
+from posefit.footage.source import resolve, scene_of
 from posefit.footage.video import Video, _rate
 from tests.cases import each
 from tests.commands import error_of
@@ -147,9 +147,9 @@ def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:
 def test_pictures_are_a_film(filmed: Film, tmp_path: Path, suffix: str) -> None:
     path, masks = filmed
     folder = written(tmp_path / "a", path, suffix, list(range(len(masks))))
-    assert kind_of(folder) == "pictures"
+    assert resolve(folder).medium == "pictures"
     # a single one, which is refused there
-    assert kind_of((folder / f"frame0{suffix}",)) == "masks"
+    assert resolve(folder / f"frame0{suffix}").medium == "masks"
     scene, other = (
         scene_of([source], fps=fps) for source, fps in ((folder, 25.0), (path, None))
     )

@@ -20,6 +20,7 @@ from posefit.silhouette.cost import project
 from tests.footage.matroska import write_matroska
 from tests.fuzz.written import written
 from tests.geometry.calibrations import EXTRI, KINDS, QUALISYS, TOML, opencv
+from tests.geometry.programs import SAMPLES
 from tests.geometry.turns import about
 from tests.motion.rigs import STYLES, write_rig
 
@@ -124,6 +125,7 @@ def corpus(folder: Path) -> list[Seed]:
         (Path(name).suffix, text + EXTRI.partition("---")[2] * (name == "intri.yml"))
         for name, text in KINDS.items()
     ]
+    texts += [(suffix, write()) for write, suffix, _ in SAMPLES.values()]
     texts += [
         (suffix, opencv(folder / f"calibration{suffix}").read_text())
         for suffix in (".yml", ".json", ".xml")

@@ -30,9 +30,9 @@ LONGEST = 400  # characters of a message
 
 def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     """Return what reads each kind of file, as far as a user's file goes before anything is searched."""
-    from posefit.footage.masks import Views
-    from posefit.footage.readers import read_masks
+    from posefit.footage.source import resolve, views_of_masks
     from posefit.footage.video import Video
+    from posefit.footage.views import Observations
     from posefit.geometry.calibration import read_calibrations, upright
     from posefit.motion.amc import read_amc
     from posefit.motion.asf import parse_asf
@@ -43,14 +43,14 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     plan.MAX_CELLS = CELLS
 
     def masks(path: Path) -> object:
-        views = Views([read_masks(path, (None, None))])
+        views = Observations(views_of_masks(resolve(path)))
         return [views[k] for k in range(min(len(views), 3))]
 
     def images(path: Path) -> object:
         room = path.parent / f"{NAME}-folder"
         room.mkdir()
         shutil.copy(path, room)
-        return [one.silhouettes for one in Views([read_masks(room, (None, None))])]
+        return [one.silhouettes for one in Observations(views_of_masks(resolve(room)))]
 
     def calibration(path: Path) -> object:
         cameras = read_calibrations(path)

@@ -1,10 +1,11 @@
 """The kinds of source: how the same small footage, or motion, is written as each of them.
 
 A line of `MASKS` is a function of a folder and masks (T, H, W), one of `FILMS` of a folder and pictures (T, H, W, 3), and
-one of `MOTIONS` of a folder and a motion. Each returns what `posefit.track` takes.
+one of `MOTIONS` of a folder and a motion. Each returns what `posefit.track` takes. One of `STREAMS` is a function of
+masks and pictures, and returns the frames that come.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 from PIL import Image
 
 import posefit
+from posefit.footage.live import LiveImage
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
@@ -167,6 +169,10 @@ FILMS: dict[str, Written] = {
     "folder of pictures": _folder,
     "list of pictures": _images,
     "list of lists of pictures": lambda folder, images: [_images(folder, images)],
+    # OpenCV has blue first, and Pillow red
+    ".tif of pictures": lambda folder, images: _pages(
+        folder, images[..., ::-1], ".tif"
+    ),
 }
 
 
@@ -188,3 +194,25 @@ MOTIONS: dict[str, Written] = {
     ".amc": _amc,
     ".bvh": _bvh,
 }
+# motions that have a name, and no file of the user's
+NAMED = {"built in": "walk", "library clip": "16_15"}
+
+STREAMS: dict[str, Callable[[Any, Any], Sequence[Any]]] = {
+    "masks": lambda shown, images: _white(shown),
+    "pictures": lambda shown, images: list(images),
+}
+
+
+class Stream:
+    """Frames of a stream, every `step`th of which is taken, as a slow tracker takes them."""
+
+    def __init__(self, frames: Sequence[Any], step: int) -> None:
+        self.name = "-"
+        self.fps = FPS
+        self.rate = FPS
+        self._frames = frames
+        self._step = step
+
+    def __iter__(self) -> Iterator[LiveImage]:
+        for number in range(0, len(self._frames), self._step):
+            yield LiveImage(number, 100.0 + number / FPS, self._frames[number])

@@ -10,9 +10,12 @@ import pytest
 
 import posefit
 from posefit.footage.extract import extract
+from posefit.footage.live import live_views
+from posefit.footage.readers import read_array
 from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
-from posefit.footage.source import scene_of, sources_of
+from posefit.footage.source import KINDS, Kind, resolve, scene_of, views_of_masks
+from posefit.footage.views import View, joined
 from posefit.progress import QUIET
 from tests.laws.sources import (
     COUNT,
@@ -20,7 +23,11 @@ from tests.laws.sources import (
     FPS,
     MASKS,
     MOTIONS,
+    NAMED,
     QUICK,
+    SIZE,
+    STREAMS,
+    Stream,
     background,
     camera,
     masks,
@@ -33,7 +40,7 @@ START, STOP = 2, 6
 
 def seen(source: Any, **options: Any) -> Scene:
     """Return what a tracker gets of a source."""
-    return scene_of(sources_of(source), **options)
+    return scene_of(source, **options)
 
 
 def check_numbered(scene: Scene, start: int, stop: int) -> None:
@@ -129,19 +136,113 @@ def test_motions_keep_their_numbers_and_a_cut_is_that_of_the_source(
     np.testing.assert_allclose(chosen.truth.joints, cut.truth.joints, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", ["walk", "16_15"])
+@pytest.mark.parametrize("name", NAMED)
 def test_named_motions_keep_their_numbers(name: str) -> None:
-    check_numbered(seen(name, frames=(START, STOP), fps=FPS), START, STOP)
+    check_numbered(seen(NAMED[name], frames=(START, STOP), fps=FPS), START, STOP)
 
 
-def test_every_file_of_a_track_has_the_numbers_and_times_of_the_footage(
-    tmp_path: Path,
+@pytest.mark.parametrize("kind", STREAMS)
+@pytest.mark.parametrize("step", [1, 3])
+def test_frames_of_a_stream_keep_their_numbers_and_times(
+    kind: str, step: int, how: Extraction
 ) -> None:
-    source = MASKS["folder"](tmp_path / "masks", masks())
-    how: dict[str, Any] = {**QUICK, "camera": camera(), "fps": FPS, "progress": QUIET}
-    posefit.track(source, frames=(START, STOP), out=tmp_path / "out", **how)
-    fitted = posefit.fit(source, frame=5, **how)
-    assert fitted.track.to_pandas()["frame"].tolist() == [5]
+    frames = STREAMS[kind](masks(), pictures(masks()))
+    views = [*live_views(Stream(frames, step), how, print)]  # type: ignore[arg-type]
+    view = joined(views)
+    numbers = np.arange(0, COUNT, step)
+    assert view.numbers.tolist() == numbers.tolist()
+    np.testing.assert_allclose(view.times, 100.0 + numbers / FPS)
+    if kind == "masks":
+        for k, number in enumerate(numbers.tolist()):
+            np.testing.assert_array_equal(view.silhouette(k).mask, masks()[number])
+
+
+@pytest.mark.parametrize("kind", MASKS)
+def test_the_view_of_masks_has_their_numbers_times_and_bits_and_is_read_only(
+    tmp_path: Path, kind: str
+) -> None:
+    source = resolve(MASKS[kind](tmp_path, masks()))
+    (view,) = views_of_masks(source, (START, STOP), fps=FPS)
+    numbers = np.arange(START, STOP)
+    assert (view.numbers.tolist(), len(view)) == (numbers.tolist(), STOP - START)
+    np.testing.assert_allclose(view.times, numbers / FPS)
+    for k, number in enumerate(numbers.tolist()):
+        np.testing.assert_array_equal(view.silhouette(k).mask, masks()[number])
+    for array in (view.bits, view.usable, view.numbers, view.times):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
+@pytest.mark.parametrize("kind", MASKS)
+def test_mirrored_masks_are_the_mirrored_view(tmp_path: Path, kind: str) -> None:
+    source = MASKS[kind](tmp_path / "a", masks())
+    mirrored = MASKS[kind](tmp_path / "b", masks()[..., ::-1])
+    pairs = zip(
+        seen(source, fps=FPS).observations,
+        seen(mirrored, fps=FPS).observations,
+        strict=True,
+    )
+    for one, other in pairs:
+        assert one.usable == other.usable
+        mask = one.silhouettes[0].mask[:, ::-1]
+        np.testing.assert_array_equal(mask, other.silhouettes[0].mask)
+
+
+@pytest.mark.parametrize("kind", [*MASKS, *MOTIONS, *NAMED])
+def test_what_is_extracted_of_masks_and_motions_shows_what_they_show(
+    tmp_path: Path, kind: str
+) -> None:
+    if kind in MASKS:
+        source = MASKS[kind](tmp_path / "in", masks())
+    else:
+        source = MOTIONS[kind](tmp_path, walk()) if kind in MOTIONS else NAMED[kind]
+    extract(source, tmp_path / "out", frames=(START, STOP))
+    later = seen(tmp_path / "out" / "masks.npz", holes=None if kind in MASKS else 0.0)
+    assert (later.first, later.count) == (START, STOP - START)
+    once = seen(source, frames=(START, STOP))
+    for one, other in zip(later.observations, once.observations, strict=True):
+        assert one.usable == other.usable
+        mask = one.silhouettes[0].mask
+        np.testing.assert_array_equal(mask, other.silhouettes[0].mask)
+
+
+def test_a_kind_of_source_is_a_line_of_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "walk.masks"
+    path.write_bytes(np.packbits(masks()).tobytes())
+
+    def read(path: Path, *how: Any) -> View:
+        bits = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+        pixels = np.unpackbits(bits).reshape(-1, SIZE[1], SIZE[0])
+        return read_array(pixels, *how)
+
+    line = Kind("masks", lambda place: str(place).endswith(".masks"), view=read)
+    monkeypatch.setattr("posefit.footage.source.KINDS", (line, *KINDS))
+    check_numbered(seen(path, frames=(START, STOP), fps=FPS), START, STOP)
+    check_alike(seen(path, fps=FPS), seen(masks(), fps=FPS))
+
+
+@pytest.mark.parametrize("kind", [*MASKS, *FILMS, *MOTIONS, *NAMED])
+def test_every_file_of_a_track_has_the_numbers_and_times_of_the_footage(
+    tmp_path: Path, kind: str, how: Extraction
+) -> None:
+    options: dict[str, Any] = {**QUICK, "fps": FPS, "progress": QUIET}
+    options["frames"] = (START, STOP)
+    if kind in MASKS:
+        source = MASKS[kind](tmp_path / "in", masks())
+    elif kind in FILMS:
+        source = FILMS[kind](tmp_path / "in", pictures(masks()))
+        options |= {"extraction": how}
+        if "pictures" not in kind:
+            del options["fps"]
+    else:
+        source = MOTIONS[kind](tmp_path, walk()) if kind in MOTIONS else NAMED[kind]
+    if kind == ".amc":
+        options["rate"] = FPS
+    if kind not in NAMED:
+        options["camera"] = camera()
+    posefit.track(source, out=tmp_path / "out", **options)
     numbers = np.arange(START, STOP)
     for name in ("frames.csv", "angles.csv"):
         with (tmp_path / "out" / name).open(newline="") as file:
@@ -158,6 +259,13 @@ def test_every_file_of_a_track_has_the_numbers_and_times_of_the_footage(
         rows = [row for row in rows if not row[0].startswith("X")]
         times = [float(row[1 if name == "track.trc" else 0]) for row in rows]
         np.testing.assert_allclose(times, numbers / FPS, atol=1e-5)
+
+
+def test_a_pose_of_one_frame_has_its_number(tmp_path: Path) -> None:
+    source = MASKS["folder"](tmp_path / "masks", masks())
+    how: dict[str, Any] = {**QUICK, "camera": camera(), "fps": FPS, "progress": QUIET}
+    fitted = posefit.fit(source, frame=5, **how)
+    assert fitted.track.to_pandas()["frame"].tolist() == [5]
 
 
 VIEWS = (1.2, 2.4)

@@ -8,7 +8,7 @@ import csv
 import errno
 import json
 import struct
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -22,6 +22,7 @@ import posefit
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.evaluation.errors import evaluated, unseen
+from posefit.evaluation.measures import Effort
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage import video
 from posefit.footage.extract import extract
@@ -36,7 +37,7 @@ from posefit.measuring.gait import gait_of
 from posefit.motion import built_in
 from posefit.output import files
 from posefit.output.content import Setup, TrackingLog
-from posefit.output.files import FILES
+from posefit.output.files import FILES, WRITERS, chosen_kinds
 from posefit.output.folder import OutputFolder
 from posefit.output.picture import Painter
 from posefit.progress import QUIET
@@ -110,7 +111,7 @@ def track_of(case: Case) -> Track:
         placing="given",
         first=case.first,
     )
-    table, measures = evaluated(scene, frames, None, None, BETA, np.ones(2))
+    table, measures = evaluated(scene, frames, None, None, BETA, Effort(1.0, 1.0))
     setup = Setup(
         motion=scene.name,
         method="by hand",
@@ -146,15 +147,17 @@ def track_of(case: Case) -> Track:
     return Track(motion, frames, table, measures, None, gait, setup, log, [], scene)
 
 
-def written(case: Case, folder: Path) -> Track:
-    """Return a track whose files were all written to a folder."""
+def written(case: Case, folder: Path, write: str | Sequence[str] = ()) -> Track:
+    """Return a track whose files, all by default, were written to a folder."""
     track = track_of(case)
     messages: list[str] = []
-    with OutputFolder(folder, False, False, {}, messages.append) as output:
+    kinds = chosen_kinds(write)
+    with OutputFolder(folder, False, False, {}, messages.append, kinds) as output:
         output.begin(track.scene)
         output.finish(track.content)
     assert messages == []
-    assert {path.name for path in folder.iterdir()} == set(FILES)
+    expected = {WRITERS[kind][0] for kind in kinds} if write else set(FILES)
+    assert {path.name for path in folder.iterdir()} == expected
     return track
 
 
@@ -485,7 +488,93 @@ def test_footage_that_is_gone_after_the_work_costs_no_picture(tmp_path: Path) ->
     capture.release()
 
 
-def test_a_disk_without_room_for_the_video_keeps_the_frames_and_resuming_writes_all(
+def test_each_file_is_written_alone_as_it_is_among_all(tmp_path: Path) -> None:
+    case = Case(count=2, first=7, cameras=2, held=(1,))
+    written(case, tmp_path / "all")
+    for kind, (name, _) in WRITERS.items():
+        written(case, tmp_path / kind, kind)
+        alone = tmp_path / kind / name
+        together = tmp_path / "all" / name
+        if kind in ("npz", "glb", "html"):  # archives and pages of many parts
+            assert alone.stat().st_size == pytest.approx(
+                together.stat().st_size, rel=0.01
+            )
+        else:
+            assert alone.read_bytes() == together.read_bytes(), name
+
+
+@each(
+    ("write", "kinds"),
+    [
+        ((), tuple(WRITERS)),
+        ("", tuple(WRITERS)),
+        ("trc,bvh", ("bvh", "trc", "summary")),
+        ("trc, track.bvh,", ("bvh", "trc", "summary")),
+        (["trc", "bvh"], ("bvh", "trc", "summary")),
+        (("frames.csv",), ("frames", "summary")),
+        ("summary", ("summary",)),
+    ],
+)
+def test_files_are_chosen_by_their_kinds_or_names(write: Any, kinds: Any) -> None:
+    assert chosen_kinds(write) == kinds
+
+
+@each(
+    ("write", "message"),
+    [
+        ("bvh,fbx", "write must be some of npz, asf, .*, html, got 'fbx'"),
+        (["tracks.bvh"], "got 'tracks.bvh'; did you mean 'track.bvh'"),
+        ([3], "write must be names of files, got"),
+        ("bvh", "write must be given with out, the folder of the track, got none"),
+    ],
+)
+def test_a_file_that_is_not_known_is_named_before_the_work(
+    write: Any, message: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("posefit.tracking.front.scene_of", None)
+    out = {} if "given with" in message else {"out": tmp_path / "out"}
+    with pytest.raises(InputError, match=message):
+        posefit.track("walk", write=write, progress=QUIET, **out)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_chosen_file_costs_no_look_at_the_footage(tmp_path: Path) -> None:
+    def pictures() -> Iterator[Any]:
+        raise AssertionError("decoded")
+        yield
+
+    track = track_of(Case())
+    scene = replace(track.scene, pictures=pictures)
+    kinds = chosen_kinds("bvh")
+    content = replace(track, scene=scene).content
+    assert files.write_files(tmp_path, content, kinds) == []
+
+
+@each(
+    ("owner", "name"),
+    [(VideoWriter, "close"), (VideoWriter, "write"), (files, "_write_png")],
+)
+def test_a_disk_without_room_for_a_picture_costs_no_poses(
+    owner: Any, name: str, tmp_path: Path
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    messages: list[str] = []
+    track = track_of(Case())
+    with (
+        OutputFolder(tmp_path / "out", False, False, {}, messages.append) as output,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        patch.setattr(owner, name, full)
+        output.finish(track.content)
+    missing = "overlay.mp4" if owner is VideoWriter else "summary.png"
+    assert messages == [f"warning: {missing} is missing: No space left on device"]
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {*FILES} - {missing}
+
+
+def test_a_disk_without_room_for_the_poses_keeps_the_frames_and_resuming_writes_all(
     tmp_path: Path,
 ) -> None:
     options: dict[str, Any] = {
@@ -497,17 +586,12 @@ def test_a_disk_without_room_for_the_video_keeps_the_frames_and_resuming_writes_
         "progress": QUIET,
     }
     out = tmp_path / "out"
-    closed: list[VideoWriter] = []
-    close = VideoWriter.close
 
-    def full(video: VideoWriter) -> None:
-        closed.append(video)
-        close(video)
-        if len(closed) == 2:  # the first is tried before the work
-            raise OSError(errno.ENOSPC, "No space left on device")
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(VideoWriter, "close", full)
+        patch.setattr(np, "savez_compressed", full)
         with pytest.raises(InputError, match="2 finished frames are kept"):
             posefit.track("walk", out=out, **options)
     assert not out.exists()

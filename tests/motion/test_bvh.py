@@ -112,7 +112,7 @@ def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None
         (
             "CHANNELS 6",
             "CHANNELS 5",
-            "expected a count of at most 6 channels, and these",
+            "expected a number of at most 6 channels, and these channels",
         ),
         (
             "ROOT Hips\n{",

@@ -48,13 +48,11 @@ def test_limits_widen_where_a_training_pose_passes_them_or_are_the_training_rang
 def test_a_skeleton_without_limits_is_named() -> None:
     average = built_in.average_skeleton()
     bare = Skeleton("bare", average.offsets, average.axes, average.channels)
-    rule = (
-        "limits must be training where the skeleton states no joint limits, got asf and"
-    )
+    rule = "limits must be training if the skeleton states no joint limits, got asf and"
     for skeleton, name in ((bare, "bare"), (None, "no skeleton")):
         with pytest.raises(ValueError, match=f"{rule} {name}"):
             Full().fit(angles("walk-a"), skeleton)
-    with pytest.raises(ValueError, match="angles must differ somewhere"):
+    with pytest.raises(ValueError, match="angles must differ between frames"):
         Full(limits="training").fit(np.zeros((5, 63)))
 
 
@@ -140,7 +138,7 @@ def test_mistakes_in_settings_are_named() -> None:
         (
             Transformed,
             {"options": '{"gama": 1}'},
-            "options of KernelPCA must be of alpha, .*, got gama",
+            "options of KernelPCA must be among alpha, .*, got gama",
         ),
     ):
         with pytest.raises(ValueError, match=message):

@@ -9,10 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from posefit.sweep.cell import CellResult, TrackCell, cell_from, packed_joints
+from posefit.sweep.cell import TrackCell, cell_from
 from posefit.sweep.ledger import FILE, Writer
 from tests.commands import run
 
@@ -73,16 +72,7 @@ def opened(
         context.close()
 
 
-def result(cell: TrackCell, error: float, **more: Any) -> CellResult:
-    """Return a result as large as a real one; of four frames, each joint wrong by the error in centimetres."""
-    truth = np.random.default_rng(cell.instance).normal(0.0, 0.3, (4, 27, 3))
-    return CellResult(
-        row_of(cell, error, **more),
-        packed_joints(truth=truth, estimate=truth + 0.01 * error),
-    )
-
-
-def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
+def result(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
     """Return a row as large as a real one, with that error in degrees."""
     skill = dict.fromkeys(("mean_pose", "persistence", "nearest"), 1.0 - error / 4.0)
     return {
@@ -154,14 +144,14 @@ def sure(
 
 def ledger(
     path: Path,
-    results: Iterable[CellResult],
+    rows: Iterable[dict[str, Any]],
     failures: Iterable[tuple[TrackCell, list[str]]] = (),
 ) -> Path:
-    """Write a ledger of results and of cells in quarantine with their reasons."""
+    """Write a ledger of finished rows and of cells in quarantine with their reasons."""
     with Writer(path / FILE) as writer, writer.transaction():
-        for done in results:
-            writer.add(cell_from(done.row["spec"]))
-            writer.finish(done.row["key"], done)
+        for row in rows:
+            writer.add(cell_from(row["spec"]))
+            writer.finish(row["key"], row)
         for cell, reasons in failures:
             writer.add(cell)
             lost = "UPDATE cells SET status = 'quarantined', faults = ? WHERE key = ?"

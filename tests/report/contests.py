@@ -9,7 +9,6 @@ from posefit.report.kind import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.runs import runs_of
 from posefit.report.summary import leader_sentences
-from posefit.sweep.cell import CellResult
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
 from tests.sweep.fake import cells
@@ -31,11 +30,11 @@ def contest_in(path: Path) -> Contest:
     return contest
 
 
-def contest_of_results(path: Path, results: Iterable[CellResult]) -> Contest:
+def contest_of_results(path: Path, results: Iterable[dict[str, Any]]) -> Contest:
     return contest_in(ledger(path / "results", results))
 
 
-def results_of(errors: Errors) -> list[CellResult]:
+def results_of(errors: Errors) -> list[dict[str, Any]]:
     return [
         result(replace(FIRST, method=m, instance=i, seed=s), error)
         for (m, i, s), error in errors.items()

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from posefit.sweep.cell import CellResult, SearchCell
+from posefit.sweep.cell import SearchCell
 from tests.report.browser import ledger
 
 BUDGET = 100  # evaluations for each dimension
@@ -29,7 +29,7 @@ def cell(
     )
 
 
-def search_result(cell: SearchCell, targets: int) -> CellResult:
+def search_result(cell: SearchCell, targets: int) -> dict[str, Any]:
     """Return the result of a search that reaches so many of 29 targets above 0: one each ten evaluations."""
     costs = [40.0, *(2.0 ** (5.0 - k / 4.0) for k in range(targets))]
     used = [1, *(10 * (k + 1) for k in range(targets))]
@@ -52,7 +52,7 @@ def search_result(cell: SearchCell, targets: int) -> CellResult:
         },
         "trace": {"evaluations": used, "cost": costs},
     }
-    return CellResult(row, b"")
+    return row
 
 
 def searched(

@@ -17,7 +17,7 @@ CELL = replace(FIRST, method="random@pca", frames=3, size=(80, 60), evaluations=
 @pytest.fixture(scope="module")
 def row():
     """Return the row of a method that has a posterior."""
-    return run_cell(replace(CELL, method="exemplars", evaluations=800)).row
+    return run_cell(replace(CELL, method="exemplars", evaluations=800))
 
 
 def test_every_figure_has_its_place_in_a_row(row):
@@ -46,5 +46,5 @@ def test_a_row_has_how_often_the_likeliest_mode_was_right(row):
     assert sum(counts) == 3
     assert all(0.0 < probability <= 1.0 for probability in probabilities)
     assert all(0.0 <= share <= 1.0 for share in right)
-    without = run_cell(replace(CELL, frames=2)).row
+    without = run_cell(replace(CELL, frames=2))
     assert (without["mode_reliability"], without["interval_mm"]) == ([], None)

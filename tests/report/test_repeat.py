@@ -90,7 +90,7 @@ def test_the_command_runs_the_row_again(tmp_path: Path) -> None:
         words, cwd=tmp_path, env=environment, check=True, capture_output=True
     )
     (row,) = rows_in(tmp_path / "rerun")
-    expected = run_cell(cell).row
+    expected = run_cell(cell)
     for name in ("seconds", "seconds_per_frame", "cpu_seconds_per_frame"):
         row.pop(name), expected.pop(name)
     assert row == expected
@@ -120,7 +120,7 @@ def test_nothing_in_a_name_ends_the_plan_or_reaches_the_shell() -> None:
 def test_a_row_is_run_again_by_the_first_digits_of_its_key(tmp_path: Path) -> None:
     made = [run_cell(cell_of(SMALL | spec)) for spec in SPECS[:2]]
     path = ledger(tmp_path / "results", made)
-    key = made[0].row["key"]
+    key = made[0]["key"]
     done = run("rerun", path, key[:8], "--out", tmp_path / "again")
     assert (done.exit_code, done.stdout) == (
         0,
@@ -132,10 +132,10 @@ def test_a_row_is_run_again_by_the_first_digits_of_its_key(tmp_path: Path) -> No
 
 def test_what_differs_in_a_row_that_is_run_again_is_printed(tmp_path: Path) -> None:
     made = run_cell(cell_of(SMALL | SPECS[0]))
-    iou = made.row["iou"]
-    made.row["iou"] = 0.25
+    iou = made["iou"]
+    made["iou"] = 0.25
     path = ledger(tmp_path / "results", [made])
-    done = run("rerun", path, made.row["key"][:8], "--json")
+    done = run("rerun", path, made["key"][:8], "--json")
     assert done.exit_code == 1
     assert json.loads(done.stdout) == {
         "same": False,

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.sweep.cell import CellResult
-from tests.report.browser import ledger, result, row_of
+from tests.report.browser import ledger, result
 from tests.sweep.fake import cells
 
 ROOT = Path(__file__).parents[2]
@@ -31,11 +30,10 @@ print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
 """
 
 
-def rows(instances: int, seeds: int) -> Iterator[CellResult]:
-    """Yield results as large as those of real cells; of one picture, whatever the row."""
+def rows(instances: int, seeds: int) -> Iterator[dict[str, Any]]:
+    """Yield rows as large as real ones."""
     first = replace(cells(1)[0], frames=60)
     rng = np.random.default_rng(0)
-    picture = result(first, 1.0).joints
     for m in range(METHODS):
         for i in range(instances):
             for s, error in enumerate(rng.gamma(2.0, 1.0, seeds).tolist()):
@@ -44,7 +42,7 @@ def rows(instances: int, seeds: int) -> Iterator[CellResult]:
                     "cost": np.round(FALLING + error, 4).tolist(),
                 }
                 cell = replace(first, method=f"m{m}@pca", instance=i, seed=s)
-                yield CellResult(row_of(cell, error, trace=trace), picture)
+                yield result(cell, error, trace=trace)
 
 
 @pytest.mark.slow

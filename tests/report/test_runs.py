@@ -11,7 +11,6 @@ import pytest
 from posefit.report.kind import Runs
 from posefit.report.runs import distinct
 from posefit.report.tracks import TRACKS
-from posefit.sweep.cell import CellResult
 from tests.report.browser import ledger, result
 from tests.report.contests import FIRST, full, results_of, runs_in
 
@@ -19,7 +18,7 @@ SAPSO = replace(FIRST, method="sapso@pca")
 COOLER = replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
 
 
-def read(path: Path, *results: CellResult) -> Runs:
+def read(path: Path, *results: dict[str, Any]) -> Runs:
     return runs_in(ledger(path / "results", results))
 
 
@@ -164,7 +163,7 @@ def test_reports_of_some_methods_name_them_as_the_report_of_all_does(
 
 
 def test_of_versions_the_installed_one_counts_or_else_the_last(tmp_path: Path) -> None:
-    def of(version: str, seed: int = 0, **more: Any) -> CellResult:
+    def of(version: str, seed: int = 0, **more: Any) -> dict[str, Any]:
         return result(replace(FIRST, version=version, seed=seed, **more), 1.0)
 
     old, older = "posefit 0.0.2 bb", "posefit 0.0.1 aa"

@@ -233,7 +233,7 @@ MISTAKES = [
     ("EMPTY --out OUT.html", "expected a ledger with finished rows, got one with none"),
     (
         "OTHER.html",
-        "OTHER.html: expected a whole SQLite file, got file is not a database",
+        "OTHER.html: expected an intact SQLite file, got file is not a database",
     ),
     ("results --out OUT.txt", "--out must be a file that ends in .html, got "),
     (

@@ -14,12 +14,10 @@ from posefit_reproduce.bench.kernel import bench_cost, opencv_costs
 from tests.cases import each
 
 
-@each("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
-def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(
-    stretch: tuple[float, float],
-) -> None:
+@each("stretch", [1.0, 0.6, 1.2])
+def test_opencv_finds_the_same_costs_whatever_the_focal_length(stretch: float) -> None:
     usual = bench_cost()
-    camera = replace(usual.cameras[0], focal=usual.cameras[0].focal * stretch)
+    camera = replace(usual.cameras[0], focal=stretch * usual.cameras[0].focal)
     proposals = np.random.default_rng(0).uniform(
         -0.3, 0.3, (50, usual.space.dimensions)
     )

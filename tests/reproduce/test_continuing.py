@@ -81,11 +81,11 @@ def test_a_folder_without_a_record_is_read_and_that_is_said(
     (tmp_path / "out" / "runs.json").unlink()
     assert capsys.readouterr().err == ""
     continued(tmp_path / "out", FIRST, frames=100)
-    assert "runs.json: there is none, so that" in capsys.readouterr().err
+    assert "runs.json is missing" in capsys.readouterr().err
     for content in ("[]", "{", '{"frames": 1}'):
         (tmp_path / "out" / "runs.json").write_text(content)
         with pytest.raises(
-            ValueError, match=r"runs\.json: expected what all runs have in common, got"
+            ValueError, match=r"runs\.json: not a record of the conditions of runs"
         ):
             continued(tmp_path / "out", FIRST, frames=100)
 

@@ -102,10 +102,10 @@ def test_mistakes_are_one_line_and_write_nothing(
         assert line.startswith(
             f"posefit: clips must be a folder of CMU clips such as {missing}.amc, got {folder}"
         )
-    assert "expected a new folder or one of an earlier reproduction" in fails(
+    assert "choose a new folder, or one of an earlier reproduction" in fails(
         "--out", clips
     )
-    assert "expected a folder to write to" in fails("--out", clips / "16" / "16_15.amc")
+    assert "cannot write to this folder" in fails("--out", clips / "16" / "16_15.amc")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert "pip install posefit[figures]" in fails("--out", out)
     assert list(tmp_path.iterdir()) == [clips]

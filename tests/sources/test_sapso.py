@@ -601,7 +601,7 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(variant, steps):
     latents = [0.1, 0.3, 0.2, 0.2]
     made: list[Scripted] = []
 
-    def make(space: SearchSpace, rng: np.random.Generator) -> Scripted:
+    def make(space: SearchSpace, rng: object, evaluations: int) -> Scripted:
         made.append(Scripted(space, np.array([0.0, 0.0, 0.0, latents[len(made)]])))
         return made[-1]
 

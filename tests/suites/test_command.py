@@ -11,6 +11,8 @@ import pytest
 
 import posefit
 from posefit.errors import InputError
+from posefit.suites.functions import SUITE
+from posefit.suites.registry import suite_registry
 from posefit.suites.running import run_of, run_on, suite_scores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.ledger import FILE, Ledger, Writer
@@ -49,7 +51,26 @@ def test_the_functions_are_listed() -> None:
     done = run("suite")
     assert done.exit_code == 0
     assert "7  high-dimensional     d = 20, 24, 40, 66" in done.stdout
-    assert [one["number"] for one in printed("suite")] == list(range(1, 10))
+    ours = printed("suite")
+    suite = ours["suites"][SUITE]
+    assert [problem["id"] for problem in suite["problems"]] == list(range(1, 10))
+
+
+def test_the_suite_has_the_form_of_iohs_registry() -> None:
+    ioh = pytest.importorskip("ioh")
+    theirs = ioh.registry()
+    ours = suite_registry()
+    assert ours["schema_version"] == theirs["schema_version"]
+    suite = ours["suites"][SUITE]
+    bbob = theirs["suites"]["BBOB"]
+    assert suite.keys() == bbob.keys()
+    for name, value in bbob.items():
+        assert type(suite[name]) is type(value), name
+        if isinstance(value, dict) and name != "scoring":
+            assert suite[name].keys() == value.keys()
+    for problem in suite["problems"]:
+        assert problem.keys() - {"dimensions", "summary"} == bbob["problems"][0].keys()
+        assert problem["optimum"].keys() == bbob["problems"][0]["optimum"].keys()
 
 
 def test_a_run_prints_what_it_reaches() -> None:
@@ -285,7 +306,7 @@ def test_a_mistake_is_one_line_and_status_2(
         ({"methods": ["sapso@pca"]}, "optimiser must be one of .*, got 'sapso@pca'"),
         (
             {"methods": [{"method": "pso", "colour": 1}]},
-            "a cell must say suite, .*, got 'colour'",
+            "a cell must hold suite, .*, got 'colour'",
         ),
         (
             {"methods": [{"method": "pso", "settings": {"particle": 2}}]},

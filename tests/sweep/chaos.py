@@ -103,9 +103,7 @@ class Chaos:
                 self._driver.wait()
         rows = rows_in(self._ledger)
         keys = Counter(row["key"] for row in rows)
-        wanted = {
-            cell.key: _figures(result(cell).row) for cell in cells(self.count, SLOW)
-        }
+        wanted = {cell.key: _figures(result(cell)) for cell in cells(self.count, SLOW)}
         quarantined = {row["key"] for row in quarantined_in(self._ledger)}
         return {
             "seed": self.seed,

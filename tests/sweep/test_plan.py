@@ -75,6 +75,26 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
     ]
 
 
+def test_each_optimiser_is_paired_with_each_prior() -> None:
+    few = {"prior": "pca", "settings": {"components": 4}}
+    cold = {"optimiser": "sapso", "settings": {"sapso.cooling": 0.8}}
+    product = {
+        "optimisers": ["cma", cold],
+        "priors": ["full", few],
+        "motions": ["walk"],
+    }
+    made = [(cell.method, dict(cell.settings)) for cell in planned(product=product)]
+    assert made == [
+        ("cma@full", {}),
+        ("cma@pca", {"pca.components": 4}),
+        ("sapso@full", {"sapso.cooling": 0.8}),
+        ("sapso@pca", {"pca.components": 4, "sapso.cooling": 0.8}),
+    ]
+    grid = {"pca.components": [4, 5]}
+    product = {"optimisers": ["cma"], "priors": ["pca"], "motions": ["walk"]}
+    assert len(planned(product=product, grid=grid)) == 2
+
+
 def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant_has_a_name() -> (
     None
 ):
@@ -119,7 +139,7 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"product": {**PRODUCT, "seeds": []}}, "product.seeds must hold at least one, got none: an empty product"),
         ({"product": {**PRODUCT, "seeds": "3"}}, "product.seeds must be a list, got '3'"),
         ({"product": {**PRODUCT, "colours": [1]}}, "product must hold methods, motions, .*, got 'colours'"),
-        ({"product": {"motions": ["walk"]}}, "a cell must say its method, got none"),
+        ({"product": {"motions": ["walk"]}}, "a cell must have a method, got none"),
         ({"product": {**PRODUCT, "motions": [{"motion": "walk", "seed": 1}], "seeds": [1]}}, "seed in one list, got it in"),
         ({"product": {**PRODUCT, "seeds": 10**12}}, "product.seeds must be at most 1,000,000, got 1,000,000,000,000"),
         ({"product": {**PRODUCT, "seeds": 2000, "instances": 2000}}, "product must hold at most 1,000,000 cells, got 4,"),
@@ -128,6 +148,10 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"defaults": [1]}, "defaults must be a table, got"),
         ({"cells": 3}, "cells must be a list of tables, got 3"),
         ({"cells": [{"method": "sapso@pca", "motion": "walk"}]}, "must differ, got sapso@pca on walk, .* seed 0 twice"),
+        ({"product": {**PRODUCT, "priors": ["pca"]}}, "product must hold methods, or both optimisers and priors, got methods, motions, priors"),
+        ({"product": {"optimisers": ["cma"]}}, "both optimisers and priors, got optimisers"),
+        ({"product": {"optimisers": ["cma"], "priors": [{"name": "pca"}]}}, "an entry of priors must hold prior, settings, got 'name'"),
+        ({"product": {"optimisers": ["cma"], "priors": [3]}}, "an entry of priors must be a name"),
         ({"product": {**PRODUCT, "methods": ["sapzo@pca"]}}, "did you mean 'sapso'"),
         ({"product": {**PRODUCT, "methods": ["vsnm"]}}, "method must be OPTIMISER@PRIOR, .*, got 'vsnm'; did you mean 'vsmm'"),
         ({"product": {**PRODUCT, "views": [[]]}}, "view_degrees must be 1 to 100 angles, got 0"),
@@ -150,7 +174,7 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"grid": {"pca.components": [1]}, "product": None, "cells": [SMALL]}, "grid must come with the methods"),
         (
             {"grid": {"sapso.cooling": [1]}, "product": {**PRODUCT, "methods": [COLD]}},
-            "grid must hold what no entry of methods sets itself, got sapso.cooling, which one does",
+            "grid must hold settings that no entry of methods sets itself, got sapso.cooling, which one sets",
         ),
         ({"product": {**PRODUCT, "methods": [{**COLD, "name": 3}]}}, "name must be a text of at most 80 characters, got 3"),
     ],
@@ -278,7 +302,7 @@ def test_a_file_that_changed_after_it_was_planned_is_not_followed(
     spec = {**SMALL, "motion": str(amc), "frames": 1, "fps": 120}
     cell = cell_of(spec)
     assert cell.files == {str(path): digest_of(path) for path in (amc, asf)}
-    assert run_cell(cell).row["status"] == "done"
+    assert run_cell(cell)["status"] == "done"
     with pytest.raises(ValueError, match=r"frames must be at most \d+, the length of"):
         cell_of({**spec, "frames": 500})
     amc.write_text(amc.read_text() + "\n")
@@ -336,7 +360,7 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
         cell.version
         == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     )
-    row = run_cell(cell).row
+    row = run_cell(cell)
     # it does not search
     assert (row["prior_floor_degrees"], row["trace"]) == (
         None,

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 from pebble import ProcessExpired, ProcessFuture
 
@@ -256,6 +257,21 @@ def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
     wait_until(lambda: not any(is_running(states[0]) for states in found))
 
 
+class Vandal(TrackCell):
+    """A cell whose method replaces functions and a class of libraries, as a careless plugin does."""
+
+    def measure(self) -> dict[str, Any]:
+        np.linalg.norm = json.dumps = np.random.Generator = print  # type: ignore[assignment,misc]
+        return {}
+
+
+def test_functions_that_a_plugin_from_elsewhere_replaces_are_put_back() -> None:
+    before = np.linalg.norm, json.dumps, np.random.Generator
+    cell = Vandal("random@pca", "walk", ("walk-a",))
+    run_cell(replace(cell, version=f"{cell.version}, elsewhere 1.0 0123abcd"))
+    assert (np.linalg.norm, json.dumps, np.random.Generator) == before
+
+
 def wait_until(true: Callable[[], bool]) -> None:
     """Wait until something is true; the limit of a test ends it otherwise."""
     while not true():
@@ -336,7 +352,7 @@ def test_a_pool_gives_the_rows_of_this_process_bit_for_bit(tmp_path: Path) -> No
     # no two are the same search
     assert len({json.dumps(row["trace"]) for row in rows.values()}) == len(searches)
     for search in searches:
-        expected = json.loads(json.dumps(run_cell(search).row))
+        expected = json.loads(json.dumps(run_cell(search)))
         same = [name for name in expected if name not in TIMES]
         assert [rows[search.key][name] for name in same] == [
             expected[name] for name in same
@@ -361,17 +377,10 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(
 
     def content(folder: Path) -> Any:
         with Ledger(folder) as ledger:
-            rows = {
+            return {
                 row["key"]: {name: row[name] for name in row if name not in TIMES}
                 for row in ledger.rows()
             }
-            joints = {
-                key: {
-                    name: array.tobytes() for name, array in ledger.joints(key).items()
-                }
-                for key in rows
-            }
-        return rows, joints
 
     assert sweep(
         plan, tmp_path / "one", Pool(2, Limits(), run_cell), print
@@ -443,7 +452,7 @@ def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on
         ledger.plan(cells(10))
         with pytest.raises(
             ValueError,
-            match=r"127.*went away; \d+ of 10 cells are done and safe: the same command",
+            match=r"127.*went away; \d+ of 10 cells are done and safe: run the same",
         ):
             drive(ledger, engine, print, watch)
     assert swept(tmp_path / "results", cells(10), Pool(2, LIMITS, behave)).done == 10

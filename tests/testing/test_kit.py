@@ -9,10 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from posefit.arrays import Array
 from posefit.cli.template import write_plugin
+from posefit.fitting.box import Space
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
 from posefit.testing import (
@@ -54,7 +56,9 @@ def test_it_passes_every_shipped_prior(name: str) -> None:
 
 
 def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
-    make = partial(SAPSO, population_size=20, iterations=task.evaluations // 20 - 1)
+    def make(space: Space, rng: np.random.Generator, evaluations: int) -> SAPSO:
+        return SAPSO(space, rng, population_size=20, iterations=evaluations // 20 - 1)
+
     return SynthesisTracker(
         task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor)
     )

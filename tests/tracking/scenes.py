@@ -96,7 +96,8 @@ def tracked(
     """Return the track of a scene whose tracker yields just these frames, with its files where there is a folder."""
 
     def follow(
-        _: object,
+        make: object,
+        audit: object,
         task: Task,
         observations: Iterable[Observation],
         rng: np.random.Generator,
@@ -107,7 +108,7 @@ def tracked(
             yield frames[k]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(method.Method, "follow", follow)
+        patch.setattr(method, "drive", follow)
         options = completed(TrackOptions(method="annealed@pca"), scene.truth)
         track = track_scene(
             scene, [built_in.motion("walk-b", frames=20)], options, recorder=recorder

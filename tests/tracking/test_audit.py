@@ -25,11 +25,11 @@ def audited(kind: Any, observations: Any = None) -> tuple[list[Any], list[str]]:
     )
     frames = list(
         drive(
-            kind(task),
+            kind,
+            audit,
             task,
             observations or all_of_them,
             np.random.default_rng(0),
-            audit,
         )
     )
     return frames, audit.warnings

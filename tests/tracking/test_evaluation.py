@@ -10,7 +10,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.evaluation import errors
 from posefit.evaluation.errors import Table, evaluated, nearest
-from posefit.evaluation.measures import Measures
+from posefit.evaluation.measures import Effort, Measures
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
@@ -56,7 +56,7 @@ def measures_of(
         None,
         truth.poses[:, 3:] if training is None else training,
         0.5,
-        np.ones(2),
+        Effort(1.0, 1.0),
     )[1]
 
 
@@ -134,7 +134,9 @@ def scene() -> Scene:
 
 
 def measured(scene: Scene, frames: list[Frame]) -> tuple[Table, Measures]:
-    return evaluated(scene, frames, None, scene.truth.poses[:, 3:], 0.5, np.ones(2))
+    return evaluated(
+        scene, frames, None, scene.truth.poses[:, 3:], 0.5, Effort(1.0, 1.0)
+    )
 
 
 def test_nothing_is_reported_of_a_method_that_reports_no_certainty(
@@ -215,7 +217,12 @@ def test_the_width_is_the_mean_radius_of_the_frames_that_have_one(scene: Scene) 
         FRAMES - 1
     )
     without_truth = evaluated(
-        replace(scene, truth=None), frames, None, np.zeros((1, 63)), 0.5, np.ones(2)
+        replace(scene, truth=None),
+        frames,
+        None,
+        np.zeros((1, 63)),
+        0.5,
+        Effort(1.0, 1.0),
     )[1]
     assert without_truth.interval_mm == measures.interval_mm
     assert without_truth.coverage is None

@@ -16,7 +16,7 @@ import pytest
 from posefit.errors import InputError
 from posefit.fitting.tracker import SynthesisTracker
 from posefit.footage import live
-from posefit.footage.live import Stream, live_masks, netpbm_images
+from posefit.footage.live import Stream, live_views, netpbm_images
 from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
@@ -134,14 +134,14 @@ def test_the_background_is_that_of_the_first_frames_or_a_picture(
     ]
     extraction = Extraction(background=str(tmp_path / "empty.png")) if given else None
     masks = list(
-        live_masks(Stream("-", io.BytesIO(b"".join(ppm))), extraction, lambda _: None)
+        live_views(Stream("-", io.BytesIO(b"".join(ppm))), extraction, lambda _: None)
     )
     assert (
-        [mask.source.number for mask in masks] == [0, 1, 2, 3]
+        [int(view.numbers[0]) for view in masks] == [0, 1, 2, 3]
         if given
         else [90, 91, 92]
     )
-    mask = masks[-1].mask
+    mask = masks[-1].silhouette(0).mask
     true = (person != empty).any(axis=2)
     assert (mask & true).sum() > 0.95 * max(mask.sum(), true.sum())
 
@@ -311,10 +311,10 @@ def test_what_a_stream_of_masks_cannot_be_tracked_with_is_refused(
 
 
 def test_images_of_another_size_are_refused(every_frame, walk):
-    masks = live_masks(
+    masks = live_views(
         Stream("-", io.BytesIO(pgm(walk[0]) + pgm(walk[0][:60]))), None, lambda _: None
     )
-    assert next(masks).source.number == 0
+    assert next(masks).numbers[0] == 0
     with pytest.raises(InputError, match="expected frames of 160x120, got 160x60"):
         next(masks)
 

@@ -14,7 +14,7 @@ from posefit import Problem, minimise
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.scene import synthetic
 from posefit.footage.segmentation import Extraction
-from posefit.footage.source import kind_of, scene_of
+from posefit.footage.source import scene_of
 from posefit.motion import built_in, recorded
 from posefit.progress import Progress
 from posefit.registry import Offer, Plugin, Registry, registry
@@ -248,7 +248,7 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
         ("a.npz", {"settings": {"exemplars.lag": 0}}, "exemplars", ["library"]),
         ("a.npz", {"method": "vsmm"}, "vsmm", WALKS),
     ):
-        motion = source if kind_of(source) == "motion" else None
+        motion = None if source.startswith(("a.", "masks/")) else source
         options = completed(TrackOptions(**given), motion)
         assert (options.method, options.train) == (expected, train), (source, given)
         again = completed(TrackOptions(**{**given, "method": options.method}), motion)

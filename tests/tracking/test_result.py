@@ -29,12 +29,15 @@ QUICK: dict[str, Any] = {
 MOTION = built_in.motion("walk", frames=3)
 BODY = posefit.Body.of(MOTION.skeleton)
 CAMERA = posefit.Camera.around(MOTION.translations[0], 0.5, 3.6, (80, 60))
-MASKS = np.array(
-    [
-        project(BODY, CAMERA, *pose)
-        for pose in zip(MOTION.poses, MOTION.translations, strict=True)
-    ]
-)
+CAMERAS = [CAMERA, posefit.Camera.around(MOTION.translations[0], 2.0, 3.6, (80, 60))]
+
+
+def masks_by(camera: posefit.Camera) -> Any:
+    poses = zip(MOTION.poses, MOTION.translations, strict=True)
+    return np.array([project(BODY, camera, *pose) for pose in poses])
+
+
+MASKS = masks_by(CAMERA)
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +132,35 @@ def test_a_frame_is_a_fit_with_a_picture(track: posefit.Track) -> None:
 def test_a_mask_is_fitted() -> None:
     fit = posefit.fit(MASKS[0], camera=CAMERA, **QUICK)
     assert fit.pose.shape == (66,)
+
+
+# What holds the masks, the keywords that choose one of them, and its number as filmed.
+FIRST: dict[str, tuple[list[int | None], dict[str, Any], int]] = {
+    "an array": ([None], {}, 0),
+    "an archive": ([0], {}, 0),
+    "an archive that begins later": ([100], {}, 100),
+    "a frame of it": ([100], {"frame": 101}, 101),
+    "two cameras": ([100, 101], {}, 101),
+}
+
+
+@each("firsts, chosen, number", FIRST.values())
+def test_a_fit_takes_the_first_frame_as_filmed(
+    firsts: list[int | None], chosen: dict[str, Any], number: int, tmp_path: Path
+) -> None:
+    sources: list[Any] = []
+    for view, first in enumerate(firsts):
+        source: Any = MASKS
+        if first is not None:
+            source = tmp_path / f"{view}.npz"
+            np.savez(source, masks=masks_by(CAMERAS[view]), first=first)
+        sources.append(source)
+    cameras = CAMERAS[: len(sources)]
+    fit = posefit.fit(
+        sources if len(sources) > 1 else sources[0], camera=cameras, **chosen, **QUICK
+    )
+    assert fit.track.table["frame"].tolist() == [number]
+    assert fit.track.gait.why == "one frame is no walk"
 
 
 def test_files_and_a_page_come_later_too(

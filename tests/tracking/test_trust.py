@@ -117,19 +117,19 @@ def test_a_body_covers_half_of_what_moves() -> None:
         ),
         (
             {"training_mm": 75.0},
-            "doubtful: one camera leaves depth to the motions learned from, and the nearest are 75 mm away",
+            "doubtful: with one camera, depth follows the motions learned from, and the nearest is 75 mm away",
         ),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         (
             {"held": 0.4},
-            "doubtful: the person is mostly out of sight in 40% of the frames in between",
+            "doubtful: the person is mostly hidden in 40% of the frames",
         ),
         (
             {"cropped": 1.0, "training_mm": 218.0},
             "do not use: the picture's border cuts the mask above and below in 100% of the frames: masks cropped to "
             "the person do not show where they are, and 1 more sign speaks against it",
         ),
-        ({"iou": 0.41}, "do not use: the body and the mask overlap by 41% only"),
+        ({"iou": 0.41}, "do not use: the body and the mask overlap by only 41%"),
         (
             {"size_ratio": 0.8, "size_m": 1.44},
             "doubtful: the person seems to be 1.44 m tall, not 1.80 m",
@@ -139,9 +139,9 @@ def test_a_body_covers_half_of_what_moves() -> None:
             "do not use: the person seems to be 2.70 m tall, not 1.80 m",
         ),
         ({"depth_scatter": 0.3}, "do not use: the distance jumps by 30%"),
-        ({"foot_share": 0.1}, "doubtful: a foot stands in 10% of the frames only"),
+        ({"foot_share": 0.1}, "doubtful: a foot stands in only 10% of the frames"),
         ({"stance_spread_m": 0.3}, "doubtful: feet stand at heights 0.30 m apart"),
-        ({"explained": 0.35}, "do not use: the body covers 35% of what moves only"),
+        ({"explained": 0.35}, "do not use: the body covers only 35% of what moves"),
         ({"acceleration": 30.0}, "doubtful: joints jerk, by 30 m/s2"),
         ({"frames": 2}, "doubtful: only 2 frames to judge the person by"),
         (
@@ -179,10 +179,10 @@ def test_a_sign_speaks_against_a_track_from_the_pages_limits_on() -> None:
     assert LIMITS.keys() == {name for name, sign in SIGNS.items() if sign.limits}
     for name, limits in LIMITS.items():
         best = FINE[name]
-        for doubtful, useless in limits:
+        for doubtful, unusable in limits:
             for limit, before, after in (
                 (doubtful, "good", "doubtful"),
-                (useless, "doubtful", "do not use"),
+                (unusable, "doubtful", "do not use"),
             ):
                 if limit is None:
                     continue
@@ -201,11 +201,11 @@ def test_a_track_without_a_sign_against_it_is_good() -> None:
     assert signs_against(unknown) == []
 
 
-def test_three_doubtful_signs_together_are_as_bad_as_a_useless_one() -> None:
+def test_three_doubtful_signs_together_are_as_bad_as_an_unusable_one() -> None:
     # a person waves, one camera
     signs = signs_against(FINE | {"unknown": 0.49, "lost": 0.24, "acceleration": 20.0})
     assert [grade for grade, _ in signs] == ["doubtful"] * 3
-    assert grade_of(signs) == "useless"
+    assert grade_of(signs) == "do not use"
     assert grade_of(signs[:2]) == "doubtful"
 
 
@@ -232,7 +232,7 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
     trust = trusted(scene)
     assert (trust.size_ratio, trust.grade) == (1.0, "good")
     assert trust.unknown_signs == {
-        "explained": "there are masks alone",
+        "explained": "there are only masks",
         **dict.fromkeys(("training_mm", "frontal"), "several cameras see the depth"),
     }
     trust = trusted(replace(scene, body=scene.body.scaled(0.8, 0.8)))
@@ -243,7 +243,7 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
     assert trust.size_ratio is None
     assert trust.unknown_signs["size_ratio"] == ONE_CAMERA
     for name in ("lost", "unknown", "interval_mm"):
-        assert trust.unknown_signs[name] == "the method does not say"
+        assert trust.unknown_signs[name] == "the method does not report it"
     assert trust.unknown_signs["training_mm"] == "no motion was learned from"
     assert ONE_CAMERA in trust_line(asdict(trust))
 
@@ -256,7 +256,7 @@ def test_motion_says_nothing_where_the_camera_moves() -> None:
         for k in range(30)
     ]
     scene = replace(scene, pictures=lambda: iter(pictures))
-    assert trusted(scene).grade == "useless"
+    assert trusted(scene).grade == "do not use"
     trust = trusted(replace(scene, camera_moves=True))
     assert (trust.grade, trust.unknown_signs["explained"]) == (
         "good",
@@ -293,7 +293,7 @@ def test_a_track_by_one_camera_is_doubtful_far_from_what_was_learned() -> None:
     trust = trusted(scene, training=[bent])
     assert trust.training_mm > 60.0
     assert trust.against[0].startswith(
-        "one camera leaves depth to the motions learned from, and the nearest are "
+        "with one camera, depth follows the motions learned from, and the nearest is "
     )
     assert trust.grade == "doubtful"
     assert trusted(walk(30, (20.0, 110.0)), training=[bent]).training_mm is None

@@ -1,12 +1,12 @@
-"""The experiments of the SAPSO paper's section 5: tracks of three motions, single images, first frames, baselines.
+"""The experiments of the SAPSO paper's section 5: all runs.
 
 | kind | what is run |
 |---|---|
 | track | 100 frames, the first yaw known to 45 degrees. Table 2, figure 9 |
 | unknown | the same with the first yaw unknown. Interpretation S17 |
-| image | each frame by itself, from all around, the yaw unknown. Section 5.3, table 1, figure 7 |
+| image | single frames from all around, unknown yaw. Section 5.3, table 1, figure 7 |
 | hidden | the same with a part of the silhouette hidden. Figure 8 |
-| first | searches of the first frame with several sizes of the swarm. Figure 6 |
+| first | searches of the first frame with several swarm sizes. Figure 6 |
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -60,20 +60,22 @@ COMPARED = {
 
 @dataclass(frozen=True)
 class Scale:
-    """How much of the paper's experiments is run.
+    """The size of the experiments.
 
-    Single images take every other seed, and their letter, which is eight times as slow, the first one.
+    Single images use every other seed. Their letter is eight times as slow and uses
+    only the first seed.
     """
 
     seeds: int = 10
     frames: int = FRAMES
-    views: tuple[float, ...] = (0.0, 45.0, 90.0)  # of tracks
-    around: tuple[float, ...] = tuple(45.0 * k for k in range(8))  # of single images
+    # degrees, of tracks and of single images
+    views: tuple[float, ...] = (0.0, 45.0, 90.0)
+    around: tuple[float, ...] = tuple(45.0 * k for k in range(8))
     iterations: int = ITERATIONS
 
     @property
     def runs(self) -> Iterator[Run]:
-        """All runs, seed by seed, so that what is interrupted has whole seeds."""
+        """All runs, seed by seed, so that an interrupted experiment has whole seeds."""
         if self.seeds < 1:
             raise InputError(f"seeds must be at least 1, got {self.seeds}")
         for seed, motion in product(range(self.seeds), COMPARED):
@@ -99,12 +101,16 @@ class Scale:
 
 @lru_cache(maxsize=2)
 def loaded(clips: str | Path | None, frames: int) -> Mapping[str, PaperMotion]:
-    """Return the motions of `paper_motions`, read once a process."""
+    """Return the motions of `paper_motions`, read once per process."""
     return paper_motions(clips, frames)
 
 
 def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
-    """Return what a run gives: poses (T, 66), and CPU seconds and evaluations a frame; costs of a first frame."""
+    """Return the arrays of a run.
+
+    A first frame has the history of its costs. Other runs have poses (T, 66), and
+    except for baselines CPU seconds and evaluations per frame.
+    """
     motion = loaded(clips, scale.frames)[run.subject]
     if run.kind == "first":
         histories = [
@@ -136,7 +142,7 @@ def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
 def options_of(
     name: str, training: Sequence[Motion], iterations: int
 ) -> dict[str, Any]:
-    """Return the options of a method's tracks, all with N (C + 1) evaluations a frame."""
+    """Return the options of a method's tracks, with N (C + 1) evaluations per frame."""
     options = {
         "train": training,
         "evaluations": PARTICLES * (iterations + 1),
@@ -152,7 +158,10 @@ def options_of(
 
 
 def follow(scene: Scene, motion: PaperMotion, scale: Scale, run: Run) -> list[Frame]:
-    """Track a motion; the first pose is searched, from any yaw if it is unknown, and the translation is known."""
+    """Track a motion with known translation. The first pose is searched.
+
+    Its yaw is known to 45 degrees, or unknown.
+    """
     options = options_of(run.method, motion.training, scale.iterations)
     if run.kind == "unknown":
         return track(
@@ -169,9 +178,10 @@ def estimate_images(
     iterations: int,
     seed: int,
 ) -> list[Frame]:
-    """Return the pose in each image by itself, whichever way the person faces: a full circle of yaws. Section 5.3.
+    """Return the pose in each image, estimated alone from a full circle of yaws.
 
-    `images` are observations of the scene by their frames' numbers; a method is run that `METHODS` names.
+    Section 5.3. `images` are observations of the scene by frame number. `name` is a
+    name of `METHODS`.
     """
     options = completed(
         TrackOptions(**options_of(name, training, iterations), seed=seed), scene.truth
@@ -180,20 +190,22 @@ def estimate_images(
     method = prepare(options, task)
     frames = list[Frame]()
     for k, image in images.items():
-        known = image.translation
-        anchor = (
-            place_of(image.silhouettes, scene.cameras, scene.body.stature)
-            if known is None
-            else np.asarray(known)
-        )
+        anchor = image.translation
+        if anchor is None:
+            anchor = place_of(image.silhouettes, scene.cameras, scene.body.stature)
         frames += method.follow(
-            replace(task, anchor=anchor), [image], np.random.default_rng([seed, k])
+            replace(task, anchor=np.asarray(anchor)),
+            [image],
+            np.random.default_rng([seed, k]),
         )
     return frames
 
 
 def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
-    """Return the poses (T, 66) of a baseline, with the true root and translation, which no method has."""
+    """Return the poses (T, 66) of a baseline.
+
+    It has the true root and translation, which no method has.
+    """
     truth = motion.test.poses
     angles = motion.angles
     if name == "persistence":
@@ -213,7 +225,10 @@ def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
 def first_history(
     motion: PaperMotion, iterations: int, particles: int, run: Run
 ) -> Array:
-    """Return the lowest cost so far (iterations + 1,) in the first frame, after each population of a swarm."""
+    """Return the lowest cost so far (iterations + 1,) in the first frame.
+
+    There is a value after each population of a swarm.
+    """
     options = options_of(run.method, motion.training, iterations)
     options["settings"] = {
         **options["settings"],

@@ -1,4 +1,7 @@
-"""The figures of the SAPSO paper, drawn again: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
+"""The figures of the SAPSO paper, drawn again.
+
+Figures 3 and 4 show the compact space, 5 and 6 one search, 7 and 9 errors.
+"""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -51,7 +54,7 @@ def paper_figures(analysis: Analysis) -> Iterator[tuple[str, Figure]]:
 def _in_compact_space(
     analysis: Analysis, draw: Callable[[Any, PaperMotion, PCA], str]
 ) -> Figure:
-    """Return the first three latents of two motions, drawn by a function that returns a title."""
+    """Return the first three latents of two motions; `draw` returns their title."""
     figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     for k, motion in enumerate(MOTIONS):
         axes: Any = figure.add_subplot(1, len(MOTIONS), k + 1, projection="3d")
@@ -66,7 +69,7 @@ def _in_compact_space(
 
 
 def _latents(axes: Any, motion: PaperMotion, prior: PCA) -> str:
-    """Draw the training poses, a colour a clip."""
+    """Draw the training poses, in one colour for each clip."""
     for clip, colour in zip(motion.training, COLOURS, strict=False):
         points = prior.transform(clip.poses[:, 3:])
         axes.plot(
@@ -98,19 +101,19 @@ def _clusters(axes: Any, motion: PaperMotion, prior: PCA) -> str:
 
 
 class WatchedSwarm(NamedTuple):
-    """A swarm in the first frame, from iteration to iteration."""
+    """The iterations of a swarm in the first frame."""
 
     scene: Scene
-    poses: list[Array]  # of each iteration (n, 66)
-    translations: list[Array]  # of each iteration (n, 3)
-    best: list[int]  # of each iteration, the proposal of lowest cost
+    poses: list[Array]  # (n, 66) in each iteration
+    translations: list[Array]  # (n, 3) in each iteration
+    best: list[int]  # the proposal of lowest cost in each iteration
     history: Array  # (iterations + 1,) lowest cost so far
 
 
 def watched_swarm(
     motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterations: int = ITERATIONS
 ) -> WatchedSwarm:
-    """Return the proposals of SAPSO in the first frame."""
+    """Return the swarm of SAPSO in the first frame."""
     scene = paper_scene(motion, SHOWN_VIEW, (0, 1))
     options = completed(
         TrackOptions(**options_of(OURS, motion.training, iterations)), scene.truth
@@ -153,7 +156,10 @@ def watched_swarm(
 
 
 def swarm_figure(swarm: WatchedSwarm) -> Figure:
-    """Return the silhouette, and on it the bones of all particles after some iterations; the best in colour."""
+    """Return the silhouette, and the bones of all particles after some iterations.
+
+    The best particle is coloured.
+    """
     scene = swarm.scene
     shown = [k for k in SHOWN_ITERATIONS if k < len(swarm.poses)]
     camera = scene.cameras[0]
@@ -189,14 +195,18 @@ def swarm_figure(swarm: WatchedSwarm) -> Figure:
             LineCollection([*bones[swarm.best[k]]], colors=COLOURS[1], linewidths=1.4)
         )
         axes.set_title(
-            f"iteration {k}, N = {len(bones)}\nlowest cost so far {swarm.history[k]:.1f}",
+            f"iteration {k}, N = {len(bones)}\n"
+            f"lowest cost so far {swarm.history[k]:.1f}",
             fontsize=9,
         )
     return figure
 
 
 def lowest_cost_figure(analysis: Analysis) -> Figure:
-    """Return the lowest cost against the iteration in the first frame, for each N: medians over views and seeds."""
+    """Return the lowest cost by iteration in the first frame, for each N.
+
+    Lines are medians over views and seeds.
+    """
     figure, panels = _panels((10.0, 3.8), 1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
         for name, style in ((OURS, "-"), (LETTER, ":")):
@@ -215,7 +225,10 @@ def lowest_cost_figure(analysis: Analysis) -> Figure:
 
 
 def dimension_figure(analysis: Analysis) -> Figure:
-    """Return the error of each angle in single images of eight views, of PCA + SAPSO, its letter and the mean pose."""
+    """Return the error of each angle in single images from eight views.
+
+    Shown are PCA + SAPSO, its letter and the mean pose.
+    """
     names = ["root", *(JOINTS[joint] for joint in INNER)]
     figure, panels = _panels((12.0, 7.5), len(analysis.motions), sharex=True)
     for axes, motion in zip(panels, analysis.motions, strict=True):
@@ -245,7 +258,10 @@ def dimension_figure(analysis: Analysis) -> Figure:
 
 
 def frame_figure(analysis: Analysis) -> Figure:
-    """Return the error of each frame of the paper's methods and the letter: medians of all runs, middle halves."""
+    """Return the errors of the paper's methods and the letter by frame.
+
+    Lines are medians of all runs, and bands their middle halves.
+    """
     figure, panels = _panels((10.0, 6.4), len(MOTIONS))
     for axes, motion in zip(panels, MOTIONS, strict=True):
         for name, colour in zip(
@@ -277,7 +293,7 @@ def frame_figure(analysis: Analysis) -> Figure:
 def _panels(
     size: tuple[float, float], rows: int, columns: int = 1, **shared: Any
 ) -> tuple[Figure, Any]:
-    """Return a figure of a size in inches and its axes, open at the top and the right."""
+    """Return a figure of a size in inches, and its axes without top and right."""
     figure = Figure(figsize=size, layout="constrained")
     panels: Any = figure.subplots(rows, columns, **shared)
     for axes in panels:

@@ -1,11 +1,11 @@
-"""SAPSO to the letter of the paper's Algorithm 1, where `posefit_swarm.sapso` reads it otherwise.
+"""SAPSO to the letter of Algorithm 1, where `posefit_swarm.sapso` deviates from it.
 
 | interpretation | here | `posefit_swarm.sapso` |
 |---|---|---|
 | S6 | cools at each acceptance, with one shared temperature | once an iteration |
-| S7 | draws the whole particle again, for velocities beyond their limits too | for constraint 2; clamps velocities |
+| S7 | redraws whole particles, for velocities beyond limits too | for constraint 2 |
 | S8 | one rand() for a pull of a particle | one for each coordinate |
-| S9 | alpha min and alpha max limit the velocities of latents, nothing those of the root | plus and minus alpha |
+| S9 | alpha is a factor on the ranges of latents, the root is free | +- alpha |
 | S10 | the last move is not evaluated: N C evaluations | N (C + 1) |
 """
 
@@ -17,17 +17,21 @@ from posefit.plugin import Array, Space, check_tell, displacement, wrap
 from posefit_swarm.sapso import SAPSO, Rows, redrawn
 
 ALPHA = 0.15  # section 2.2
-REDRAWS = 100  # ours: then the particle stays where it is, at rest. Interpretation S7
+# ours: after these the particle stays, at rest. Interpretation S7
+REDRAWS = 100
 
 
 class LetterSAPSO(SAPSO):
-    """Algorithm 1 as the paper has it. Positions and velocities are those of the unit box.
+    """Algorithm 1 to the letter. Positions and velocities are those of the unit box.
 
     Settings:
-        population_size (N): of the swarm, 1 or more. Section 5.2.
-        iterations (C): populations that are evaluated, 1 or more. Section 5.2, Interpretation S10.
-        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Interpretation S5.
-        inertia (A): factor on the old velocity at first, above 0.1; it falls to 0.1. Section 3.1, Interpretation S5.
+        population_size (N): size of the swarm, 1 or more. Section 5.2.
+        iterations (C): number of evaluated populations, 1 or more. Section 5.2,
+            Interpretation S10.
+        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends
+            it. Interpretation S5.
+        inertia (A): first factor on the old velocity, above 0.1; it falls to 0.1.
+            Section 3.1, Interpretation S5.
     """
 
     def __init__(
@@ -54,11 +58,14 @@ class LetterSAPSO(SAPSO):
         self.v = np.clip(self.v, self.low, self.high)
 
     def ask(self) -> Array:
-        """Return the particles (N, d) after their move; none once the iterations or the temperature are used up."""
+        """Return the particles (N, d) after their move.
+
+        The array is empty once the iterations or the temperature are used up.
+        """
         return super().ask() if self.c < self.C else self.moved[:0].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Accept or refuse the moves by their costs (N,), cool, remember the bests, and move on."""
+        """Accept or refuse moves by their costs (N,), cool, update the bests, move."""
         check_tell(self.waiting, proposals, costs)
         count = self.accept(costs)
         if self.c > 0:
@@ -68,7 +75,7 @@ class LetterSAPSO(SAPSO):
         self.waiting = 0
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
-        """Return velocities and positions (k, d) of some particles (k,) after a move by (1) and (2)."""
+        """Return velocities and positions (k, d) of particles (k,) by (1) and (2)."""
         x = self.x[rows]
         gbest = self.pbest[self.pbest_cost.argmin()]
         phi1, phi2 = self.acceleration * self.rng.random((2, len(rows), 1))
@@ -78,16 +85,16 @@ class LetterSAPSO(SAPSO):
         return v, wrap(self.space, x + v)
 
     def allowed(self, v: Array, x: Array) -> NDArray[np.bool_]:
-        """Return which velocities and positions (k, d) meet constraints 1 and 2 (k,)."""
-        return np.asarray(
-            ((self.low <= v) & (v <= self.high)).all(axis=1) & self.space.feasible(x)
-        )
+        """Return which velocities and positions (k, d) meet both constraints (k,)."""
+        within = ((self.low <= v) & (v <= self.high)).all(axis=1)
+        return np.asarray(within & self.space.feasible(x))
 
 
 def velocity_limits(space: Space) -> tuple[Array, Array]:
-    """Return the lowest and highest velocity (d,) of the unit box: alpha times the latents' own limits.
+    """Return the lowest and highest velocity (d,) of the unit box.
 
-    The root's are infinite. A space without latents has the limits plus and minus alpha.
+    For latents they are alpha times the latent's limits, for the root they are
+    infinite. A space without latents has the limits plus and minus alpha.
     """
     if not isinstance(space, SearchSpace):
         return np.full(space.dimensions, -ALPHA), np.full(space.dimensions, ALPHA)
@@ -95,8 +102,6 @@ def velocity_limits(space: Space) -> tuple[Array, Array]:
     high = np.full(space.dimensions, np.inf)
     m = len(space.prior.low)
     half = np.where(space.half[-m:] > 0.0, space.half[-m:], 1.0)
-    low[-m:], high[-m:] = (
-        ALPHA * space.prior.low / half,
-        ALPHA * space.prior.high / half,
-    )
+    low[-m:] = ALPHA * space.prior.low / half
+    high[-m:] = ALPHA * space.prior.high / half
     return low, high

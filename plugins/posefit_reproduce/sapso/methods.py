@@ -1,4 +1,4 @@
-"""What the reproduction of the SAPSO paper compares: the paper's methods, its letter, and what lacks one part each."""
+"""The compared methods: the paper's, its letter, and variants without one part."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -11,12 +11,13 @@ from posefit.evaluation.measures import BASELINES
 from posefit_priors.pca import PCA
 from posefit_swarm.sapso import SAPSO, inertia_at
 
-# the two forms that are run side by side in every experiment
+# our reading and the letter, which are run side by side in every experiment
 OURS = "sapso@pca"
 LETTER = "sapso-letter@pca"
-WIDER = 3.0  # times the range of the training latents, where constraint 1 is left out
-NO_LIMIT = 2.0  # alpha at which a velocity may cross the whole box
-# Interpretation S16: the paper learns nothing of the root
+# without constraint 1, this factor widens the range of the training latents
+WIDER = 3.0
+NO_LIMIT = 2.0  # alpha with which a velocity may cross the whole box
+# Interpretation S16: the paper does not learn the root
 DRIVEN = {"tracker.tilt": "box"}
 
 
@@ -24,7 +25,7 @@ class WidePCA(PCA):
     """The compact space without the range of constraint 1."""
 
     def fit(self, angles: Array, skeleton: object = None) -> "WidePCA":
-        """Learn the space, and widen its box about its middle."""
+        """Learn the space, and widen its box around the middle."""
         super().fit(angles)
         middle = (self.high + self.low) / 2.0
         half = (self.high - self.low) / 2.0
@@ -37,20 +38,23 @@ class UnclusteredPCA(PCA):
     """The compact space without constraint 2."""
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are feasible (n,)."""
+        """Return True (n,) for all latents (n, m)."""
         return np.ones(len(latents), dtype=bool)
 
 
 class ConstantInertia(SAPSO):
-    """SAPSO whose inertia is that of the middle of a search throughout, 0.3."""
+    """SAPSO with a constant inertia, 0.3, that of the middle of a search."""
 
     def inertia(self) -> float:
-        """Return omega of the middle of a search."""
+        """Return omega in the middle of a search."""
         return inertia_at(self.C // 2, self.C, self.A)
 
 
 class PaperMethod(NamedTuple):
-    """A method by its name in tables, and the options of its tracks; a prior in a pair is a class."""
+    """A method: its name in tables and the options of its tracks.
+
+    A prior or optimiser in a pair may be a class.
+    """
 
     label: str
     options: Mapping[str, Any]
@@ -65,7 +69,7 @@ def _search(
     return PaperMethod(label, {"method": method, "settings": settings, **more})
 
 
-# constraint 1 on all angles; the files' joint limits alone are far wider
+# constraint 1 on all angles: the files' joint limits alone are far wider
 _FULL = DRIVEN | {"full.limits": "training"}
 _ALWAYS, _NEVER = (
     {"sapso.temperature": value, "sapso.cooling": 1.0} for value in (1e9, 1e-9)
@@ -80,7 +84,7 @@ OTHERS = {
     "pso@pca": _search("PCA + PSO", "pso@pca"),
     "particle@pca": _search("PCA + PF", "particle@pca"),
 }
-# what PCA + SAPSO is without one of its parts, with as many evaluations
+# PCA + SAPSO without one of its parts, with as many evaluations
 PARTS = {
     "no-velocity-limits": _search(
         "no velocity limits (half of constraint 1)",
@@ -97,7 +101,7 @@ PARTS = {
     ),
     "constant-inertia": _search("inertia constant at 0.3", (ConstantInertia, "pca")),
 }
-# what may follow a turn better, with the walk's budget
+# variants that may follow a turn better, with the walk's budget
 TURNING = {
     "turning-prior": _search(
         "PCA of walks with turns + SAPSO", OURS, train=["16_18", "16_20"]

@@ -1,6 +1,7 @@
-"""The motions of the SAPSO paper's experiments: CMU clips of a folder, else the same ones of posefit's own library.
+"""The motions of the SAPSO paper: CMU clips from a folder or posefit's library.
 
-The library keeps a clip's poses at 30 frames a second to within a centimetre; between them angles are interpolated.
+The library stores a clip's poses at 30 frames a second to within a centimetre. Between
+them angles are interpolated.
 """
 
 from collections.abc import Sequence
@@ -11,51 +12,53 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
+from posefit.footage.views import Range
 from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
 from posefit.sweep.cell import digest_of
 
 SIZE = (320, 240)  # pixels
-# not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a
-# run nearly
+# ours: the paper gives none; at this rate a clip of a walk has more than the 100
+# frames, and of a run nearly
 FPS = 60.0
-# the clip, and those that its prior learns from; there is one run of each person, so its prior knows only others
+# the test clip and the training clips; each person has only one run, so the run's prior
+# learns from others
 CLIPS = {
     "walk": ("16/16_15", ("16/16_17",)),
     "turn": ("16/16_17", ("16/16_15",)),
     "run": ("16/16_35", ("09/09_01", "127/127_03")),
 }
 ALL_CLIPS = [clip for test, training in CLIPS.values() for clip in (test, *training)]
-# the first frame that is followed: 16_15 begins with an arm held out that is gone 1/60 s later, and the person of 16_17
-# walks straight on for two seconds before turning by a quarter
+# the first tracked frame: 16_15 begins with an arm held out that is gone 1/60 s later,
+# and the person of 16_17 walks straight on for two seconds before the quarter turn
 FIRST = {"walk": 1, "turn": 120, "run": 1}
 LABELS = {"walk": "walk", "turn": "walk with a turn", "run": "run"}
 
 
 @dataclass(frozen=True, eq=False)
 class PaperMotion:
-    """A motion to follow, and what a prior may learn from."""
+    """A motion to track, and the motions from which a prior may learn."""
 
     test: Motion
     training: Sequence[Motion] = field(repr=False)
 
     @property
     def angles(self) -> Array:
-        """The joint angles (n, 63) that may be learned from."""
+        """The joint angles (n, 63) from which a prior may learn."""
         return np.concatenate([motion.poses[:, 3:] for motion in self.training])
 
 
 def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotion]:
-    """Return the three motions, each of so many `frames` or as many as there are.
+    """Return the three motions, each of `frames` frames or as many as there are.
 
-    Raises ValueError where `clips` is no folder with the CMU clips that are wanted.
+    Raises InputError if `clips` is not a folder with the CMU clips.
     """
     for clip in ALL_CLIPS:
         if clips is not None and not (Path(clips) / f"{clip}.amc").is_file():
             raise InputError(
-                f"clips must be a folder of CMU clips such as {clip}.amc, got {clips}, which has none"
+                f"clips must be a folder of CMU clips such as {clip}.amc, "
+                f"got {clips}, which has none"
             )
     motions = {}
     for name, (test, training) in CLIPS.items():
@@ -68,7 +71,7 @@ def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotio
 
 
 def digests(clips: str | Path | None) -> str | list[str]:
-    """Return what clips are: `library`, or digests of the files of a folder that are read."""
+    """Return the identity of the clips: "library", or digests of the files."""
     if clips is None:
         return "library"
     paths = [Path(clips) / f"{clip}.amc" for clip in ALL_CLIPS]
@@ -80,13 +83,13 @@ def digests(clips: str | Path | None) -> str | list[str]:
 
 
 def _clip(folder: str | Path | None, clip: str) -> Motion:
-    return load_motion(
-        clip.partition("/")[2] if folder is None else Path(folder) / f"{clip}.amc", FPS
-    )
+    if folder is None:
+        return load_motion(clip.partition("/")[2], FPS)
+    return load_motion(Path(folder) / f"{clip}.amc", FPS)
 
 
 def paper_scene(
     motion: PaperMotion, view: float, frames: Range = (None, None)
 ) -> Scene:
-    """Return a motion as a camera sees it."""
+    """Return the scene of a motion, seen by a camera."""
     return synthetic(motion.test, [view], SIZE, [], frames)

@@ -1,7 +1,7 @@
 """The SAPSO paper's own numbers. Acta Automatica Sinica 38(5), 2012, section 5.
 
-Table 1 gives three angles of four joints; the order of the three and the axes of the skeleton are not given, so only
-the sizes of its errors can be held against others.
+Table 1 gives three angles of four joints. It does not give their order or the axes of
+the skeleton, so only the sizes of its errors can be compared with others.
 """
 
 from typing import NamedTuple
@@ -15,12 +15,12 @@ class Tracked(NamedTuple):
     """A cell of table 2."""
 
     error_degrees: float
-    spread_degrees: float  # (10), which the table's head calls the variance
+    spread_degrees: float  # (10), called the variance in the table's head
     seconds_per_frame: float
 
 
 TABLE_1_JOINTS = ("LFemur", "RFemur", "LKnee", "RKnee")
-# of each motion the true and the estimated angles in degrees, (4 joints, 3)
+# the true and the estimated angles of each motion in degrees, (4 joints, 3)
 TABLE_1: dict[str, tuple[Array, Array]] = {
     "walk": (
         np.array(
@@ -77,7 +77,7 @@ TABLE_1: dict[str, tuple[Array, Array]] = {
         ),
     ),
 }
-# of each motion the three methods, by the names they have in `methods.METHODS`
+# the three methods on each motion, by their names in `methods.METHODS`
 TABLE_2: dict[str, dict[str, Tracked]] = {
     "walk": {
         "particle@full": Tracked(4.6713, 2.5157, 5.236),
@@ -90,15 +90,15 @@ TABLE_2: dict[str, dict[str, Tracked]] = {
         "sapso@pca": Tracked(3.8769, 1.3789, 2.365),
     },
 }
-FRAMES = 100  # of each sequence
+FRAMES = 100  # in each sequence
 TRAINING_FRAMES = {"walk": 386, "turn": 386, "run": 198}
 CONVERGED = 30  # iterations, section 5.2 and figure 6
-SMALL_DEGREES = 5.0  # most dimensions' errors are below it: section 5.3 and figure 7
+SMALL_DEGREES = 5.0  # most dimensions have smaller errors: section 5.3 and figure 7
 TRACK_DEGREES = 4.0  # about the mean error of its tracks: section 5.4
-# so many components explain this share at least: section 2.1
+# this many components explain at least this share: section 2.1
 ENOUGH_COMPONENTS = 5
 EXPLAINED_VARIANCE = 0.95
 # figure 5
 SHOWN_ITERATIONS = (0, 10, 40, 60)
 SHOWN_PARTICLES = 100
-SWARMS = (20, 40, 60, 100)  # N of figure 6; the paper's own are not in its text
+SWARMS = (20, 40, 60, 100)  # N of figure 6; the text does not give the paper's own

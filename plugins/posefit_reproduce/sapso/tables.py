@@ -1,4 +1,4 @@
-"""The SAPSO paper's tables beside ours, its claims with verdicts, and what each part of its method is worth."""
+"""The SAPSO paper's tables compared with ours, its claims, the effect of each part."""
 
 from collections.abc import Mapping
 
@@ -33,19 +33,20 @@ from posefit_reproduce.sapso.methods import (
 from posefit_reproduce.sapso.motions import LABELS as MOTIONS
 from posefit_reproduce.sapso.motions import PaperMotion
 
-# LFemur, RFemur, LKnee, RKnee: an Acclaim knee has one angle, the other two are padding that cannot err
+# LFemur, RFemur, LKnee, RKnee. An Acclaim knee has one angle; the other two are padding
+# and cannot err
 ANGLES = angles_of(("lfemur", "rfemur", "ltibia", "rtibia"))
-# bounds that are ours, where the paper gives none
-# the quantile from which a frame's error is high, and how many joints are a few
+# bounds that are ours, because the paper gives none
+# quantile from which a frame's error is high, and the number of joints that are "a few"
 HIGH_FRAMES = 0.9
 FEW_JOINTS = 3
-# share of frames with left and right exchanged that still counts as none
+# share of frames with left and right exchanged that is negligible
 SWAPPED = 0.01
-# by which views, or a hidden part, may change an error that stays the same
+# change of an error between views, or by a hidden part, that is negligible
 SAME_DEGREES = 1.0
-# by which costs may differ that have converged or are equal; costs go from 0 to 100
+# difference between costs, of 0 to 100, that is negligible
 SAME_COST = 1.0
-# degrees: a yaw that is more off is a person seen the wrong way round
+# degrees: a larger error of the yaw means that the person faces the wrong way
 TURNED_ROUND = 90.0
 
 
@@ -57,7 +58,7 @@ class Analysis:
         self.motions = motions
 
     def away(self, motion: str, method: str = OURS, kind: str = "track") -> Array:
-        """Return the absolute errors of all angles in degrees, (views, seeds, T, 66)."""
+        """Return the absolute errors of all angles, (views, seeds, T, 66) degrees."""
         poses = self.results.of("poses", kind, motion, method)
         return np.asarray(
             np.degrees(np.abs(wrapped(poses - self.motions[motion].test.poses)))
@@ -70,14 +71,17 @@ class Analysis:
     def errors(
         self, motion: str, method: str = OURS, kind: str = "track", free: bool = False
     ) -> Array:
-        """Return the mean errors (8) of runs in degrees, (views, seeds). Interpretation S18."""
+        """Return the mean errors (8) of runs, (views, seeds) degrees.
+
+        Interpretation S18.
+        """
         away = self.away(motion, method, kind)
-        return np.asarray(
-            (away[..., self.free(motion)] if free else away).mean(axis=(2, 3))
-        )
+        if free:
+            away = away[..., self.free(motion)]
+        return np.asarray(away.mean(axis=(2, 3)))
 
     def spread(self, motion: str, method: str) -> Array:
-        """Return the deviations (10) of runs in degrees, (views, seeds)."""
+        """Return the standard deviations (10) of runs, (views, seeds) degrees."""
         return np.asarray(self.away(motion, method).mean(axis=3).std(axis=2))
 
     def swapped(self, motion: str, method: str = OURS, kind: str = "track") -> Array:
@@ -124,7 +128,7 @@ def verdicts_table(analysis: Analysis) -> Table:
 
 
 def motions_table(analysis: Analysis) -> Table:
-    """Return what is followed and learned from, and how many seeds there are."""
+    """Return the tracked and training clips of each motion, and numbers of seeds."""
     rows = []
     for name, motion in analysis.motions.items():
         yaw = np.degrees(np.unwrap(motion.test.poses[:, 0]))
@@ -161,9 +165,10 @@ def motions_table(analysis: Analysis) -> Table:
 
 
 def table_1(analysis: Analysis) -> Table:
-    """Return table 1: twelve angles of one image, and the mean error of those that can err, of all images for ours.
+    """Return table 1: twelve angles of one image, and the mean error.
 
-    Ours is the middle frame of the first seed from 45 degrees.
+    Our image is the middle frame of the first seed from 45 degrees. Our mean error is
+    over all images and those angles that can err.
     """
     rows = []
     for motion, pair in paper.TABLE_1.items():
@@ -200,7 +205,10 @@ def table_1(analysis: Analysis) -> Table:
 
 
 def table_2(analysis: Analysis) -> Table:
-    """Return table 2 beside ours: error (9), deviation (10) and seconds a frame of each method and baseline."""
+    """Return table 2 compared with ours, for each method and baseline.
+
+    A cell has the error (9), the deviation (10) and the seconds per frame.
+    """
     rows = []
     for name in (*PAPER, *OTHERS, *BASELINES):
         cells = [LABELS[name]]
@@ -214,21 +222,23 @@ def table_2(analysis: Analysis) -> Table:
                 f"{analysis.spread(motion, name).mean():.2f}",
             ]
             if name in METHODS:
-                figures.append(
-                    f"{analysis.results.of('cpu_seconds', 'track', motion, name).mean():.4f}"
-                )
+                seconds = analysis.results.of("cpu_seconds", "track", motion, name)
+                figures.append(f"{seconds.mean():.4f}")
             cells.append(" / ".join(figures))
         rows.append(cells)
     heads = [
-        f"{motion}, {whose}"
+        f"{motion}, {origin}"
         for motion in paper.TABLE_2
-        for whose in ("the paper", "here")
+        for origin in ("the paper", "here")
     ]
     return Table("table-2", ["(9) / (10) / seconds", *heads], rows)
 
 
 def flaws_table(analysis: Analysis) -> Table:
-    """Return how often each method goes wrong on each motion, and its error where the first yaw is unknown."""
+    """Return how often each method fails on each motion.
+
+    The last column is its error with an unknown first yaw.
+    """
     rows = []
     for name in (*PAPER, *OTHERS):
         figures: list[list[str]] = [[], [], []]
@@ -252,7 +262,7 @@ def flaws_table(analysis: Analysis) -> Table:
 
 
 def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
-    """Return the claims of tracks, by (8), of the compact space and of searches of first frames."""
+    """Return the claims about tracks, by (8), the compact space, and first frames."""
     results = analysis.results
     label = MOTIONS[motion]
     ours, full, particle = (
@@ -262,7 +272,7 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
         results.of("cpu_seconds", "track", motion, name)
         for name in (OURS, "sapso@full")
     ]
-    # the walk with a turn is followed in the space of the straight walk
+    # the walk with a turn is tracked in the space of the straight walk
     space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
     explained = np.asarray(100.0 * space.explained[: paper.ENOUGH_COMPONENTS].sum())
     wanted = 100.0 * paper.EXPLAINED_VARIANCE
@@ -334,7 +344,7 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
 
 
 def image_claims(analysis: Analysis, motion: str) -> list[Claim]:
-    """Return the claims of single images, by the angles that can err."""
+    """Return the claims about single images, by the angles that can err."""
     label = MOTIONS[motion]
     away = analysis.away(motion, OURS, "image")
     small = 100.0 * (
@@ -345,7 +355,7 @@ def image_claims(analysis: Analysis, motion: str) -> list[Claim]:
     images, hidden = (
         analysis.errors(motion, OURS, kind, free=True) for kind in ("image", "hidden")
     )
-    # the former of the same views
+    # compare with the same views of the images
     worse = hidden - images[: len(hidden)]
     around = np.ptp(images, axis=0)[None]
     swapped = 100.0 * analysis.swapped(motion, OURS, "image")
@@ -392,7 +402,7 @@ def image_claims(analysis: Analysis, motion: str) -> list[Claim]:
 
 
 def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> Array:
-    """Return the mean errors (views, seeds) of table 1's angles, of those that can err."""
+    """Return the mean errors (views, seeds) of table 1's angles that can err."""
     chosen = [angle for angle in ANGLES if analysis.free(motion)[angle]]
     return np.asarray(
         analysis.away(motion, method, kind)[..., chosen].mean(axis=(2, 3))
@@ -400,7 +410,10 @@ def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> A
 
 
 def few_joints(analysis: Analysis, motion: str) -> Array:
-    """Return which share (views, seeds) of the error of a run's worst tenth of frames its three worst joints have."""
+    """Return the share (views, seeds) of the three worst joints in high errors.
+
+    High errors are those of the worst tenth of a run's frames.
+    """
     away = analysis.away(motion)
     # the root and 21 inner joints
     joints = away.reshape(*away.shape[:3], 22, 3).sum(axis=4)
@@ -415,7 +428,7 @@ def few_joints(analysis: Analysis, motion: str) -> Array:
 
 
 def views_table(analysis: Analysis) -> Table:
-    """Return single images by view, all around: the yaw unknown, each frame by itself."""
+    """Return the errors of single images by view, all around, with the yaw unknown."""
     views = sorted({run.view for run in analysis.results.runs if run.kind == "image"})
     rows = []
     for motion in analysis.motions:
@@ -439,7 +452,10 @@ def views_table(analysis: Analysis) -> Table:
 
 
 def parts_table(analysis: Analysis) -> Table:
-    """Return by how much PCA + SAPSO without a part, or another method, is worse than it, paired by view and seed."""
+    """Return how much worse PCA + SAPSO is without a part, and other methods are.
+
+    Differences are paired by view and seed.
+    """
     labels = {"sapso@full": "no PCA space: all angles"} | {
         name: LABELS[name] for name in (*PARTS, *OTHERS)
     }

@@ -1,7 +1,8 @@
-"""The sequence that the VSMM patent was tried on, re-created: four activities before a camera, with a known truth.
+"""The VSMM patent's test sequence, re-created with a known truth.
 
-The patent's own recording is not public. Here the four activities are built-in motions, each in another phase, speed
-and view for every seed, that no motion model was fitted to; between them lie a few frames of blending.
+The patent's recording is not public. Here its four activities are built-in motions with
+random phase, speed and view for each seed. No motion model was fitted to them. A few
+frames blend one activity into the next.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,15 +26,16 @@ SIZE = (320, 240)
 FPS = 30.0
 EMPTY = 100  # frames of the empty scene, for the mean background
 BLEND = 8  # frames between two activities
-DISTANCE = 4.6  # metres
-SIDEWAYS = 0.3  # radians to either side: from where the camera looks at the front
+DISTANCE = 4.6  # metres from the camera
+# largest angle between the view and the front, to either side, in radians
+SIDEWAYS = 0.3
 SPEEDS = (0.9, 1.1)
-GRAIN = 4.0  # grey levels: the deviation of a pixel from frame to frame
+GRAIN = 4.0  # standard deviation of a pixel from frame to frame, in grey levels
 
 
 @dataclass(frozen=True)
 class Activity:
-    """One part of the sequence, and the motion models that it is an instance of."""
+    """A part of the sequence, and the motion models that describe it."""
 
     label: str
     motion: str
@@ -47,7 +49,7 @@ ACTIVITIES = (
     Activity("jumping jacks", "jacks-b", 140, frozenset({"jacks"})),
     Activity("squat", "squat-b", 60, frozenset({"squat"})),
 )
-# What a prior may learn from: no motion of the sequence.
+# for priors: no motion of the sequence
 TRAINING = tuple(
     f"{kind}-a"
     for kind in ("walk", "step", "arms-out", "wave", "jacks", "squat", "jump", "march")
@@ -56,17 +58,17 @@ TRAINING = tuple(
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """What was filmed, and the truth."""
+    """A film and its truth."""
 
     truth: Motion
     body: Body
     camera: Camera
-    labels: list[int]  # (T,) which activity
-    rng: np.random.Generator = field(repr=False)  # of the pixels' noise
+    labels: list[int]  # (T,) number of the activity
+    rng: np.random.Generator = field(repr=False)  # for the pixels' noise
 
     @cached_property
     def observations(self) -> list[Observation]:
-        """The masks of every frame, taken from a film of it by the mean background of the empty scene."""
+        """The mask of every frame, segmented by the mean background of the scene."""
         empty, film = _images(self.truth, self.body, self.camera, self.rng)
         background = mean_background(empty)
         masks = (people(*background.segment(image), None, None)[0] for image in film)
@@ -74,7 +76,7 @@ class Film:
 
     @property
     def switches(self) -> list[int]:
-        """The frames in which another activity begins."""
+        """The frames in which a new activity begins."""
         return [
             k
             for k in range(1, len(self.labels))
@@ -82,9 +84,9 @@ class Film:
         ]
 
 
-@lru_cache(maxsize=1)  # all methods follow the film of one seed before that of the next
+@lru_cache(maxsize=1)  # all methods track the film of one seed before the next
 def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
-    """Return the film of a seed."""
+    """Return the film for a seed."""
     rng = np.random.default_rng(seed)
     parts = [
         built_in.motion(
@@ -119,7 +121,10 @@ def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
 def _images(
     truth: Motion, body: Body, camera: Camera, rng: np.random.Generator
 ) -> tuple[Iterator[Image], Iterator[Image]]:
-    """Return the frames of the empty scene, and of the person before it; a wall, and clothes of another colour."""
+    """Return frames of the empty scene, and frames of the person in front of it.
+
+    The scene is a wall; the clothes have other colours.
+    """
     width = camera.width
     height = camera.height
     across, down = np.meshgrid(

@@ -1,6 +1,7 @@
-"""The experiment of the VSMM patent: trackers on films of its four activities, one film a seed.
+"""The experiment of the VSMM patent: trackers on films of its four activities.
 
-The settings of `vsmm` were chosen on films 0 to 4 (`TUNED`); films 5 to 14 are those that figures are reported of.
+There is one film for each seed. The settings of `vsmm` were chosen on films 0 to 4
+(`TUNED`); results are reported on films 5 to 14.
 """
 
 from collections.abc import Iterator
@@ -20,11 +21,13 @@ from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
 from posefit_vsmm.groups import TOPOLOGY
 from posefit_vsmm.motion import library
 
-TUNED = 5  # films on which defaults were chosen
-WARM_UP = 3  # frames that are tracked beforehand, so that no time includes compilation
-# of the film's activities; a jump is none of them
+# number of films on which defaults were chosen
+TUNED = 5
+# frames that are tracked before, so that the times exclude compilation
+WARM_UP = 3
+# labels of activities; a jump does not occur in the film
 LABELS = ("walk", "arms-out", "jacks", "squat", "jump")
-# of frames that are stored
+# stored details of each frame
 DETAILS = ("lost", "joints", "confidence", "filter_seconds", "detection_seconds")
 MODELS = library().models.names
 GROUPS = tuple(TOPOLOGY.groups.items())
@@ -36,7 +39,7 @@ METHODS: dict[str, TrackOptions] = {
         method="vsmm:patent", settings={"vsmm.structure": "all"}
     ),
 }
-# Interpretation V14, on the films that defaults are chosen on
+# Interpretation V14, on the films on which defaults were chosen
 UNRECOVERED = "no recovery"
 ALL = METHODS | {
     UNRECOVERED: TrackOptions(method="vsmm", settings={"vsmm.recovery": False})
@@ -45,7 +48,7 @@ ALL = METHODS | {
 
 @dataclass(frozen=True)
 class Scale:
-    """How many films are followed, of those that no default was chosen on."""
+    """The number of films, all different from those on which defaults were chosen."""
 
     films: int = 10
 
@@ -66,7 +69,7 @@ class Scale:
 
 
 def film_task(film: Film, evaluations: int) -> Task:
-    """Return what is known before a film; its first pose is not."""
+    """Return the task of a film. Its first pose is unknown."""
     yaw = float(film.truth.poses[0, 0])
     place = film.truth.translations[0]
     motions = [built_in.motion(motion) for motion in TRAINING]
@@ -83,7 +86,7 @@ def film_task(film: Film, evaluations: int) -> Task:
 
 
 def perform(run: Run) -> Arrays:
-    """Follow the film of a seed with a method; the first pose is not known."""
+    """Track the film of a seed with a method. The first pose is unknown."""
     film = film_of(run.seed)
     options = ALL[run.method]
     task = film_task(film, options.evaluations or EVALUATIONS)
@@ -98,7 +101,10 @@ def perform(run: Run) -> Arrays:
 
 
 def arrays_of(frames: list[Frame]) -> Arrays:
-    """Return the arrays of a track, a row a frame; -1 stands for no group, no candidate and no label."""
+    """Return the arrays of a track, a row for each frame.
+
+    -1 means no group, no candidate or no label.
+    """
     probabilities = np.zeros((len(frames), len(MODELS)))
     for row, frame in zip(probabilities, frames, strict=True):
         row[[MODELS.index(name) for name in frame.details["models"]]] = (

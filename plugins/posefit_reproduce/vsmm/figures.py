@@ -1,4 +1,7 @@
-"""The figures of the VSMM patent, redrawn: detected joints and poses (9), probabilities (10), joint errors (11)."""
+"""The figures of the VSMM patent, redrawn.
+
+Figure 9 shows detected joints and poses, 10 probabilities, 11 joint errors.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -15,13 +18,16 @@ from posefit_reproduce.vsmm.experiment import GROUPS, MODELS, TUNED
 from posefit_reproduce.vsmm.tables import PATENT_CM, joint_errors
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
-LARGER = 2  # pixels a pixel, in the stills
+LARGER = 2  # scale of the stills
 _JOINT = (60, 220, 255)
 _HIDDEN = (120, 120, 120)
 
 
 def patent_figures(results: Results) -> Iterator[tuple[str, Any]]:
-    """Yield the figures of the first film that is reported, by default and by the letter, with the names of files."""
+    """Yield the figures of the first reported film, with the names of their files.
+
+    There is a set for the default and one for the letter.
+    """
     film = film_of(TUNED)
     for run, arrays in results.runs.items():
         if (
@@ -38,7 +44,7 @@ def patent_figures(results: Results) -> Iterator[tuple[str, Any]]:
 
 
 def probability_figure(film: Film, arrays: Arrays) -> Figure:
-    """Return the probability of each model over time, with the groups that are in force."""
+    """Return the probability of each model over time, and the groups in force."""
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4.0, 1.0))
     seconds = np.arange(len(film.labels)) / FPS
@@ -75,7 +81,10 @@ def probability_figure(film: Film, arrays: Arrays) -> Figure:
 
 
 def error_figure(film: Film, arrays: Arrays) -> Figure:
-    """Return the errors of right elbow and hand over time, against the detected joints and against the truth."""
+    """Return the errors of right elbow and hand over time.
+
+    They are measured to the detected joints and to the truth.
+    """
     labels = {
         "_detected": "to the detected, cm",
         "": "to the truth, cm",
@@ -114,7 +123,10 @@ def _activities(axes: Any, film: Film, label: bool) -> None:
 
 
 def film_stills(film: Film, arrays: Arrays) -> Image:
-    """Return stills: detected joints on the mask, filled unless hidden; the body on it; the body from its side."""
+    """Return stills: detected joints on the mask, the body on it and from the side.
+
+    Joints are filled unless they are hidden.
+    """
     stills = [
         _still(
             film, {name: value[k] for name, value in arrays.items() if value.ndim}, k

@@ -1,4 +1,4 @@
-"""The figures of the VSMM patent's experiment, film by film, beside the patent's own, and its claims with verdicts."""
+"""The results of the VSMM patent's experiment compared with its own, and its claims."""
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
@@ -30,12 +30,13 @@ from posefit_reproduce.vsmm.experiment import (
 )
 from posefit_vsmm.state import AT
 
-# the joints that end in elbow and hand
+# the joints whose bones end in elbow and hand
 ELBOW = JOINTS.index("rhumerus")
 HAND = JOINTS.index("rwrist")
 POINTS = [AT["right elbow"], AT["right hand"]]
-TRUE_MM = 50.0  # ours: a mean distance of joints in space that still counts as none
-PATENT_CM = (2.7, 5.2)  # between these lie the patent's own mean errors of figure 11
+TRUE_MM = 50.0  # ours: mean distance of joints in space that is negligible
+# range of the patent's mean errors in figure 11
+PATENT_CM = (2.7, 5.2)
 RIGHT = [
     [MODELS.index(model) for model in sorted(activity.models)]
     for activity in ACTIVITIES
@@ -61,8 +62,9 @@ FIGURES: dict[str, tuple[str, int]] = {
     "frame": ("frame, CPU ms", 2),
 }
 BOTH = ("default", "patent")
-Films = Mapping[str, Array]  # by the names of `FIGURES`, those of all films (1, n)
-# what is shown film by film
+# values of all films (1, n), by the names of `FIGURES`
+Films = Mapping[str, Array]
+# figures shown for each film
 CHIEF = (
     "elbow_detected",
     "hand_detected",
@@ -72,7 +74,7 @@ CHIEF = (
     "delay",
     "delay_change",
 )
-# figures that a filter over all models does not have
+# figures that do not exist for a filter over all models
 SWITCHING = {
     "group",
     "delay",
@@ -84,18 +86,18 @@ SWITCHING = {
 
 
 def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
-    """Return the errors in cm of right elbow and hand (T, 2): to the detected joints, to the truth, and in space.
+    """Return the errors in cm of right elbow and hand (T, 2).
 
-    As in figure 11 no frame is left out: a joint that is hidden is where it is predicted. Interpretation V18.
+    They are measured to the detected joints, to the truth, and in space. As in figure
+    11 no frame is left out: a hidden joint is where it is predicted.
+    Interpretation V18.
     """
     skeleton = film.body.skeleton
     chosen = [ELBOW, HAND]
     truth = skeleton.joints(film.truth.poses, film.truth.translations)[:, chosen]
     estimate = skeleton.joints(arrays["poses"], arrays["translations"])[:, chosen]
-    (true_pixels, true_depths), (pixels, depths) = (
-        film.camera.project(truth),
-        film.camera.project(estimate),
-    )
+    true_pixels, true_depths = film.camera.project(truth)
+    pixels, depths = film.camera.project(estimate)
 
     def in_cm(off_pixels: Array, depths: Array) -> Array:
         return np.asarray(
@@ -128,11 +130,14 @@ def film_figures(seed: int, arrays: Arrays) -> dict[str, float]:
 
 
 def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
-    """Return how often models and groups in force are right; frames that try all models have no group."""
+    """Return how often models and groups in force are right.
+
+    Frames that try all models have no group.
+    """
     probabilities = arrays["probabilities"]
     candidates = arrays["candidate_group"]
     likeliest = probabilities.argmax(axis=1)
-    # of a group's number + 1
+    # by group number + 1
     models_of = [
         set(),
         *({MODELS.index(name) for name in names} for _, names in GROUPS),
@@ -174,7 +179,10 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
 
 
 def _delays(labels: list[int], right_group: NDArray[np.bool_]) -> list[int]:
-    """Return the frames of each activity until a right group is in force; all of them where none ever is."""
+    """Return the frames until a right group is in force, for each activity.
+
+    If none ever is, this is the activity's length.
+    """
     starts = [0, *(k for k in range(1, len(labels)) if labels[k] != labels[k - 1])]
     delays = []
     for start, stop in pairwise([*starts, len(labels)]):
@@ -184,7 +192,7 @@ def _delays(labels: list[int], right_group: NDArray[np.bool_]) -> list[int]:
 
 
 def patent_tables(results: Results) -> Iterator[Table]:
-    """Yield all tables: claims, methods, film by film, labels, recovery."""
+    """Yield all tables: claims, methods, films, labels, recovery."""
     rows: dict[str, list[dict[str, float]]] = {}
     for run in sorted(results.runs, key=lambda run: run.seed):
         rows.setdefault(f"{run.kind} {run.method}", []).append(
@@ -204,24 +212,22 @@ def patent_tables(results: Results) -> Iterator[Table]:
 
 
 def means_table(name: str, methods: Mapping[str, Films]) -> Table:
-    """Return the mean over films of each figure, with the interval that other films would give."""
-    rows = [
-        [
-            label,
-            *(
-                ""
-                if "six" in method and figure in SWITCHING
-                else bounded(interval(films[figure]), digits)
-                for method, films in methods.items()
-            ),
-        ]
-        for figure, (label, digits) in FIGURES.items()
-    ]
+    """Return the mean of each figure over films, with an interval over films."""
+    rows = []
+    for figure, (label, digits) in FIGURES.items():
+        cells = []
+        for method, films in methods.items():
+            # a filter over all six models does not switch
+            if "six" in method and figure in SWITCHING:
+                cells.append("")
+            else:
+                cells.append(bounded(interval(films[figure]), digits))
+        rows.append([label, *cells])
     return Table(name, ["mean of the films", *methods], rows)
 
 
 def films_table(name: str, methods: Mapping[str, Films]) -> Table:
-    """Return the chief figures of each film, and their deviation over the films."""
+    """Return the chief figures of each film, and their deviation over films."""
     rows = []
     for figure in CHIEF:
         label, digits = FIGURES[figure]
@@ -235,7 +241,7 @@ def films_table(name: str, methods: Mapping[str, Films]) -> Table:
 
 
 def claims(methods: Mapping[str, Films]) -> Iterator[Claim]:
-    """Yield what the patent says of its experiment, of our default and of its letter."""
+    """Yield the patent's claims on its experiment, for our default and the letter."""
     for name, other in (("default", "all six models"), ("patent", "patent, all six")):
         figures = methods[name]
         less = {
@@ -320,7 +326,10 @@ def claims(methods: Mapping[str, Films]) -> Iterator[Claim]:
 
 
 def labels_table(name: str, results: Results, method: str) -> Table:
-    """Return which share of the frames of each activity has which label, over the films that are reported."""
+    """Return the share of each label in the frames of each activity.
+
+    All reported films count.
+    """
     counts = np.zeros((len(ACTIVITIES), len(LABELS) + 1))
     for run, arrays in results.runs.items():
         if (run.kind, run.method) == ("reported", method):
@@ -335,7 +344,10 @@ def labels_table(name: str, results: Results, method: str) -> Table:
 
 
 def recovery_table(films: Mapping[str, Films]) -> Table:
-    """Return by how many mm of MPJPE the tracker is worse without recovery, on the films that it was chosen on."""
+    """Return how much worse, in mm of MPJPE, the tracker is without recovery.
+
+    The films are those on which recovery was chosen.
+    """
     with_it = films["tuned default"]
     without = films[f"tuned {UNRECOVERED}"]
     worse = without["mpjpe"] - with_it["mpjpe"]

@@ -1,19 +1,19 @@
-"""The page of a report as one document; what it shares with other pages is in `posefit.page`.
+"""The page of a report as one document. `posefit.page` has the parts of all pages.
 
 | looking for | file |
 |---|---|
-| the sections, empty, and how they look | report.html, report.css |
-| colours and marks of methods, the legend whose buttons show and hide them | methods.js |
+| the empty sections and their style | report.html, report.css |
+| methods: colours, marks, and the legend that shows and hides them | methods.js |
 | charts: lines with bands, errors of joints | charts.js |
-| the first screen: all methods, trouble | first.js |
-| the tables: leaderboard, all runs, running times, failures; the command that runs a cell again | tables.js |
+| the first screen: all methods, problems | first.js |
+| the tables, and the command that runs a cell again | tables.js |
 | paired tests: one method against all others | compare.js |
 | the order in which everything is drawn | main.js |
 
 The constant `D` is the data that `posefit.report.content` returns.
 
-All colours are darker on white and lighter on black, so that each has a contrast of at least 4.5 to 1 with its
-background. Marks distinguish methods too.
+All colours are darker on white and lighter on black, so that each has a contrast of at
+least 4.5 to 1 with its background. Marks distinguish methods too.
 """
 
 from typing import Any
@@ -21,7 +21,8 @@ from typing import Any
 from posefit.page.document import assembled, colour_style, one_script, part
 
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
-SCRIPTS = ("methods", "charts", "first", "tables", "compare", "main")  # in this order
+# each script may use the ones before it
+SCRIPTS = ("methods", "charts", "first", "tables", "compare", "main")
 _LIGHT = ("#00775a", "#a63d80", "#7a5c00", "#6b4cc0", "#111111", "#b0123b", "#3d6b7d")
 _DARK = ("#2cc79a", "#e39cc6", "#d9cf6a", "#b9a3ff", "#f2f2f2", "#ff8095", "#8fb8c9")
 COLOUR_COUNT = len(_LIGHT)

@@ -1,0 +1,73 @@
+"""TOML of Anipose, and what writes as it does: Pose2Sim, FreeMoCap, Caliscope; the AIST database has the same in JSON.
+
+A table a camera, or a table of these: a rotation about an axis and a translation, from the world to the camera.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from posefit.errors import InputError
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.lens import Calibration, Place, numbers_of, stated
+from posefit.geometry.calibration.values import Stored, matrix_of
+
+KEYS = {
+    *("name", "size", "matrix", "distortions", "rotation", "translation", "fisheye"),
+    # FreeMoCap's, which follow from the rotation and the translation
+    *("world_position", "world_orientation"),
+    # Caliscope's, of how its pictures were taken
+    *("ignore", "cam_id", "port", "error", "grid_count", "rotation_count"),
+    *("exposure", "verified_resolutions", "nickname"),
+}
+REQUIRED = {"matrix", "size", "distortions"}
+
+
+def _recognises(stored: Stored) -> bool:
+    return any(True for _ in _tables(stored.values))
+
+
+def _tables(
+    values: Mapping[str, Any], levels: int = 2
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the tables of cameras, and those in lists and other tables."""
+    for key, value in values.items():
+        entries = value if isinstance(value, list) else [value]
+        for number, table in enumerate(entries):
+            if not isinstance(table, dict):
+                continue
+            name = f"{key}{number}" if isinstance(value, list) else key
+            if table.keys() >= REQUIRED:
+                yield str(table.get("name", name)), table
+            elif levels > 1:
+                yield from _tables(table, levels - 1)
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    return [
+        _camera(name, table)
+        for name, table in _tables(stored.values)
+        if str(table.get("ignore")).lower() != "true"
+    ]
+
+
+def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
+    check_others(name, {key: value for key, value in table.items() if key not in KEYS})
+    # Caliscope's of a camera that is not placed yet
+    table = {key: value for key, value in table.items() if value != "null"}
+    place: Place | None = None
+    if "rotation" in table and "translation" in table:
+        place = matrix_of(table["rotation"]), matrix_of(table["translation"])
+    elif "rotation" in table or "translation" in table:
+        raise InputError("one with a rotation or a translation, but not both")
+    return stated(
+        name,
+        matrix_of(table["size"]).tolist(),
+        numbers_of(matrix_of(table["matrix"]), (3, 3)),
+        matrix_of(table["distortions"]),
+        place,
+        fisheye=str(table.get("fisheye", False)).lower() == "true",
+    )
+
+
+ANIPOSE = Dialect("Anipose", _recognises, _read)

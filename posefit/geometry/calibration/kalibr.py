@@ -1,0 +1,98 @@
+"""Kalibr's camchain.yaml: lengths in metres; each camera is placed from the one before it, or from the IMU."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.lens import (
+    Calibration,
+    Place,
+    numbers_of,
+    pinhole_matrix,
+    stated,
+)
+from posefit.geometry.calibration.values import Stored, check_keys, matrix_of, plain
+
+# matrices (4, 4), points of the second name to those of the first: the camera before
+# this one, and the IMU
+CHAINED = "T_cn_cnm1"
+FROM_IMU = "T_cam_imu"
+LENSES = {"radtan": False, "none": False, "equidistant": True}
+KEYS = {
+    *("camera_model", "intrinsics", "distortion_model", "distortion_coeffs"),
+    *("resolution", CHAINED, FROM_IMU),
+    # when and over what the pictures came
+    *("rostopic", "cam_overlaps", "timeshift_cam_imu", "line_delay"),
+    # which Kalibr does not write, and users add
+    *("rvec", "tvec"),
+}
+
+
+def _recognises(stored: Stored) -> bool:
+    return any(
+        isinstance(table, dict)
+        and (CHAINED in table or "camera_model" in table)
+        # users have a matrix under that name
+        and isinstance(table.get("intrinsics"), list)
+        and len(table["intrinsics"]) == 4
+        for table in stored.values.values()
+    )
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    tables = {
+        name: table for name, table in stored.values.items() if isinstance(table, dict)
+    }
+    places = _places(tables)
+    return [
+        _camera(name, table, place)
+        for (name, table), place in zip(tables.items(), places, strict=True)
+    ]
+
+
+def _places(tables: Mapping[str, Any]) -> list[Place | None]:
+    """Return where cameras stand: from the first of a chain, or else from the IMU, where all of them state it."""
+    if all({"rvec", "tvec"} <= table.keys() for table in tables.values()):
+        return [
+            (matrix_of(one["rvec"]), matrix_of(one["tvec"])) for one in tables.values()
+        ]
+    if not any(CHAINED in table for table in tables.values()):
+        if not all(FROM_IMU in table for table in tables.values()):
+            return [None] * len(tables)
+        matrices = [_matrix(table[FROM_IMU]) for table in tables.values()]
+    else:
+        matrices = [np.eye(4)]
+        for name, table in list(tables.items())[1:]:
+            if CHAINED not in table:
+                raise InputError(f"{name!r} without {CHAINED}")
+            matrices.append(_matrix(table[CHAINED]) @ matrices[-1])
+    return [(matrix[:3, :3], matrix[:3, 3]) for matrix in matrices]
+
+
+def _matrix(value: Any) -> Any:
+    return numbers_of(matrix_of(value), (4, 4))
+
+
+def _camera(name: str, table: Mapping[str, Any], place: Place | None) -> Calibration:
+    check_keys(table, KEYS, name, "Kalibr")
+    model = table.get("camera_model", "pinhole")
+    lens = table.get("distortion_model", "none")
+    if plain(model) != "pinhole":
+        raise InputError(f"the camera model {model!r}, which is not known")
+    if plain(lens) not in LENSES:
+        raise InputError(f"the lens model {lens!r}, which is not known")
+    intrinsics = numbers_of(matrix_of(table["intrinsics"]), (4,))
+    return stated(
+        name,
+        matrix_of(table["resolution"]).tolist(),
+        pinhole_matrix(intrinsics[:2], intrinsics[2:]),
+        matrix_of(table.get("distortion_coeffs", [0.0] * 4)),
+        place,
+        fisheye=LENSES[plain(lens)],
+    )
+
+
+KALIBR = Dialect("Kalibr", _recognises, _read)

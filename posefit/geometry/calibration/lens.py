@@ -1,0 +1,331 @@
+"""What a calibration file says of one camera, and the pictures that its lens would take without distortion."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.geometry.camera import Camera, check_focal, is_focal
+from posefit.reading import quoted
+
+# Of the lengths in a file: metres; a unit that is recognised by how large people are; or any multiple of a metre, where
+# a scene was reconstructed from pictures alone.
+Scale = Literal["metres", "open", "free"]
+# rotation and translation, camera_from_world
+Place = tuple[Any, Any]
+# of cameras that look along -z with y up, as OpenGL's and Qualisys' do, to ours
+OPENGL = np.diag([1.0, -1.0, -1.0])
+DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by
+BLOCK = 16  # pixels: codecs fill pictures up to a multiple of it
+HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
+FULL_TURN = 2.0 * math.pi  # radians, and no rotation vector is longer
+SKEWED = 2e-3  # of the focal length: pixels whose sides lean by less change nothing
+# of a picture's sides: a principal point is in the middle half
+MIDDLE = 0.25, 0.75
+# by how much of a picture's sides it may be off the centre by equal shares of both, as a picture that was scaled has it
+SCALED = 0.1
+EQUAL = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """One camera's entry in a calibration file. Lengths are metres, or the file's unit, and pixels."""
+
+    name: str
+    # width, height; None where the file does not state it: that of its pictures
+    size: tuple[int, int] | None
+    # (3, 3) of the pinhole, a skew of next to nothing ignored; pixel centres at 0, as OpenCV counts them
+    matrix: Array = field(repr=False)
+    # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; none is all 0
+    distortion: Array = field(repr=False)
+    # (3, 3) camera_from_world; None where the file does not place it
+    rotation: Array | None = field(repr=False)
+    translation: Array | None = field(repr=False)  # (3,)
+    fisheye: bool = False
+    # whether +y is known to be up in its world, as in our own files
+    upright: bool = False
+    # what is known of the unit of its places
+    scale: Scale = "open"
+
+    @property
+    def distorted(self) -> bool:
+        """Whether the lens bends straight lines; a fisheye does so by itself."""
+        return self.fisheye or bool(np.any(self.distortion))
+
+    @property
+    def position(self) -> Array | None:
+        """Where (3,) it stands in the world of its file; None where this does not place it."""
+        if self.rotation is None or self.translation is None:
+            return None
+        return np.asarray(-self.rotation.T @ self.translation)
+
+    @classmethod
+    def of(cls, camera: Camera, name: str = "camera") -> "Calibration":
+        """Return what a file would say of a camera, whose lens does not bend straight lines."""
+        matrix = pinhole_matrix(camera.focal, camera.centre - HALF)
+        return cls(
+            name,
+            (camera.width, camera.height),
+            matrix,
+            np.zeros(4),
+            camera.rotation,
+            camera.translation,
+            upright=True,
+            scale="metres",
+        )
+
+    def in_metres(self, metres: float) -> "Calibration":
+        """Return the calibration in metres, where the unit of its file is so many, unless it is in metres already."""
+        if self.translation is None or self.scale == "metres":
+            return self
+        return replace(self, translation=metres * self.translation)
+
+    def camera(self, size: tuple[int, int], world: Array) -> Camera:
+        """Return the camera of pictures scaled to `size` without their distortion; `world` (3, 3) turns its up to +y.
+
+        A camera that the file does not place stands at the origin and looks level along -z.
+        """
+        scale = np.array(size) / (self.size or size)
+        rotation = OPENGL if self.rotation is None else self.rotation @ world.T
+        translation = np.zeros(3) if self.translation is None else self.translation
+        focal = np.diag(self.matrix)[:2] * scale
+        centre = (self.matrix[:2, 2] + HALF) * scale
+        return Camera(*size, focal, centre, orthonormal(rotation), translation)
+
+    def padded(self, size: tuple[int, int]) -> "Calibration | None":
+        """Return the calibration of pictures of another size that only have rows or columns more or less at their end.
+
+        Codecs fill up a picture to blocks of 16 pixels, so that 1080 rows become 1088, and some programs leave them
+        there. None where the sizes differ otherwise; a calibration of no size fits where its centre is in the middle
+        half of the picture.
+        """
+        if self.size is None:
+            fits = is_central(self.matrix, size) and is_focal(
+                np.diag(self.matrix)[:2], size
+            )
+            return replace(self, size=size) if fits else None
+        for side, other in zip(self.size, size, strict=True):
+            if side != other and (
+                abs(side - other) >= BLOCK or max(side, other) % BLOCK
+            ):
+                return None
+        return replace(self, size=size)
+
+    def maps(
+        self, size: tuple[int, int], straight: Camera | None = None
+    ) -> tuple[Any, Any]:
+        """Return the maps with which cv2.remap makes pictures of a camera without distortion.
+
+        Args:
+            size: Width and height of the pictures that are straightened.
+            straight: The camera that they become, with this calibration's view; by default that of `size`. It may have
+                square pixels where these are not square.
+
+        Returns:
+            Columns and rows in the pictures, each (height, width) of `straight`.
+
+        """
+        lens = self.distortion[: 4 if self.fisheye else None]
+        straight = straight or self.camera(size, np.eye(3))
+        maps = (
+            cv2.fisheye.initUndistortRectifyMap
+            if self.fisheye
+            else cv2.initUndistortRectifyMap
+        )
+        return maps(
+            self._scaled_matrix(size),
+            lens,
+            np.eye(3),
+            pinhole_matrix(straight.focal, straight.centre - HALF),
+            (straight.width, straight.height),
+            cv2.CV_32FC1,
+        )
+
+    def _scaled_matrix(self, size: tuple[int, int]) -> Array:
+        camera = self.camera(size, np.eye(3))
+        return pinhole_matrix(camera.focal, camera.centre - HALF)
+
+    def straightened(
+        self, points: Array, size: tuple[int, int], straight: Camera | None = None
+    ) -> Array:
+        """Return points without distortion, as `maps` moves pictures.
+
+        Args:
+            points: Columns, rows and a third number (..., 3) in pictures of `size`.
+            size: Width and height of the pictures.
+            straight: The camera whose columns and rows are returned; by default that of `size`.
+
+        Returns:
+            Points (..., 3).
+
+        """
+        matrix = self._scaled_matrix(size)
+        straight = straight or self.camera(size, np.eye(3))
+        to = pinhole_matrix(straight.focal, straight.centre - HALF)
+        bent = points[..., :2].reshape(-1, 1, 2).astype(np.float64) - HALF
+        undistort = cv2.fisheye.undistortPoints if self.fisheye else cv2.undistortPoints
+        lens = self.distortion[: 4 if self.fisheye else None]
+        moved = undistort(bent, matrix, lens, P=to) + HALF
+        return np.concatenate(
+            [moved.reshape(*points.shape[:-1], 2), points[..., 2:]], axis=-1
+        )
+
+
+def is_central(matrix: Array, size: Sequence[float]) -> bool:
+    """Return whether a principal point may be that of pictures of a size, and not of larger or smaller ones."""
+    across, down = matrix[:2, 2] / size
+    low, high = MIDDLE
+    if not (low < across < high and low < down < high):
+        return False
+    scaled = (
+        abs(across - down) < EQUAL and min(abs(across - 0.5), abs(down - 0.5)) > SCALED
+    )
+    return not scaled
+
+
+def stated(
+    name: str,
+    size: Any,
+    matrix: Any,
+    distortion: Any,
+    place: Place | None,
+    *,
+    fisheye: bool = False,
+    cropped: bool = False,
+    scale: Scale = "open",
+) -> Calibration:
+    """Return what a file states of a camera, checked.
+
+    Args:
+        name: What the file calls the camera.
+        size: Width and height of its pictures; None where the file does not state them.
+        matrix: Pinhole (3, 3), the centre of the first pixel at 0.
+        distortion: OpenCV's k1, k2, p1, p2, k3, ..., or k1 to k4 of a fisheye.
+        place: Rotation, as a matrix or as an axis as long as its angle, and translation, from the world to the camera.
+        fisheye: Whether the lens is OpenCV's fisheye.
+        cropped: Whether pictures are a part of the sensor's, so that their centre may be anywhere.
+        scale: What is known of the unit of `place`.
+
+    Returns:
+        The calibration.
+
+    Raises:
+        InputError: No camera can be so; the message completes `expected a calibration ..., got ...`.
+
+    """
+    if size is not None:
+        size = _whole(size)
+    if abs(matrix[1, 0]) > 1e-6 or np.abs(matrix[2] - [0.0, 0.0, 1.0]).max() > 1e-6:
+        raise InputError(
+            f"a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: {quoted(matrix.tolist())}"
+        )
+    check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
+    if abs(matrix[0, 1]) > SKEWED * matrix[0, 0]:
+        raise InputError(
+            f"a skew of {matrix[0, 1]:g} pixels, which is not read: pictures must have upright pixels"
+        )
+    if size is not None and not cropped and not is_central(matrix, size):
+        centre = " and ".join(f"{value:g}" for value in matrix[:2, 2])
+        raise InputError(
+            f"a centre of {centre} in pictures of {size[0]}x{size[1]}: it is of pictures of another size"
+        )
+    rotation, translation = (None, None) if place is None else place
+    return Calibration(
+        name,
+        size,
+        matrix,
+        _lens(distortion, fisheye),
+        None if rotation is None else rotation_of(rotation),
+        None if translation is None else numbers_of(np.ravel(translation), (3,)),
+        fisheye,
+        scale=scale,
+    )
+
+
+def _whole(size: Sequence[float]) -> tuple[int, int]:
+    width, height = size
+    sides = float(width), float(height)
+    if not all(side.is_integer() and side >= 1 for side in sides):
+        raise InputError(f"an image size of {width} x {height}")
+    return int(width), int(height)
+
+
+def _lens(distortion: Any, fisheye: bool) -> Array:
+    lens = np.array(distortion, dtype=np.float64).reshape(-1)
+    if not np.isfinite(lens).all():
+        raise InputError("a distortion that is not finite")
+    if not lens.any():
+        return np.zeros(4)
+    if lens.size not in DISTORTIONS or (fisheye and lens[4:].any()):
+        raise InputError(
+            f"a distortion of {lens.size} numbers{' of a fisheye' if fisheye else ''}"
+        )
+    return lens
+
+
+def rotation_of(rotation: Any) -> Array:
+    """Return the matrix (3, 3) of a rotation: nine numbers, or three, its axis as long as its angle in radians."""
+    if np.size(rotation) == 3:
+        vector = numbers_of(np.ravel(rotation), (3,))
+        angle = float(np.linalg.norm(vector))
+        if angle > FULL_TURN:
+            raise InputError(
+                f"a rotation of {angle:g} radians about an axis, more than a full turn: are {quoted(vector.tolist())} "
+                "degrees, or angles about three axes?"
+            )
+        return np.asarray(cv2.Rodrigues(vector)[0])
+    if np.shape(rotation) == (9,):
+        rotation = np.reshape(rotation, (3, 3))
+    return numbers_of(rotation, (3, 3))
+
+
+def placed_at(rotation: Array, position: Any) -> Place:
+    """Return the place of a camera (3, 3) from the world that stands at a position (3,) of the world."""
+    return rotation, -rotation @ numbers_of(np.ravel(position), (3,))
+
+
+def seen_from(matrix: Any, axes: Array | None = None) -> Place:
+    """Return the place of a camera from its matrix (4, 4) to the world.
+
+    `axes` (3, 3) turns the axes of the file's cameras to ours, x right, y down and z forward.
+    """
+    to_world = numbers_of(matrix, (4, 4))
+    if np.abs(to_world[3] - [0.0, 0.0, 0.0, 1.0]).max() > 1e-6:
+        raise InputError(
+            f"a matrix to the world whose last row is not 0 0 0 1: {quoted(to_world.tolist())}"
+        )
+    rotation = to_world[:3, :3].T if axes is None else axes @ to_world[:3, :3].T
+    return placed_at(rotation, to_world[:3, 3])
+
+
+def pinhole_matrix(
+    focal: Sequence[float] | Array, centre: Sequence[float] | Array
+) -> Array:
+    """Return the matrix (3, 3) of a camera without skew."""
+    return np.array(
+        [[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]]
+    )
+
+
+def numbers_of(values: Any, shape: tuple[int, ...]) -> Array:
+    """Return finite numbers of a shape. Raises InputError where they are others."""
+    numbers = np.asarray(values, dtype=np.float64)
+    if numbers.shape != shape or not np.isfinite(numbers).all():
+        raise InputError(
+            f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be"
+        )
+    return numbers
+
+
+def orthonormal(rotation: Array) -> Array:
+    """Return the rotation nearest to a matrix that was rounded when it was written."""
+    left, _, right = np.linalg.svd(rotation)
+    nearest = left @ right
+    if np.linalg.det(nearest) < 0.0 or np.abs(nearest - rotation).max() > 1e-2:
+        raise InputError(f"a rotation that is none: {quoted(rotation.tolist())}")
+    return np.asarray(nearest)

@@ -1,0 +1,162 @@
+"""transforms.json of instant-ngp, nerfstudio and their relatives: a camera a frame; lengths have no unit.
+
+`transform_matrix` (4, 4) is camera_to_world of a camera that looks along -z with y up, as OpenGL has it. The centre of
+the first pixel is 0.5, as COLMAP counts, from which these files are made.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.lens import (
+    HALF,
+    OPENGL,
+    Calibration,
+    numbers_of,
+    pinhole_matrix,
+    seen_from,
+    stated,
+)
+from posefit.geometry.calibration.values import (
+    Stored,
+    counts,
+    matrix_of,
+    number_of,
+    plain,
+)
+from posefit.reading import quoted
+
+MATRIX = "transform_matrix"
+LENSES = {
+    **dict.fromkeys(("", "opencv", "pinhole", "simplepinhole", "simpleradial"), False),
+    **dict.fromkeys(("radial", "perspective"), False),
+    "opencvfisheye": True,
+}
+LENS_KEYS = ("k1", "k2", "k3", "k4", "p1", "p2")
+# of one frame, or of all of them
+VIEW_KEYS = {
+    *("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_angle_y", "K"),
+    *("camera_model", "is_fisheye", *LENS_KEYS),
+}
+FRAME_KEYS = {
+    *(MATRIX, "file_path", *VIEW_KEYS),
+    # which picture it is, and what is beside it
+    *("sharpness", "depth_file_path", "depth_path", "mask_path", "colmap_im_id"),
+    *("time", "timestamp", "timestep_index", "camera_index", "camera_id", "cam_id"),
+    # of Blender's example scenes: how far a turntable went on
+    *("rotation",),
+}
+FILE_KEYS = {
+    *("frames", *VIEW_KEYS),
+    # how a radiance field is trained, and what was applied to the matrices already
+    *("aabb_scale", "scale", "offset", "aabb", "render_aabb", "up"),
+    *("applied_transform", "applied_scale", "orientation_override"),
+    *("ply_file_path", "fps", "white_transparent", "black_transparent"),
+    *("enable_depth_loading", "integer_depth_scale", "n_extra_learnable_dims"),
+    *("train_filenames", "val_filenames", "test_filenames"),
+}
+
+
+def _recognises(stored: Stored) -> bool:
+    frames = stored.values.get("frames")
+    return isinstance(frames, list) and any(
+        isinstance(frame, dict) and MATRIX in frame for frame in frames
+    )
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    values = stored.values
+    check_others(
+        stored.path.stem,
+        {key: value for key, value in values.items() if key not in FILE_KEYS},
+    )
+    frames = values["frames"]
+    names = _names([str(frame.get("file_path", k)) for k, frame in enumerate(frames)])
+    shared = {key: value for key, value in values.items() if key in VIEW_KEYS}
+    return [
+        _camera(name, frame, shared) for name, frame in zip(names, frames, strict=True)
+    ]
+
+
+def _names(paths: Sequence[str]) -> list[str]:
+    """Return the names of files without folder and suffix, where these are names of one file each."""
+    stems = [PurePosixPath(path).stem for path in paths]
+    seen = Counter(stems)
+    return [
+        stem if seen[stem] == 1 else path
+        for stem, path in zip(stems, paths, strict=True)
+    ]
+
+
+def _camera(
+    name: str, frame: Mapping[str, Any], shared: Mapping[str, Any]
+) -> Calibration:
+    check_others(
+        name,
+        {key: value for key, value in frame.items() if key not in FRAME_KEYS},
+    )
+    if MATRIX not in frame:
+        raise InputError(f"the frame {quoted(name)} without {MATRIX}")
+    values = {**shared, **frame}
+    model = plain(values.get("camera_model", ""))
+    if model not in LENSES:
+        raise InputError(
+            f"the camera model {quoted(values['camera_model'])}, which is not known"
+        )
+    fisheye = LENSES[model] or str(values.get("is_fisheye")).lower() in ("true", "1")
+    k1, k2, k3, k4, p1, p2 = (number_of(values.get(key, 0.0)) for key in LENS_KEYS)
+    # OpenCV's polynomial has no fourth number, and its fisheye none across
+    for key in ("p1", "p2") if fisheye else ("k4",):
+        if counts(values.get(key, 0.0)):
+            raise InputError(f"the lens key {quoted(key)}, which is not read")
+    size = None
+    if "w" in values and "h" in values:
+        size = [number_of(values["w"]), number_of(values["h"])]
+    return stated(
+        name,
+        size,
+        _matrix(values, size),
+        [k1, k2, k3, k4] if fisheye else [k1, k2, p1, p2, k3],
+        seen_from(matrix_of(frame[MATRIX]), OPENGL),
+        fisheye=fisheye,
+        scale="free",
+    )
+
+
+def _matrix(values: Mapping[str, Any], size: Sequence[float] | None) -> Array:
+    if "K" in values:
+        matrix = numbers_of(matrix_of(values["K"]), (3, 3)).copy()
+        matrix[:2, 2] -= HALF
+        return matrix
+    if size is None:
+        raise InputError("transforms without w and h, the size of their pictures")
+    focal = list[float | None]()
+    for axis, side in zip("xy", size, strict=True):
+        if f"fl_{axis}" in values:
+            focal.append(number_of(values[f"fl_{axis}"]))
+        elif f"camera_angle_{axis}" in values:
+            angle = number_of(values[f"camera_angle_{axis}"])
+            focal.append(0.5 * side / math.tan(0.5 * angle))
+        else:
+            focal.append(None)
+    known = [length for length in focal if length is not None]
+    if not known:
+        raise InputError("transforms without fl_x, camera_angle_x or K")
+    centre = [
+        number_of(values.get(f"c{axis}", 0.5 * side)) - HALF
+        for axis, side in zip("xy", size, strict=True)
+    ]
+    return pinhole_matrix(
+        [known[0] if length is None else length for length in focal], np.array(centre)
+    )
+
+
+NERF = Dialect("NeRF's programs", _recognises, _read)

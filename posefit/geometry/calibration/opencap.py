@@ -1,0 +1,49 @@
+"""OpenCap's cameraIntrinsicsExtrinsics, converted to JSON: a rotation and a translation in millimetres.
+
+OpenCap writes a pickle. This may run any code when it is read, so that it is refused, with how to convert it.
+"""
+
+import numpy as np
+
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.lens import Calibration, Place, numbers_of, stated
+from posefit.geometry.calibration.values import Stored, matrix_of
+
+PICKLES = (".pickle", ".pkl")
+# what a message about a pickle says
+HOW = (
+    "a pickle, which may run any code: where you trust it, write it as JSON, "
+    "json.dump({key: numpy.asarray(value).tolist() for key, value in pickle.load(file).items()}, ...)"
+)
+REQUIRED = {"intrinsicMat", "imageSize"}
+KEYS = {
+    *("distortion", "rotation", "translation", *REQUIRED),
+    # it follows from the rotation
+    "rotation_EulerAngles",
+}
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    values = stored.values
+    name = stored.path.stem
+    check_others(name, {key: value for key, value in values.items() if key not in KEYS})
+    matrix = numbers_of(matrix_of(values["intrinsicMat"]), (3, 3))
+    size = np.ravel(matrix_of(values["imageSize"]))
+    # its height comes first where its pictures are tall: the centre says which side is which
+    off = [np.abs(matrix[:2, 2] / sides - 0.5).max() for sides in (size, size[::-1])]
+    place: Place | None = None
+    if "rotation" in values and "translation" in values:
+        place = matrix_of(values["rotation"]), matrix_of(values["translation"])
+    return [
+        stated(
+            name,
+            size if off[0] <= off[1] else size[::-1],
+            matrix,
+            matrix_of(values.get("distortion", [0.0] * 5)),
+            place,
+        )
+    ]
+
+
+OPENCAP = Dialect("OpenCap", lambda stored: stored.values.keys() >= REQUIRED, _read)

@@ -1,0 +1,254 @@
+"""Cameras as OpenCV's FileStorage and its users write them: YAML, JSON, XML or TOML, under the names that they chose.
+
+A camera is a table with a camera matrix, or fx, fy and its centre; a file is one, or has several in
+tables or lists. Rotation and translation are from the world to the camera. What a key says is decided
+by its name alone, in small letters and without signs between. A key that is not known is refused by
+its name where it holds numbers, unless its name says that they describe neither the lens nor the
+place, see keys.py.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.lens import (
+    Calibration,
+    Place,
+    numbers_of,
+    pinhole_matrix,
+    stated,
+)
+from posefit.geometry.calibration.values import (
+    Stored,
+    matrix_of,
+    number_of,
+    plain,
+)
+from posefit.reading import quoted
+
+MOST_TABLES = 10_000
+INTRINSICS = (
+    *("intrinsic", "intrinsics", "intrinsicmatrix", "intrinsicmat"),
+    *("cameraintrinsic", "cameraintrinsics"),
+)
+MATRIX = (
+    *("cameramatrix", "cameramat", "cameramtx", "matrix", "k", "m", "mtx"),
+    *INTRINSICS,
+)
+LENS = (
+    *("distortioncoefficients", "distortioncoeffs", "distortioncoefs"),
+    *("distortioncoefficient", "distortioncoeff", "distortions", "distortion"),
+    *("distortionparams", "distortionparameters", "distortionvector"),
+    *("distcoefficients", "distcoeffs", "distcoefs", "distcoef", "distcoeff"),
+    *("dist", "d", "kc"),
+)
+MODEL = (
+    *("distortionmodel", "fisheyemodel", "fisheye", "isfisheye", "lensmodel"),
+    *("cameramodel", "model"),
+)
+SIZE = (
+    *("imagesize", "size", "resolution", "imgsize", "imsize", "imageresolution"),
+    *("cameraresolution", "framesize"),
+)
+SIDES = (
+    ("imagewidth", "width", "w", "imgwidth", "imgw", "framewidth"),
+    ("imageheight", "height", "h", "imgheight", "imgh", "frameheight"),
+)
+FOCAL = "fx", "fy"
+CENTRES = (("cx", "cy"), ("ppx", "ppy"), ("ox", "oy"), ("u0", "v0"))
+NUMBERED = "k1", "k2", "p1", "p2", "k3"  # in OpenCV's order
+NUMBERED_FISHEYE = "k1", "k2", "k3", "k4"
+ROTATION = (
+    *("r", "rotation", "rvec", "rot", "rmat", "rotationmatrix", "rotationvector"),
+    *("rotmat", "rotvec"),
+)
+TRANSLATION = "t", "translation", "tvec", "translationvector", "transvec"
+# of a chessboard there are many; a single one is the camera's place
+BOARDS = (
+    ("rvecs", "tvecs"),
+    ("rotationvectors", "translationvectors"),
+)
+EXTRINSICS = "extrinsic", "extrinsics", "cameraextrinsic", "cameraextrinsics"
+_FISHEYES = (
+    *("1", "true", "yes", "fisheye", "equidistant", "kannalabrandt"),
+    *("kannalabrandt4", "opencvfisheye", "kb4"),
+)
+_POLYNOMIALS = (
+    *("0", "false", "no", "none", "null", "", "plumbbob", "brown", "brownconrady"),
+    *("pinhole", "perspective", "opencv", "fullopencv", "polynomial"),
+    *("rationalpolynomial", "radtan", "radialtangential", "standard"),
+)
+# models not read
+_OTHERS = re.compile(
+    "omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular"
+)
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    """Return the camera that values describe by their keys, or those of their tables, and of the tables in these."""
+    cameras = list[Calibration]()
+    # of tables that hold those of cameras
+    around = dict[str, Any]()
+    tables: list[tuple[str, Mapping[str, Any]]] = [(stored.path.stem, stored.values)]
+    for _ in range(3):
+        inner = list[tuple[str, Mapping[str, Any]]]()
+        for name, table in tables:
+            table = _whole(table)
+            # a camera may be called K or D
+            known = {
+                plain(key): value
+                for key, value in table.items()
+                if not _is_camera(value)
+            }
+            if _first(known, MATRIX) is not None or _pinhole(known) is not None:
+                cameras.append(_camera(name, table, known))
+            elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
+                raise InputError(
+                    f"{quoted(name)} without camera_matrix, image_width and image_height"
+                )
+            else:
+                around |= {k: v for k, v in table.items() if not _has_tables(v)}
+                inner += _tables(table)
+        # as an alias of YAML may give the same one again and again
+        if len(inner) > MOST_TABLES:
+            raise InputError(f"a file of more than {MOST_TABLES:,} tables")
+        tables = inner
+    if cameras:
+        check_others(stored.path.stem, around)
+    return cameras
+
+
+def _has_tables(value: Any) -> bool:
+    return isinstance(value, dict) or (
+        isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
+    )
+
+
+def _whole(table: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a table with what its tables `intrinsics` and `extrinsics` say of the same camera."""
+    whole = dict[str, Any]()
+    for key, value in table.items():
+        inner = isinstance(value, dict) and not any(map(_has_tables, value.values()))
+        names = {plain(name) for name in value} if inner else set()
+        of_lens = plain(key) in INTRINSICS and not names.isdisjoint((*MATRIX, "fx"))
+        of_place = plain(key) in EXTRINSICS and not names.isdisjoint(ROTATION)
+        whole |= value if of_lens or of_place else {key: value}
+    return whole
+
+
+def _is_camera(value: Any) -> bool:
+    """Return whether a value is a table that describes a camera, whatever this is called."""
+    if not isinstance(value, dict):
+        return False
+    names = {plain(name) for name in value}
+    return {"fx", "fy"} <= names or not names.isdisjoint(MATRIX)
+
+
+def _tables(values: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the tables among values, and those in lists, with their names."""
+    for key, value in values.items():
+        if isinstance(value, dict) and key != "metadata":
+            yield str(value.get("name", key)), value
+        elif isinstance(value, list):
+            tables = (entry for entry in value if isinstance(entry, dict))
+            yield from (
+                (str(table.get("name", f"{key}{number}")), table)
+                for number, table in enumerate(tables)
+            )
+
+
+def _pinhole(known: Mapping[str, Any]) -> Array | None:
+    """Return the matrix (3, 3) of focal lengths and a centre that are stated one by one; None where they are not."""
+    for centre in CENTRES:
+        if {*FOCAL, *centre} <= known.keys():
+            return pinhole_matrix(
+                [number_of(known[key]) for key in FOCAL],
+                [number_of(known[key]) for key in centre],
+            )
+    return None
+
+
+def _camera(
+    name: str, values: Mapping[str, Any], known: Mapping[str, Any]
+) -> Calibration:
+    """Return the camera that values describe, whose keys in small letters and digits are those of `known`."""
+    fisheye = _is_fisheye(known)
+    numbered = NUMBERED_FISHEYE if fisheye else NUMBERED
+    lens = _first(known, LENS)
+    read = {*LENS, *MODEL, *numbered, *SIZE, *SIDES[0], *SIDES[1], *ROTATION}
+    read |= {*TRANSLATION, *FOCAL, *sum(CENTRES, ()), *sum(BOARDS, ())}
+    read.add(next((key for key in MATRIX if key in known), ""))
+    others = {key: value for key, value in values.items() if plain(key) not in read}
+    if lens is None or (isinstance(lens, dict) and "k1" in lens):
+        others |= {
+            key: value
+            for key, value in (lens or {}).items()
+            if plain(key) not in {*numbered, *MODEL}
+        }
+        lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
+    size = _first(known, SIZE)
+    sides = (
+        [_first(known, names) for names in SIDES]
+        if size is None
+        else np.ravel(matrix_of(size)).tolist()
+    )
+    place = _place(known)
+    check_others(name, others, placed=place is not None)
+    return stated(
+        name,
+        None if None in sides else [number_of(side) for side in sides],
+        _matrix(known),
+        matrix_of(lens),
+        place,
+        fisheye=fisheye,
+    )
+
+
+def _matrix(known: Mapping[str, Any]) -> Array:
+    value = _first(known, MATRIX)
+    if value is None:
+        return np.asarray(_pinhole(known))
+    matrix = matrix_of(value)
+    return numbers_of(matrix.reshape(3, 3) if matrix.shape == (9,) else matrix, (3, 3))
+
+
+def _place(known: Mapping[str, Any]) -> Place | None:
+    """Return the rotation and the translation that values state; None of a camera that they do not place."""
+    rotation = _first(known, ROTATION)
+    translation = _first(known, TRANSLATION)
+    if rotation is not None and translation is not None:
+        return matrix_of(rotation), matrix_of(translation)
+    if rotation is not None or translation is not None:
+        raise InputError("one with a rotation or a translation, but not both")
+    for names in BOARDS:
+        single = [matrix_of(known[key]) for key in names if key in known]
+        if len(single) == 2 and all(numbers.size == 3 for numbers in single):
+            return single[0].reshape(-1), single[1].reshape(-1)
+    return None
+
+
+def _first(known: Mapping[str, Any], names: Sequence[str]) -> Any:
+    """Return the value of the first name that is known; None where none is."""
+    return next((known[name] for name in names if name in known), None)
+
+
+def _is_fisheye(known: Mapping[str, Any]) -> bool:
+    """Return whether the lens is OpenCV's fisheye. Raises InputError for a model that OpenCV has not."""
+    for key in (name for name in MODEL if name in known):
+        model = plain(known[key])
+        if model in _FISHEYES:
+            return True
+        if model not in _POLYNOMIALS and (
+            key not in ("cameramodel", "model") or _OTHERS.search(model)
+        ):
+            raise InputError(f"the lens model {quoted(known[key])}, which is not known")
+    return False
+
+
+OPENCV = Dialect("OpenCV", lambda stored: stored.root is None, _read)

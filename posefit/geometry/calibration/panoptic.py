@@ -1,0 +1,40 @@
+"""CMU Panoptic's calibration_*.json: lengths in centimetres, -y up."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.lens import Calibration, numbers_of, stated
+from posefit.geometry.calibration.values import Stored, check_keys, matrix_of
+
+REQUIRED = {"K", "distCoef", "R", "t", "resolution"}
+# which of the dome's cameras it is
+KEYS = REQUIRED | {"name", "type", "panel", "node"}
+
+
+def _recognises(stored: Stored) -> bool:
+    cameras = stored.values.get("cameras")
+    return isinstance(cameras, list) and any(
+        isinstance(camera, dict) and camera.keys() >= REQUIRED for camera in cameras
+    )
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    return [
+        _camera(str(table.get("name", number)), table)
+        for number, table in enumerate(stored.values["cameras"])
+    ]
+
+
+def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
+    check_keys(table, KEYS, name, "CMU Panoptic")
+    return stated(
+        name,
+        matrix_of(table["resolution"]).tolist(),
+        numbers_of(matrix_of(table["K"]), (3, 3)),
+        matrix_of(table["distCoef"]),
+        (matrix_of(table["R"]), matrix_of(table["t"])),
+    )
+
+
+PANOPTIC = Dialect("CMU Panoptic", _recognises, _read)

@@ -1,0 +1,86 @@
+"""Qualisys' calibration in XML: millimetres, and lengths on the sensor in 64ths of a pixel.
+
+Its cameras look along -z with y up. `fov_video` is the part of the sensor that the video shows.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.lens import (
+    OPENGL,
+    Calibration,
+    pinhole_matrix,
+    placed_at,
+    stated,
+)
+from posefit.geometry.calibration.values import Stored, counts, plain
+from posefit.geometry.calibration.xml_tags import tag_of
+from posefit.reading import quoted
+
+SUBPIXELS = 64.0
+MILLIMETRES = 0.001
+# in the order of OpenCV's k1, k2, p1, p2, k3
+LENS = (
+    *("radialDistortion1", "radialDistortion2"),
+    *("tangentalDistortion1", "tangentalDistortion2", "radialDistortion3"),
+)
+INTRINSICS = {
+    *("focalLengthU", "focalLengthV", "centerPointU", "centerPointV", *LENS),
+    # of the lens in millimetres, and of the whole sensor
+    *("focallength", "sensorMinU", "sensorMaxU", "sensorMinV", "sensorMaxV"),
+}
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    return [
+        _camera(camera, camera.get("serial", f"camera {number}"))
+        for number, camera in enumerate(stored.root.iter("camera"))
+    ]
+
+
+def _camera(camera: Any, name: str) -> Calibration:
+    view = tag_of(camera, "fov_video")
+    lens = tag_of(camera, "intrinsic")
+    place = tag_of(camera, "transform")
+    for key, value in lens.items():
+        if key not in INTRINSICS and counts(value):
+            raise InputError(f"the lens key {quoted(key)}, which is not known")
+    if counts(camera.get("viewrotation", "0")):
+        raise InputError(
+            f"the key 'viewrotation' of {quoted(name)}, which is not read: calibrate with views that are not rotated"
+        )
+    left, top, right, bottom = (
+        float(view.get(side, "")) for side in ("left", "top", "right", "bottom")
+    )
+    focal, centre = (
+        np.array([float(lens.get(f"{kind}{axis}", "")) / SUBPIXELS for axis in "UV"])
+        for kind in ("focalLength", "centerPoint")
+    )
+    turned = np.array(
+        [[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"]
+    )
+    position = MILLIMETRES * np.array([float(place.get(axis, "")) for axis in "xyz"])
+    return stated(
+        name,
+        (right - left + 1, bottom - top + 1),
+        pinhole_matrix(focal, centre - (left, top)),
+        [float(lens.get(key, "0")) for key in LENS],
+        placed_at(OPENGL @ turned, position),
+        # the video may be any part of the sensor
+        cropped=True,
+        scale="metres",
+    )
+
+
+def _recognises(stored: Stored) -> bool:
+    return (
+        stored.root is not None
+        and plain(stored.root.tag) == "calibration"
+        and stored.root.find(".//fov_video") is not None
+    )
+
+
+QUALISYS = Dialect("Qualisys", _recognises, _read)

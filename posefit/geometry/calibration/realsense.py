@@ -1,0 +1,66 @@
+"""Intrinsics of a RealSense camera, as `pyrealsense2.intrinsics` names them: one camera, which it does not place."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.lens import Calibration, pinhole_matrix, stated
+from posefit.geometry.calibration.values import (
+    Stored,
+    matrix_of,
+    number_of,
+    plain,
+)
+from posefit.reading import quoted
+
+REQUIRED = {"ppx", "ppy", "fx", "fy"}
+# `depth_scale` is of pictures of depths
+KEYS = REQUIRED | {"width", "height", "model", "coeffs", "depth_scale"}
+# models that are OpenCV's, and whether they are of a fisheye; the others bend pictures in
+# another way, or state how to bend them back
+LENSES = {"none": False, "brownconrady": False, "kannalabrandt4": True}
+
+
+def _tables(stored: Stored) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the camera of a file, or those of its tables, such as color and depth."""
+    if stored.values.keys() >= REQUIRED:
+        yield stored.path.stem, stored.values
+    for name, table in stored.values.items():
+        if isinstance(table, dict) and table.keys() >= REQUIRED:
+            yield str(name), table
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    return [_camera(name, table) for name, table in _tables(stored)]
+
+
+def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
+    check_others(name, {key: value for key, value in table.items() if key not in KEYS})
+    lens = matrix_of(table.get("coeffs", [0.0] * 5))
+    stated_model = table.get("model", "none")
+    model = plain(str(stated_model).rpartition(".")[2])
+    if lens.any() and model not in LENSES:
+        raise InputError(f"the lens model {quoted(stated_model)}, which is not read")
+    size = None
+    if "width" in table and "height" in table:
+        size = [number_of(table[side]) for side in ("width", "height")]
+    return stated(
+        name,
+        size,
+        pinhole_matrix(
+            [number_of(table[f"f{axis}"]) for axis in "xy"],
+            [number_of(table[f"pp{axis}"]) for axis in "xy"],
+        ),
+        np.ravel(lens),
+        None,
+        fisheye=bool(lens.any()) and LENSES[model],
+    )
+
+
+REALSENSE = Dialect(
+    "RealSense", lambda stored: any(True for _ in _tables(stored)), _read
+)

@@ -1,0 +1,167 @@
+"""The text of a calibration file as texts, numbers, lists and dictionaries, or as the tree of an XML file.
+
+OpenCV's own reader is not used, as it trusts the file: here nothing is expanded, and a matrix is as
+large as the numbers that are there.
+"""
+
+import math
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.reading import parsed_json, parsed_toml, quoted
+
+LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
+# the letters of OpenCV's element types whose numbers are rounded when they are read
+_ROUNDED = {"f": np.float32, "h": np.float16}
+_TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """What a calibration file holds: values by name, or the tree of an XML file that is not OpenCV's."""
+
+    path: Path
+    values: Mapping[str, Any]
+    root: Any = None
+
+
+def stored(path: Path, text: str) -> Stored:
+    """Return what a file holds. Raises InputError where it is none of the four formats."""
+    start = text.lstrip()[:100]
+    if path.suffix.lower() == ".toml":
+        return Stored(path, parsed_toml(text))
+    if start.startswith("<"):
+        root = _xml_of(text)
+        if root.tag != "opencv_storage":
+            return Stored(path, {}, root)
+        return Stored(path, _of_opencv(root))
+    if not (
+        start.startswith(("{", "[", "%")) or path.suffix.lower() in (".yml", ".yaml")
+    ):
+        raise InputError(
+            f"a file that is none of them, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml"
+        )
+    values = parsed_json(text) if start.startswith(("{", "[")) else _yaml(text)
+    if isinstance(values, list):  # of cameras, as those of the AIST database
+        values = {"camera": values}
+    if not isinstance(values, dict):
+        raise InputError(f"a file without names, {quoted(values)}")
+    return Stored(path, values)
+
+
+def plain(key: object) -> str:
+    """Return a key in small letters and digits alone: Camera_Matrix is cameramatrix."""
+    return re.sub(r"[^a-z0-9]", "", str(key).lower())
+
+
+def counts(value: Any) -> bool:
+    """Return whether a value is a number, or numbers, that are not all 0."""
+    try:
+        return bool(matrix_of(value).any())
+    except (ValueError, TypeError, KeyError):
+        return False
+
+
+def says(value: Any) -> bool:
+    """Return whether a value says something: neither 0, nor false, nor empty."""
+    if isinstance(value, str):
+        return plain(value) not in ("", "0", "00", "false", "no", "none", "null")
+    return counts(value) or (isinstance(value, list | dict) and bool(value))
+
+
+def check_keys(
+    table: Mapping[str, Any], known: Collection[str], name: str, program: str
+) -> None:
+    """Raise InputError for the first key of a table that is not known, and says something."""
+    for key, value in table.items():
+        if key not in known and says(value):
+            raise InputError(
+                f"the key {quoted(key)} of {quoted(name)}, which {program} is not known to write"
+            )
+
+
+def matrix_of(value: Any) -> Array:
+    """Return a matrix, or numbers in one row. Raises InputError where there are none, too many, or another number."""
+    stated = value if isinstance(value, dict) and "data" in value else {"data": value}
+    cells = np.array(
+        stated["data"].split() if isinstance(stated["data"], str) else stated["data"],
+        dtype=object,
+    )
+    numbers = np.array([number_of(cell) for cell in cells.flat], dtype=np.float64)
+    match = _TYPE.fullmatch(str(stated.get("dt", "d")))
+    if match is None:
+        raise InputError(f"a matrix of the type {quoted(stated['dt'])}")
+    if match[2] in _ROUNDED:
+        numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
+    sides = (
+        [stated["rows"], stated["cols"]]
+        if {"rows", "cols"} <= stated.keys()
+        else stated.get("sizes")
+    )
+    if sides is None:
+        return numbers.reshape(cells.shape)
+    shape = [
+        *map(number_of, sides if isinstance(sides, list) else [sides]),
+        *map(float, filter(None, [match[1]])),
+    ]
+    if not all(
+        side.is_integer() and side > 0 for side in shape
+    ) or numbers.size != math.prod(shape):
+        raise InputError(
+            f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with {numbers.size} numbers"
+        )
+    return numbers.reshape([int(side) for side in shape])
+
+
+def number_of(value: Any) -> float:
+    """Return a number, which may be text. Raises InputError where it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{quoted(value)} where a number should be") from None
+
+
+def _yaml(text: str) -> Any:
+    """Return what a YAML text holds: texts, lists and dictionaries alone, whatever tags it has."""
+    import yaml
+
+    # OpenCV writes %YAML:1.0 where the directive is %YAML 1.0
+    text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
+    try:
+        return yaml.load(text, Loader=yaml.BaseLoader)
+    except (yaml.YAMLError, RecursionError) as error:
+        reason = " ".join(str(error).split()) or "brackets that are nested too deeply"
+        raise InputError(f"YAML that is broken: {reason}") from None
+
+
+def _of_opencv(root: Any) -> dict[str, Any]:
+    return {
+        entry.tag: {part.tag: (part.text or "").strip() for part in entry}
+        or (entry.text or "").strip()
+        for entry in root
+    }
+
+
+def _xml_of(text: str) -> Any:
+    """Return the root of an XML text. Raises InputError where it is broken or has a document type, which may expand."""
+    from xml.etree.ElementTree import ParseError
+
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    try:
+        return fromstring(text, forbid_dtd=True)
+    except DefusedXmlException:
+        raise InputError(
+            "an XML file with a document type, which is not read"
+        ) from None
+    # ValueError: an encoding that contradicts the text's
+    except (ParseError, ValueError, RecursionError) as error:
+        raise InputError(f"XML that is broken: {error}") from None

@@ -1,0 +1,57 @@
+"""Calibrations of Shelf and Campus as VoxelPose and mmpose have them: T is the camera's place, in millimetres.
+
+A point of the world is R (x - T) in the camera. The keys `k` and `p`, the lens' radial and tangential
+numbers, tell such a file from one whose T is a translation.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.lens import (
+    Calibration,
+    numbers_of,
+    pinhole_matrix,
+    placed_at,
+    stated,
+)
+from posefit.geometry.calibration.values import (
+    Stored,
+    check_keys,
+    matrix_of,
+    number_of,
+)
+
+KEYS = {"R", "T", "fx", "fy", "cx", "cy", "k", "p"}
+
+
+def _recognises(stored: Stored) -> bool:
+    return any(
+        isinstance(table, dict) and table.keys() >= KEYS
+        for table in stored.values.values()
+    )
+
+
+def _read(stored: Stored) -> list[Calibration]:
+    return [_camera(str(name), table) for name, table in stored.values.items()]
+
+
+def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
+    check_keys(table, KEYS, name, "VoxelPose")
+    focal = [number_of(table[f"f{axis}"]) for axis in "xy"]
+    centre = [number_of(table[f"c{axis}"]) for axis in "xy"]
+    radial = np.ravel(matrix_of(table["k"]))
+    tangential = np.ravel(matrix_of(table["p"]))
+    rotation = numbers_of(matrix_of(table["R"]), (3, 3))
+    return stated(
+        name,
+        None,
+        pinhole_matrix(focal, centre),
+        [*radial[:2], *tangential, *radial[2:]],
+        placed_at(rotation, matrix_of(table["T"])),
+    )
+
+
+VOXELPOSE = Dialect("VoxelPose", _recognises, _read)

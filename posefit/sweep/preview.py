@@ -1,0 +1,166 @@
+"""The preview of `posefit sweep --dry-run`: a plan's cells and their approximate time.
+
+Each method runs a few frames. This also finds settings that a method's factory refuses,
+which checking a plan cannot find.
+"""
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from posefit.errors import InputError
+from posefit.reading import cut
+from posefit.settings import settings_text
+from posefit.sweep.cell import Cell, TrackCell, json_of, run_cell
+from posefit.sweep.command import cells_of, done_elsewhere, file_of
+from posefit.sweep.engine import text_of
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.plan import Plan
+
+VALUES = 12  # the most values of a field that a preview lists
+# Frames of the two short runs of a method. The difference of their times is the time of
+# three frames; the rest is the time of learning.
+SHORT = 1
+LONGER = 4
+
+
+class Preview(NamedTuple):
+    """The preview of a plan."""
+
+    lines: list[str]
+    cells: list[dict[str, Any]]  # key, done and spec of each
+    seconds: float  # of the cells to run, one after the other
+
+
+def preview(plan: str, out: str | None, shard: str | None) -> Preview:
+    """Return the preview of a plan, or of one shard of it.
+
+    Args:
+        plan: The plan's file, as `posefit.sweep.plan.Plan.read` takes it.
+        out: The folder of the ledger, or None. Its finished cells will not run again.
+        shard: The shard as I/N, or None for all cells.
+
+    Returns:
+        The preview.
+
+    Raises:
+        ValueError: The plan is wrong, or a method fails in its first frames.
+    """
+    counts: dict[str, Counter[str]] = {}
+    times: dict[str, _Times] = {}
+    listed = []
+    evaluations = 0
+    for cell, done in _cells(plan, out, shard):
+        listed.append({"key": cell.key, "done": done, **cell.spec})
+        for name, value in cell.spec.items():
+            text = value if isinstance(value, str) else json_of(value)
+            counts.setdefault(name, Counter())[text] += 1
+        if not done:
+            evaluations += cell.total_evaluations
+            method = json_of([cell.method, dict(cell.settings)])
+            times.setdefault(method, _Times(cell)).add(cell)
+    to_run = sum(each.count for each in times.values())
+    last = (
+        f"{len(listed):,} cells, {to_run:,} of them to run, {evaluations:,} evaluations"
+    )
+    lines = [*_value_lines(counts), last]
+    return Preview(lines, listed, sum(each.seconds() for each in times.values()))
+
+
+def time_line(seconds: float, workers: int) -> str:
+    """Return a line such as `about 3 hours on 2 workers`.
+
+    `seconds` is the time of all cells, one after the other.
+    """
+    each = seconds / workers
+    where = "one worker" if workers == 1 else f"{workers} workers"
+    for unit, length in (("hours", 3600.0), ("minutes", 60.0)):
+        if each >= 2 * length:
+            return f"about {each / length:.0f} {unit} on {where}"
+    return f"about {max(each, 1.0):.0f} s on {where}"
+
+
+def _cells(
+    plan: str, out: str | None, shard: str | None
+) -> Iterator[tuple[Cell, bool]]:
+    """Yield the cells of a plan or of a shard, each with whether it is done."""
+    name = file_of(shard)
+    cells = cells_of(Plan.read(plan), shard)
+    done = set[str]()
+    if out is not None:
+        if shard is None:
+            done |= done_elsewhere(Path(out))
+        if (path := Path(out) / name).exists():
+            with Ledger(path) as ledger:
+                done |= ledger.done()
+    yield from ((cell, cell.key in done) for cell in cells)
+
+
+def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
+    """Return a line for each field with more than one value, with the cells of each."""
+    lines = []
+    for name, values in counts.items():
+        is_varied = len(values) > 1 and name not in ("version", "files")
+        if name not in ("method", "motion") and not is_varied:
+            continue
+        shown = [
+            f"{count:,} x {cut(value)}"
+            for value, count in islice(values.items(), VALUES)
+        ]
+        if len(values) > VALUES:
+            shown.append(f"and {len(values) - VALUES:,} other values")
+        lines.append(f"{name:16}  {', '.join(shown)}")
+    return lines
+
+
+class _Times:
+    """Estimates the time of one method's cells from two short runs of its first one."""
+
+    def __init__(self, first: Cell) -> None:
+        self._first = first
+        self._amount = 0.0
+        self.count = 0
+
+    def add(self, cell: Cell) -> None:
+        self.count += 1
+        self._amount += _amount(cell)
+
+    def seconds(self) -> float:
+        """Return about how many seconds the cells take.
+
+        Raises InputError if a run fails.
+        """
+        if not isinstance(self._first, TrackCell):
+            return _seconds(self._first) / _amount(self._first) * self._amount
+        short = replace(self._first, frames=SHORT)
+        longer = replace(self._first, frames=LONGER)
+        _seconds(longer)  # imports and compiles
+        of_short = _seconds(short)
+        slope = (_seconds(longer) - of_short) / (_amount(longer) - _amount(short))
+        slope = max(slope, 0.0)
+        fixed = max(of_short - slope * _amount(short), 0.0)
+        return fixed * self.count + slope * self._amount
+
+
+def _amount(cell: Cell) -> float:
+    """Return the evaluations of a cell times its views: its time is proportional."""
+    views = len(cell.view_degrees) if isinstance(cell, TrackCell) else 1
+    return float(cell.total_evaluations * views)
+
+
+def _seconds(cell: Cell) -> float:
+    """Return how long a cell takes. Raises InputError naming its method if it fails."""
+    start_time = time.perf_counter()
+    try:
+        run_cell(cell)
+    except Exception as error:
+        settings = ", ".join(settings_text(cell.settings))
+        method = f"{cell.method} with {settings}" if settings else cell.method
+        raise InputError(
+            f"{method} fails in its first frames: {text_of(error)}"
+        ) from error
+    return time.perf_counter() - start_time
