@@ -178,7 +178,7 @@ def _print(
 
 
 @click.command()
-@click.argument("source")
+@click.argument("source", nargs=-1, required=True)
 @click.option(
     "--out",
     required=True,
@@ -197,7 +197,7 @@ def _print(
 @options(track_flags("person"))
 @JSON
 def extract(
-    source: str,
+    source: Sequence[str],
     out: str,
     as_json: bool,
     frames: Any,
@@ -205,9 +205,10 @@ def extract(
     person: Any,
     **options: Any,
 ) -> None:
-    """Write the masks of one person as a file, of whatever SOURCE one camera took.
+    """Write the masks of one person in SOURCE as a file.
 
     They are taken out of a video, or of pictures, before a still background; masks are cleaned, and motions drawn.
+    Several sources are what several cameras saw at the same time.
     """
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
@@ -217,20 +218,24 @@ def extract(
     how = extraction_of(options, resolved.medium, settings) or Extraction()
     how = replace(how, person=person)
     result = run(resolved, out, how, frames=frames, progress=progress)
-    if result["guesses"]:
-        say(f"guessed: {'; '.join(result['guesses'])}")
-    for warning in result["warnings"]:
-        say(f"warning: {warning}")
+    cameras = result.get("cameras", [result])
+    for camera in cameras:
+        if camera["guesses"]:
+            say(f"guessed: {'; '.join(camera['guesses'])}")
+        for warning in camera["warnings"]:
+            say(f"warning: {warning}")
     if as_json:
         click.echo(json.dumps(result))
         return
-    pieces = ""
-    if result["in_pieces"] is not None:
-        pieces = f", {result['in_pieces']} in pieces"
-    click.echo(
-        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border{pieces}; "
-        f"written to {out}: watch preview.mp4"
-    )
+    for number, camera in enumerate(cameras, 1):
+        pieces = ""
+        if camera["in_pieces"] is not None:
+            pieces = f", {camera['in_pieces']} in pieces"
+        folder = out if len(cameras) == 1 else f"{out}/{number}"
+        click.echo(
+            f"{camera['frames']} frames, {camera['usable']} usable, {camera['touching_border']} touch the "
+            f"border{pieces}; written to {folder}: watch preview.mp4"
+        )
 
 
 def _arguments(

@@ -39,57 +39,72 @@ def extract(
     frames: Range = (None, None),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return a summary of the masks of what one camera saw, and write them, a preview and a report to a new folder.
+    """Return a summary of masks of one person, and write them, a preview and a report to a new folder.
 
     `source` is what `posefit.track` takes. masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,), `fps`
     where it is known, the number of the `first` frame, and `landmarks` (T, 27, 3) where a segmenter gives any, see
-    `Segmenter`. The report, quality.csv, compares masks with the pictures of a film. The folder appears whole or not
-    at all. Raises InputError for mistakes in arguments or files, where no frame shows a person, and on a full disk.
+    `Segmenter`. The report, quality.csv, compares masks with the pictures of a film. Of several cameras each has its
+    number as a folder, 1 and so on, and its summary in the list `cameras`. The folder appears whole or not at all.
+    Raises InputError for mistakes in arguments or files, where no frame shows a person, and on a full disk.
     """
     target = Path(out)
     check_new(target)
     opencv_name(target)  # a name that it cannot write is refused before the work
     resolved = resolve(source)
-    if len(resolved.named) > 1:
-        raise InputError(
-            f"source must be of one camera, got {len(resolved.named)}: extract them one after the other"
-        )
     how = how or Extraction()
     # checked before the folder is made
-    films = films_of(resolved)
-    segmentation = Segmentation(films[0], how, frames) if films else None
-    if not films and how != Extraction(person=how.person):
+    parts = [Segmentation(film, how, frames) for film in films_of(resolved)]
+    if not parts and how != Extraction(person=how.person):
         raise useless_for(resolved.medium, "extraction", how, "video")
     with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
-        rows: Sequence[dict[str, Any]] = ()
-        if segmentation is None:
-            view = _masks(resolved, how, frames)
+        if len(resolved.named) == 1:
+            folders = [building]
         else:
-            view, rows, _ = segmentation.read(progress)
-        warnings = [*view.warnings]
-        preview = building / "preview.mp4"
-        try:
-            with VideoWriter(preview, view.fps or FPS, view.size) as writer:
-                for k, image in enumerate(_pictures(view)):
-                    silhouette = view.silhouette(k)
-                    writer.write(_painted(image, silhouette, bool(view.usable[k])))
-        except (InputError, cv2.error) as error:
-            # such as of a build of OpenCV without the format: the masks are the work
-            preview.unlink(missing_ok=True)
-            warnings.append(f"preview.mp4 is missing: {error}")
-        _write_npz(building / "masks.npz", view)
-        if rows:
-            path = building / "quality.csv"
-            with path.open("w", newline="", encoding="utf-8") as file:
-                table = csv.DictWriter(file, list(rows[0]))
-                table.writeheader()
-                table.writerows(rows)
+            folders = [building / f"{k}" for k in range(1, len(resolved.named) + 1)]
+        summaries = []
+        if parts:
+            for folder, part in zip(folders, parts, strict=True):
+                view, rows, _ = part.read(progress)
+                summaries.append(_written(folder, view, rows, how.name))
+        else:
+            views = _masks(resolved, how, frames)
+            for folder, view in zip(folders, views, strict=True):
+                summaries.append(_written(folder, view))
+    return summaries[0] if len(summaries) == 1 else {"cameras": summaries}
+
+
+def _written(
+    folder: Path,
+    view: View,
+    rows: Sequence[dict[str, Any]] = (),
+    method: str | None = None,
+) -> dict[str, Any]:
+    """Return the summary of a view, and write its files to a folder."""
+    folder.mkdir(exist_ok=True)
+    warnings = [*view.warnings]
+    preview = folder / "preview.mp4"
+    try:
+        with VideoWriter(preview, view.fps or FPS, view.size) as writer:
+            for k, image in enumerate(_pictures(view)):
+                silhouette = view.silhouette(k)
+                writer.write(_painted(image, silhouette, bool(view.usable[k])))
+    except (InputError, cv2.error) as error:
+        # such as of a build of OpenCV without the format: the masks are the work
+        preview.unlink(missing_ok=True)
+        warnings.append(f"preview.mp4 is missing: {error}")
+    _write_npz(folder / "masks.npz", view)
+    if rows:
+        path = folder / "quality.csv"
+        with path.open("w", newline="", encoding="utf-8") as file:
+            table = csv.DictWriter(file, list(rows[0]))
+            table.writeheader()
+            table.writerows(rows)
     border = border_of(view.bits, view.size).any(axis=1)
     return {
         "video": view.name,
-        "method": how.name if films else None,
+        "method": method,
         "frames": len(view),
         "usable": int(view.usable.sum()),
         "size": list(view.size),
@@ -102,12 +117,12 @@ def extract(
     }
 
 
-def _masks(source: Resolved, how: Extraction, frames: Range) -> View:
-    """Return the view of a source that needs no extraction."""
+def _masks(source: Resolved, how: Extraction, frames: Range) -> list[View]:
+    """Return the views of a source that needs no extraction."""
     if source.medium == "motion":
-        return observed_views(scene_of(source, frames=frames))[0]
-    (view,) = views_of_masks(source, frames)
-    return cleaned(view, choice=how.person)
+        return observed_views(scene_of(source, frames=frames))
+    views = views_of_masks(source, frames)
+    return [cleaned(view, choice=how.person) for view in views]
 
 
 def _pictures(view: View) -> Iterator[Image]:

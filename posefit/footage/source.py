@@ -115,8 +115,16 @@ def _is_film(place: Place) -> bool:
 
 
 def _is_video(place: Place) -> bool:
-    """Return whether a file is a video: what is no other file is."""
-    return isinstance(place, Path) and place.suffix.lower() not in ("", *NO_VIDEO)
+    """Return whether a file is a video: what is no other file is. Raises InputError for one that is known not to be."""
+    if not isinstance(place, Path):
+        return False
+    suffix = place.suffix.lower()
+    for suffixes, what, instead in UNREAD:
+        if suffix in suffixes:
+            raise InputError(
+                f"{existing(place)}: {what} of {suffix} are not read; {instead} are"
+            )
+    return suffix not in ("", *NO_VIDEO)
 
 
 def _ends_in(suffix: str) -> Callable[[Place], bool]:
@@ -224,11 +232,6 @@ def _place(source: Footage) -> Place:
         raise InputError(
             f"{path}: expected a name that ends in what the file is, such as .mp4, .npz or .bvh, got no suffix"
         )
-    for suffixes, what, instead in UNREAD:
-        if suffix in suffixes:
-            raise InputError(
-                f"{existing(path)}: {what} of {suffix} are not read; {instead} are"
-            )
     if not suffix:
         return existing(path) if os.sep in str(source) else source
     return path

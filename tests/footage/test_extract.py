@@ -492,5 +492,22 @@ def test_pictures_are_extracted_masks_cleaned_and_motions_drawn(
     assert "width must be given for video only, got 320 for masks" in error
     with pytest.raises(ValueError, match="extraction must be given for video only"):
         extract(tmp_path / "masks", tmp_path / "new", Extraction("median"))
-    with pytest.raises(ValueError, match="source must be of one camera, got 2"):
-        extract([filmed[0], filmed[0]], tmp_path / "new")
+
+
+def test_what_several_cameras_took_is_extracted_to_a_folder_each(
+    filmed: Film, tmp_path: Path
+) -> None:
+    files = [
+        stack(tmp_path / f"{name}.npz", truth(azimuth)[:8], first=first, fps=25.0)
+        for name, azimuth, first in (("a", np.pi / 2, 0), ("b", 0.6, 2))
+    ]
+    for name, sources in (("masks", files), ("films", [filmed[0]] * 2)):
+        out = tmp_path / name
+        words = ["--background", "0:10", "--frames", "12:18"] * (name == "films")
+        result = run("extract", *sources, *words, "--out", out)
+        assert result.exit_code == 0, result.stderr
+        assert sorted(path.name for path in out.iterdir()) == ["1", "2"]
+        start = 12 if name == "films" else 2  # the frames that both have
+        for number in "12":
+            view = read_masks(out / number / "masks.npz", ALL)
+            assert view.numbers.tolist() == [*range(start, start + 6)]

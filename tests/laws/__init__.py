@@ -5,7 +5,7 @@ and every law is then asked of it:
 
 | table | a line is | laws |
 |---|---|---|
-| `sources.MASKS`, `sources.FILMS`, `sources.MOTIONS` | a name and a function that writes the source | numbers and times, cut |
+| `sources.MASKS`, `sources.FILMS`, `sources.MOTIONS`, `sources.NAMED`, `sources.STREAMS` | a name and a function that writes the source | numbers and times, cut, extraction, mirrored, files of a track |
 | `test_arguments.EQUAL` | an option and forms of one value | arguments |
 | `test_effort.OPTIMISERS`, `test_effort.TRACKERS`, `test_track_effort.CASES` | a method, a kind of start | evaluations reported are poses drawn |
 | `test_modes.FORMS` | an autoreset mode, a form of environment | same seeds, same episodes |

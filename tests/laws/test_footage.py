@@ -209,7 +209,7 @@ def test_what_is_extracted_of_masks_and_motions_shows_what_they_show(
 def test_a_kind_of_source_is_a_line_of_the_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "walk.masks"
+    path = tmp_path / "walk.h5"
     path.write_bytes(np.packbits(masks()).tobytes())
 
     def read(path: Path, *how: Any) -> View:
@@ -217,7 +217,7 @@ def test_a_kind_of_source_is_a_line_of_the_table(
         pixels = np.unpackbits(bits).reshape(-1, SIZE[1], SIZE[0])
         return read_array(pixels, *how)
 
-    line = Kind("masks", lambda place: str(place).endswith(".masks"), view=read)
+    line = Kind("masks", lambda place: str(place).endswith(".h5"), view=read)
     monkeypatch.setattr("posefit.footage.source.KINDS", (line, *KINDS))
     check_numbered(seen(path, frames=(START, STOP), fps=FPS), START, STOP)
     check_alike(seen(path, fps=FPS), seen(masks(), fps=FPS))
