@@ -235,7 +235,7 @@ def _search(
         points = REACH * proposals  # in spreads of people
         logs = np.array([_ROOT @ point for point in points])
         pulls = np.array([PULL * float(point @ point) for point in points])
-        return cost(np.exp(logs)) + pulls
+        return np.asarray(cost(np.exp(logs)) + pulls)
 
     mean = np.clip(np.linalg.solve(_ROOT, np.log(start)) / REACH, -1.0, 1.0)
     box = FactorBox(
