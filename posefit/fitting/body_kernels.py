@@ -109,6 +109,6 @@ def count_pairs(chain, bodies, view, observed, poses, places, pairs, areas):
             k = (first + lane) % frames
             image, box = fill_pose(lane, stride, work)
             body, overlap = count(image, observed.person[k], observed.valid[k], box)
-            areas[i, k, 0] = np.uint64(observed.pixels[k]) - overlap  # SAPSO (3)
+            areas[i, k, 0] = np.uint64(observed.pixels[k]) - overlap
             areas[i, k, 1] = body - overlap
             areas[i, k, 2] = overlap

@@ -4,9 +4,10 @@ docs/background/contour-fit.md derives the method; its equations have numbers, w
 `# contour (3)`. In short:
 
 - A bone is drawn as a tapered cone, which six numbers place in the picture: two joints (u, v) and two radii. A distance
-  between the borders is one residual; its derivatives by these numbers are a row of six (1) to (4).
-- The residuals of a bone are summed up to a 6 x 6 Hessian and a gradient (5) by a weight that bounds outliers (6).
-  Their 24 different products are summed, and expanded to both once.
+  between the borders is one residual. It changes with the disc at one share of the bone, and by that share with the
+  discs at both ends (1) to (4).
+- The residuals of a bone are summed up to a 6 x 6 Hessian and a gradient (5) by a weight that bounds outliers (6). Both
+  consist of 24 sums of products, which are expanded once all residuals are added.
 - A twist, velocity and rotation, moves a bone. The chain rule makes of both a spatial Hessian and a spatial force over
   twists (7) to (9), as a rigid body has a spatial inertia.
 - An angle turns everything beyond its joint. So it meets the sum over these bones, which the composite-rigid-body
@@ -52,7 +53,7 @@ class Contour(NamedTuple):
     size: NDArray[np.int64]  # (2,) rows and columns of the field
     points: Array  # (n, 2) pixels of the border
     step: float  # pixels of the border that a point represents
-    # (n,) the bone that was nearest to each point when it was last looked for, or -1; written
+    # (n,) the bone nearest to each point in the step before, -1 at first; overwritten
     owners: NDArray[np.int64]
 
 
@@ -83,9 +84,9 @@ class Views(NamedTuple):
 
 
 class Prior(NamedTuple):
-    """What is known of the m free numbers of a place and a pose before a fit, of n poses."""
+    """What is known before a fit of the m numbers of n places and poses that may change."""
 
-    free: NDArray[np.int64]  # (m,) their places among the 69
+    free: NDArray[np.int64]  # (m,) which of the 69 numbers they are
     means: Array  # (n, m)
     precisions: Array  # (m,)
 
@@ -171,8 +172,8 @@ def cone_distance(x, y, cone):
 def accumulate(products, share, slope, residual, weight):
     """Add the products of a residual and its derivatives to those of a bone (24,). contour (5).
 
-    The point is at a `share` of the bone, from 0 at its start to 1 at its end. There the residual changes by `slope`:
-    with the disc's column, its row and its radius. The ends of the bone have their shares of it, contour (2) and (4).
+    The residual changes by `slope` with the column, the row and the radius of the disc at a `share` of the bone, from
+    0 at its start to 1 at its end. It changes by 1 - share of that with the first disc, and by share with the last.
     """
     rest = 1.0 - share
     near = rest * rest
@@ -264,7 +265,8 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     """Add the squared distances of the mask's border from the body's, and of the body's border from the mask's.
 
     Each bone gets its own, as half a Hessian (B, 6, 6) and half a gradient (B, 6) by the column and row of its two
-    joints, and by both radii. Distances beyond `scale` pixels count less.
+    joints, and by both radii. Distances beyond `scale` pixels count less. The owners of the contour's points are
+    replaced by the bones that are nearest now.
     """
     count = parents.size
     cones = np.empty((count, 8))
@@ -299,7 +301,7 @@ def _accumulate_mask_border(contour, scale, cones, discs, products):
         owners[i] = bone
         distance, share, nx, ny = cone_distance(x, y, cones[bone])
         weight = contour.step / (1.0 + (distance / scale) ** 2)  # contour (6)
-        slope = -nx, -ny, -1.0
+        slope = -nx, -ny, -1.0  # contour (2)
         accumulate(products[bone], share, slope, distance, weight)
 
 
@@ -317,7 +319,7 @@ def _accumulate_point(disc, normal, length, contour, scale, bones, products):
     known, distance, slope_x, slope_y = field_distance(x, y, contour)
     if known and visible(x, y, bones):
         weight = length / (1.0 + (distance / scale) ** 2)  # contour (6)
-        slope = slope_x, slope_y, slope_x * nx + slope_y * ny
+        slope = slope_x, slope_y, slope_x * nx + slope_y * ny  # contour (4)
         accumulate(products, share, slope, distance, weight)
 
 
@@ -677,7 +679,7 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
 def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
     """Move poses (n, 66) and places (n, 3) to the contours of one frame, a step for each of `reaches`, metres.
 
-    A step is Gauss-Newton's, with a `prior`. No angle turns farther than `max_turn` in a step.
+    Each is a Gauss-Newton step, with a `prior`. No angle turns farther than `max_turn`, radians, in one.
     """
     free = prior.free
     count = poses.shape[0]
@@ -685,7 +687,6 @@ def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
     frames = np.empty((count, joints, 4, 3))
     sines = np.empty((count, ANGLES))
     cosines = np.empty((count, ANGLES))
-    # each pose has the owners of the points that it had a step before
     owners = np.full((count, len(views.points)), -1)
     bones = BoneSquares(np.empty((joints, 6, 6)), np.empty((joints, 6, 1)))
     all_screws = np.empty((NUMBERS, 6))
@@ -713,7 +714,7 @@ def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
 
 @inlined
 def _add_views(parents, radii, views, frames, owners, reach, bones):
-    """Write the squares of one frame's views, see `add_view`, to those of the bones. `owners` (n,) of all points."""
+    """Write the squares of one frame's views to those of the bones, see `add_view`. `owners` (n,) are of all points."""
     bones.hessians[:] = 0.0
     bones.forces[:] = 0.0
     joints = parents.size + 1

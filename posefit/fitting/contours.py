@@ -37,7 +37,7 @@ class MaskContours:
 
     camera: Camera  # whose pixels these are: of fine masks a coarser one than theirs
     metres: Array  # (T,) pixels of a metre where the person is
-    step: float  # pixels of the border that a point stands for
+    step: float  # pixels of the border that a point represents
     # (T, h, w) pixels outside the mask, below 0 within; 0 where it is unknown
     fields: Distances = field(repr=False)
     # (T, 2) column and row of each field's first pixel
