@@ -290,14 +290,17 @@ def _owners(
     """Return whose each blob is, by its number, so that all are as near as possible to where they are expected."""
     if not tracklets or not blobs:
         return {}
-    # takes a tenth of a second to import
-    from scipy.optimize import linear_sum_assignment
-
     distances = np.array(
         [[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets]
     )
-    rows, columns = linear_sum_assignment(np.minimum(distances, 1e6))
-    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    if 1 in distances.shape:
+        pairs = [divmod(int(distances.argmin()), len(blobs))]
+    else:
+        # takes a third of a second to import
+        from scipy.optimize import linear_sum_assignment
+
+        rows, columns = linear_sum_assignment(np.minimum(distances, 1e6))
+        pairs = list(zip(rows.tolist(), columns.tolist(), strict=True))
     return {
         column: tracklets[row]
         for row, column in pairs
