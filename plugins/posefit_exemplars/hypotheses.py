@@ -560,7 +560,7 @@ class HypothesisFilter:
         return poses + (pulls / sums)[3:] * (means - poses), sums
 
     def _continuing(self, before: _FittedFrame, frame_costs: FrameCosts) -> Rows:
-        """Return the hypotheses that continue: the likeliest without near duplicates."""
+        """Return the hypotheses that continue: the likeliest, without duplicates."""
         count = self.counts(frame_costs).continued
         joints = before.hypotheses.joints
         joints = joints.reshape(len(joints), -1).astype(np.float32)  # (n, 81)
