@@ -18,9 +18,9 @@ REPAIR_STEPS = 32  # ours: points that `repair` tries along its line
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The distribution of a first population around a prediction, in the unit box. SAPSO (6), (7)."""
+    """The distribution of a first population, around a prediction. SAPSO (6), (7)."""
 
-    mean: Array  # (d,)
+    mean: Array  # (d,) in the unit box
     spread: Array  # (d,) standard deviations
     velocity: Array  # (d,) v_pred
     weight: float = 1.0  # likelihood relative to the others
@@ -55,7 +55,7 @@ class Space(Protocol):
 
 
 def wrap(space: Space, proposals: Array) -> Array:
-    """Return proposals (..., d) with their periodic coordinates brought into [-1, 1)."""
+    """Return proposals (..., d) with their periodic coordinates in [-1, 1)."""
     if not space.periodic.any():
         return proposals
     return np.where(space.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
@@ -87,8 +87,8 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
     - A coordinate outside the box is redrawn alone. The coordinates of (6) are
       independent and the box is a product, so this has the same distribution as
       redrawing the whole proposal. If it is still outside, it is folded into the box.
-    - An infeasible proposal is redrawn as a whole. If it is still infeasible, it becomes
-      the start's mean, or a copy of a feasible proposal.
+    - An infeasible proposal is redrawn as a whole. If it is still infeasible, it
+      becomes the start's mean, or a copy of a feasible proposal.
 
     If nothing around the start is feasible, the population is drawn from anywhere.
 
@@ -203,8 +203,8 @@ def sample_normal(
     """Return a normal draw (n, d) around each of n feasible means.
 
     `spread` (d,) or (n, d) has the standard deviations. A coordinate outside the box is
-    folded back into it, as at a mirror. An infeasible draw is redrawn at most 100 times,
-    and then stays at its mean.
+    folded back into it, as at a mirror. An infeasible draw is redrawn at most 100
+    times, and then stays at its mean.
     """
     spread = np.broadcast_to(spread, means.shape)
 

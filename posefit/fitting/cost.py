@@ -35,7 +35,7 @@ def align(
     poses: Array,
     anchors: Array,
 ) -> Array:
-    """Return the translations (n, 3) at which poses (n, 66) fill the silhouettes' boxes.
+    """Return the translations (n, 3) with which poses fill the silhouettes' boxes.
 
     Interpretation S4, `aligned`. The outermost disc of the body must touch each border
     of a box, and that is linear in the translation: `focal (x + t_x) +- focal radius =
@@ -62,8 +62,8 @@ class SilhouetteCost:
     """The cost of proposals for one observation, a pure function. SAPSO (4).
 
     Call it with proposals (n, d) of its space for their costs (n,), 0 to 100: the mean
-    over the views. The cost of a proposal has the same bits whatever the other proposals
-    are, and with any number of threads. A `Problem` counts the calls.
+    over the views. The cost of a proposal has the same bits whatever the other
+    proposals are, and with any number of threads. A `Problem` counts the calls.
 
     Args:
         body: the person's body.
@@ -186,14 +186,14 @@ class SilhouetteCost:
         return known_views(views, self.silhouettes)
 
     def _cost(self, poses: Array, translations: Array) -> Array:
-        """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
+        """Return the costs (n,) of decoded poses at translations, on one thread."""
         by_view = [
             costs_in(*view, poses, translations, self.beta) for view in self._drawings
         ]
         return mean_over_views(by_view)
 
     def _aligned(self, poses: Array, translations: Array) -> Array:
-        """Return the translations (n, 3) of decoded poses (n, 66), aligned if needed."""
+        """Return the translations (n, 3) of decoded poses, aligned if needed."""
         if self.space.translation != "aligned":
             return translations
         return align(self.body, self.cameras, self.silhouettes, poses, translations)

@@ -42,11 +42,11 @@ class Filter(Optimiser, Protocol):
 
 
 # Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a
-# NumPy Generator that is the only source of randomness, and keyword-only settings. For a
-# factory that takes them, the driver fills in two settings: `evaluations`, the budget of
-# one search, and `iterations`, the populations after the first that this budget holds. A
-# factory with a true attribute `baseline` is random search, which others are compared
-# with: the kit of checks does not ask it to beat chance.
+# NumPy Generator that is the only source of randomness, and keyword-only settings. For
+# a factory that takes them, the driver fills in two settings: `evaluations`, the budget
+# of one search, and `iterations`, the populations after the first that this budget
+# holds. A factory with a true attribute `baseline` is the chance that others are
+# compared with: the kit of checks does not ask it to beat chance.
 OptimiserFactory = Callable[..., Optimiser]
 
 # The optimiser of the next frame: a new one that starts around the prediction, SAPSO
@@ -102,7 +102,10 @@ class Adapter(ABC):
 
     @abstractmethod
     def propose(self) -> Array:
-        """Return the library's next proposals (n, d), feasible or not; (0, d) to end."""
+        """Return the library's next proposals (n, d), feasible or not.
+
+        An empty array, (0, d), means that it has ended.
+        """
 
     @abstractmethod
     def learn(self, proposals: Array, costs: Array) -> None:

@@ -67,7 +67,7 @@ class Prior(Latents, Protocol):
 
 @dataclass(eq=False, repr=False)
 class Components:
-    """Latents along given directions: joint angles are a mean plus a sum of components."""
+    """Latents along directions: joint angles are a mean plus a sum of components."""
 
     mean: Array  # (63,)
     components: Array  # (m, 63), orthonormal
@@ -104,8 +104,8 @@ class Tilt:
     The mean is affine in the latents, and limited to its range over the training poses.
     """
 
-    # (3 + m, 2) radians: the least and the greatest mean, its value at latents of 0, and
-    # the slope of each latent
+    # (3 + m, 2) radians: the least and the greatest mean, its value at latents of 0,
+    # and the slope of each latent
     mean: Array
     # (2,) radians: the range of the residuals; pi to either side is the whole circle
     low: Array

@@ -219,7 +219,7 @@ class Problem:
         self.evaluations += len(rows)
 
     def checked(self, proposals: object) -> Array:
-        """Return proposals (d,) or (n, d) as float64. Raises ValueError for anything else."""
+        """Return proposals (d,) or (n, d) as float64; raise ValueError for others."""
         try:
             values = np.asarray(proposals)
             if values.dtype.kind == "c":
@@ -311,7 +311,7 @@ class Problem:
         return np.zeros(self.dimension) if start is None else start.mean.copy()
 
     def initial_solution_proposal(self, restart: int = 0) -> Array:
-        """Return the proposal (d,) to start from first, and a random one for each restart."""
+        """Return the proposal (d,) to start from, or a random one for a restart."""
         if not restart:
             return self.initial_solution
         rng = np.random.default_rng([getattr(self, "instance", 0), restart])
@@ -373,7 +373,7 @@ class Problems:
         self.best_costs[row] = np.inf
 
     def count(self, rows: NDArray[np.int64], proposals: Array, costs: Array) -> None:
-        """Count proposals (m, k, d) with costs (m, k) in rows (m,), and keep the best."""
+        """Count proposals (m, k, d) with costs (m, k) in rows (m,); keep the best."""
         self.evaluations[rows] += costs.shape[1]
         least = costs.min(axis=1)
         better = np.flatnonzero(least < self.best_costs[rows])
