@@ -1,4 +1,4 @@
-"""Arrays of other libraries, such as PyTorch and JAX, taken and given back through DLPack."""
+"""Arrays of other libraries, such as PyTorch and JAX, converted through DLPack."""
 
 import sys
 from collections.abc import Callable

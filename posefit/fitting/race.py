@@ -13,8 +13,8 @@ import numpy as np
 from posefit.fitting.box import Start
 from posefit.fitting.problem import Problem
 
-# All constants are ours. Starts with less than this share of the likeliest start's weight
-# are not searched.
+# All constants are ours. Starts with less than this share of the likeliest start's
+# weight are not searched.
 MIN_WEIGHT = 0.05
 SHORT_SHARE = 0.5  # share of the budget for the short searches
 MIN_SHORT = 40  # evaluations of a short search, at least
@@ -35,7 +35,7 @@ def race(starts: Sequence[Start], search: Search, budget: int) -> list[list[Prob
         budget: the evaluations of all searches together.
 
     Returns:
-        The problems of each start: its short search, and the long one if it was a finalist.
+        The problems of each start: its short search, and the long one of a finalist.
 
     """
     short_budget = int(SHORT_SHARE * budget)
