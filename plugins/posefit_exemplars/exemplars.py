@@ -270,7 +270,8 @@ class Exemplars:
         drawn = rng.uniform(0.0, ends[-1], count)
         group = np.minimum(np.searchsorted(ends, drawn, "right"), len(sizes) - 1)
         ranks = (rng.random(count) * sizes[group]).astype(np.int64)  # in their groups
-        return self.members[self.starts[group] + ranks]
+        states: Rows = self.members[self.starts[group] + ranks]
+        return states
 
     def nearest(self, poses: Array, count: int) -> tuple[Rows, Codes]:
         """Return the states nearest to poses, and their squared distances.

@@ -562,8 +562,9 @@ class HypothesisFilter:
     def _continuing(self, before: _FittedFrame, frame_costs: FrameCosts) -> Rows:
         """Return the hypotheses that continue: the likeliest, without duplicates."""
         count = self.counts(frame_costs).continued
-        joints = before.hypotheses.joints
-        joints = joints.reshape(len(joints), -1).astype(np.float32)  # (n, 81)
+        count_before = len(before.hypotheses.joints)
+        flat = before.hypotheses.joints.reshape(count_before, -1)  # (n, 81)
+        joints = flat.astype(np.float32)
         same = squared_distances(joints, joints) < SAME_DISTANCE**2 * len(JOINTS)
         rows: list[int] = []
         for row in np.argsort(before.states.totals, kind="stable"):

@@ -213,7 +213,7 @@ class FreeAxes:
 
     @cached_property
     def _reach(self) -> Array:
-        """The largest allowed angles (n,), which take long to learn from many motions."""
+        """The largest allowed angles (n,), slow to learn from a large library."""
         reach = np.zeros(len(self._fixed))
         for angles in self._training:
             off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
