@@ -262,8 +262,8 @@ def track_hypotheses(
             progress.log(f"going on from frame {done} of {count}{of_several}")
             if _starts_over(method, frames):
                 progress.warn(
-                    f"{method.name} starts over at frame {done}: from there on the"
-                    " frames may differ from an uninterrupted track"
+                    f"{method.name} starts over at frame {done}: the frames from there"
+                    " on may differ from an uninterrupted track"
                 )
         elif not done and total > 1:
             progress.log(f"{which}: {hypothesis.guess}")

@@ -112,7 +112,7 @@ class Lists(Annealed):
 
 
 @each("method", [Holds, (Lists, "pca")])
-def test_a_method_that_starts_anew_says_so_when_it_goes_on(
+def test_a_method_that_starts_over_says_so_when_it_resumes(
     method: Any, tmp_path: Path
 ) -> None:
     log: list[str] = []
