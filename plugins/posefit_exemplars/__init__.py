@@ -1,25 +1,31 @@
-"""A tracker that follows clips instead of frames: `exemplars`.
+"""A tracker that follows recorded clips: `exemplars`.
 
-One silhouette does not distinguish a stride from its mirrored half-cycle; a sequence of them nearly always does. So
-states are poses of recorded clips, each with a yaw. They continue as their clips do, at about their speed, or change to
-a similar clip, turn, or jump, and the likeliest path through the frames is followed. After Toyama and Blake,
-Probabilistic tracking in a metric space, 2001. From there every joint may move, until contours are those of the masks:
-several hypotheses of each frame are fitted, and the likeliest sequence of them is reported some frames later.
+One silhouette does not distinguish a stride from its mirrored half-cycle; a sequence of
+silhouettes nearly always does. So a state is a pose of a recorded clip with a yaw. A
+state continues as its clip does, at about the recorded speed; it may also change to a
+similar clip, turn, or jump. The tracker follows the likeliest path through the frames
+(Toyama and Blake, Probabilistic tracking in a metric space, 2001).
 
-- `exemplars` has the poses, what came after each, and codes to compare them.
-- `beam` has the states that a frame may be in, and the costs of steps between them.
-- `frame_costs` has the costs of poses in a frame.
-- `markov` has the likeliest path through the last frames, the weights of states, and sampled paths.
-- `hypotheses` has those of each frame, and the likeliest sequence.
-- `smoothing` filters the estimates over time.
-- `calibration` reports a frame with a posterior whose intervals hold.
-- `lost_model` gives the probability that a frame is lost.
-- `lookup` has the poses whose silhouettes are like an observed one, for any method.
-- `kernels` has the compiled loops.
-- `tracker` has the settings, and processes one frame after the other.
+Several hypotheses per frame start from that path. A fit moves every joint until the
+contours of the body match the masks. The tracker reports the likeliest sequence of
+fitted hypotheses, some frames later.
+
+- `exemplars`: the poses, how each clip continues, and codes that compare poses.
+- `beam`: the states that a frame may be in, and the costs of steps between them.
+- `frame_costs`: the costs of poses in a frame.
+- `markov`: the likeliest path in the lag window, state weights, and sampled paths.
+- `hypotheses`: the fitted hypotheses of each frame, and their likeliest sequence.
+- `smoothing`: the filter of the estimates over time.
+- `calibration`: the reported frame and its calibrated posterior.
+- `lost_model`: the probability that a frame is lost.
+- `lookup`: the poses whose silhouettes resemble an observed one, for any method.
+- `kernels`: the compiled loops.
+- `tracker`: the settings, and the processing of one frame after the other.
 
 >>> import posefit
->>> track = posefit.track("walk-a", method="exemplars", train=["walk-b", "walk-c"], frames=(0, 10))
+>>> track = posefit.track(
+...     "walk-a", method="exemplars", train=["walk-b", "walk-c"], frames=(0, 10)
+... )
 >>> track.measures.lost_rate
 0.0
 """
@@ -30,7 +36,7 @@ from posefit.hooks import RegisterStart, RegisterTracker
 
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
-    """Offer `exemplars`."""
+    """Register the tracker `exemplars`."""
     from posefit_exemplars.tracker import ExemplarTracker
 
     register("exemplars", ExemplarTracker, looks_ahead=True)
@@ -38,7 +44,7 @@ def posefit_register_trackers(register: RegisterTracker) -> None:
 
 @hookimpl
 def posefit_register_starts(register: RegisterStart) -> None:
-    """Offer `lookup`."""
+    """Register the start `lookup`."""
     from posefit_exemplars.lookup import Lookup
 
     register("lookup", Lookup)

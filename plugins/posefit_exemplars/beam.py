@@ -1,7 +1,7 @@
-"""The states that a frame may be in, and the costs of steps between them: a beam search.
+"""Beam search: the states that a frame may be in, and the costs of steps between them.
 
-A state is a pose of the exemplars and a yaw. Its total is the cost of the best path to it: of silhouettes, steps
-and jumps.
+A state is a pose of the exemplars with a yaw. Its total is the cost of the best path to
+it: the sum of the costs of silhouettes, steps and jumps.
 """
 
 import math
@@ -16,31 +16,34 @@ from posefit.geometry.rotation import wrapped
 from posefit_exemplars import kernels
 from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 
-YAW_BINS = 36  # of a full turn: two states of one pose in one bin are one
-CLIP_SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
+# Yaw bins in a full turn. States with the same pose and the same bin count as one.
+YAW_BINS = 36
+CLIP_SPEEDS = (0.8, 1.0, 1.25)  # multiples of a clip's recorded speed
 RECORDED_SPEED = CLIP_SPEEDS.index(1.0)
-# of a candidate away from its clip, to either side, or not at all
+# Each candidate is also tried with this turn away from its clip, to either side.
 CANDIDATE_TURN = np.radians(7.0)
-# similar poses with similar yaws have at most one of so many shares of a beam
+# Similar poses with similar yaws fill at most 1 / BEAM_SHARES of a beam.
 BEAM_SHARES = 20
-YAW_SHARES = 4  # and one yaw's candidates at most one of so many
-JUMP_COST = 12.0  # of a step to any other pose, in units of cost over the temperature
-MAX_EXCESS_COST = 8.0  # beyond the cost of a jump; steps that cost more are left out
-# standard deviation of turns away from the clip, for a thirtieth of a second
+YAW_SHARES = 4  # candidates in one yaw bin: at most 1 / YAW_SHARES of the beam
+JUMP_COST = 12.0  # cost of a jump to any other pose; costs are over the temperature
+MAX_EXCESS_COST = 8.0  # steps that cost more than a jump plus this are left out
+# Standard deviation of turns away from the clip, for a thirtieth of a second.
 TURN_SPREAD = np.radians(4.0)
-# metres that an aligned root is off where its clip continues, to the side or up
+# Metres between an aligned root and where its clip continues, to the side or up.
 ROOT_SPREAD = 0.01
-DEPTH_SPREAD = 0.03  # metres, the same along the line of sight of a single camera
-# metres that a known root is off where its clip continues, in a thirtieth of a second
+# Metres, the same along the line of sight of a single camera. It is larger because one
+# silhouette says little about the distance from the camera.
+DEPTH_SPREAD = 0.03
+# Metres between a known root and where its clip continues, for a thirtieth of a second.
 KNOWN_ROOT_SPREAD = 0.008
-FAST_TURN_COST = 100.0  # of each radian beyond the fastest possible turn
+FAST_TURN_COST = 100.0  # cost of each radian beyond the fastest possible turn
 
 
 class Step(NamedTuple):
-    """From one frame to the next: the time between them, and which differences are usual in it."""
+    """The time from one frame to the next, and the usual differences between them."""
 
-    seconds: float  # negative where a track goes back in time
-    # metres, root mean square over joints, that a pose is off where its clip continues
+    seconds: float  # negative in a track that runs backwards in time
+    # metres, root mean square over joints, between a pose and where its clip continues
     pose: float
     turn: float = TURN_SPREAD
     known_root: float = KNOWN_ROOT_SPREAD
@@ -48,12 +51,12 @@ class Step(NamedTuple):
 
     @classmethod
     def of(cls, task: Task, spread: float) -> Self:
-        """Return a step of a track; `spread` is that of poses in a thirtieth of a second."""
+        """Return the step of a task; `spread` is for a thirtieth of a second."""
         seconds = (-1.0 if task.backwards else 1.0) / task.fps
         intervals = 30.0 / task.fps
-        max_turn = (
-            math.inf if task.fastest_turn is None else task.fastest_turn / task.fps
-        )
+        max_turn = math.inf
+        if task.fastest_turn is not None:
+            max_turn = task.fastest_turn / task.fps
         slack = math.sqrt(intervals)
         return cls(
             seconds,
@@ -66,40 +69,41 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """States of one frame, and the costs of the best paths to them."""
+    """The states of one frame, and the costs of the best paths to them."""
 
     states: Rows  # (n,) poses of the exemplars
     yaws: Array  # (n,) radians
     totals: Array  # (n,)
-    places: Array = field(repr=False)  # (n, 3) metres where the root is, or is expected
+    places: Array = field(repr=False)  # (n, 3) metres: the root, aligned or expected
 
     def __len__(self) -> int:
         return len(self.states)
 
     def rows(self, rows: Rows) -> "Beam":
-        """Return some of the states."""
+        """Return the states in these rows."""
         return Beam(
             self.states[rows], self.yaws[rows], self.totals[rows], self.places[rows]
         )
 
 
 def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, count: int) -> Rows:
-    """Return the states of least `totals` (n,), but only the best few of those with similar poses and yaws.
+    """Return the `count` states of least `totals` (n,), with few similar ones.
 
-    The right alternative often costs more for a while, until later silhouettes confirm it.
+    Only the best few of the states with similar poses and yaws are kept: the right
+    alternative often costs more for a while, until later silhouettes confirm it.
     """
     kinds = exemplars.coarse_groups[beam.states] * YAW_BINS + yaw_bins(beam.yaws)
     order = np.lexsort((totals, kinds))
     starts = np.flatnonzero(np.diff(kinds[order], prepend=-1))
-    ranks = np.arange(len(order)) - np.repeat(
-        starts, np.diff(np.append(starts, len(order)))
-    )
+    sizes = np.diff(np.append(starts, len(order)))
+    # the rank of each state among the states of its kind
+    ranks = np.arange(len(order)) - np.repeat(starts, sizes)
     retained = order[ranks < max(count // BEAM_SHARES, 1)]
     return retained[np.argsort(totals[retained], kind="stable")[:count]]
 
 
 def merged(*beams: Beam) -> Beam:
-    """Return the states of all beams; of several of one pose in one bin of yaw the one of least total."""
+    """Return the states of all beams, of equal poses and yaw bins only the cheapest."""
     arrays = zip(
         *((beam.states, beam.yaws, beam.totals, beam.places) for beam in beams),
         strict=True,
@@ -127,7 +131,15 @@ class Continuations(NamedTuple):
     def of(
         cls, exemplars: Exemplars, beam: Beam, step: Step, root: Array | None
     ) -> Self:
-        """Return where clips are a step later, and the costs of their distances from a known `root` (3,)."""
+        """Return where clips are a step later, and the costs of missing a known root.
+
+        Args:
+            exemplars: The poses of the clips.
+            beam: The states that continue.
+            step: The time to the next frame, and the usual differences.
+            root: (3,) metres, the root in the next frame, or None if it is unknown.
+
+        """
         codes, turns, displacements = zip(
             *(
                 exemplars.continuation(beam.states, step.seconds * speed)
@@ -144,7 +156,7 @@ class Continuations(NamedTuple):
             squares = ((np.array(places) - root) ** 2).sum(axis=2) / (
                 2.0 * step.known_root**2
             )
-            # or nothing might be within reach
+            # without a limit no step might be cheap enough
             costs = np.minimum(np.log1p(squares), JUMP_COST)
         return cls(
             np.stack(codes),
@@ -157,11 +169,15 @@ class Continuations(NamedTuple):
 def next_states(
     exemplars: Exemplars, beam: Beam, step: Step, count: int, root: Array | None = None
 ) -> Beam:
-    """Return the states that those of a beam may reach in a step, each at its cheapest; at most `count`.
+    """Return at most `count` states that a beam reaches in one step, at least cost.
 
-    A pose costs half the square of its distance, over its spread, from what its parent's clip did next at one of the
-    speeds; a yaw half the square of its turn away from the clip's. Where the root is known to be at `root` (3,), its
-    distance d from where the clip leads costs log(1 + d^2 / 2 / spread^2): a person may be faster than all clips.
+    A pose costs half the square of its distance, in spreads, from where the clip of its
+    parent continues at one of the speeds. A yaw costs half the square of its turn away
+    from the clip's yaw, in spreads.
+
+    If the root (3,) is known, its distance d from where the clip leads costs
+    log(1 + d^2 / 2 / spread^2). This grows slowly with d, because a person may be
+    faster than all clips.
     """
     continued = Continuations.of(exemplars, beam, step, root)
     groups = exemplars.near_groups(continued.codes[RECORDED_SPEED])
@@ -215,11 +231,20 @@ def squared_distances(codes: Codes, others: Codes) -> Codes:
 
 
 def root_deviation_costs(places: Array, expected: Array, camera: Array | None) -> Array:
-    """Return the costs of aligned roots that are at `places` (n, 3) where they were `expected` (..., n, 3).
+    """Return the costs of aligned roots at `places` that were expected elsewhere.
 
-    `camera` (3,) is the position of the only camera: a silhouette says little about how far away from it a body is.
+    Args:
+        places: (n, 3) metres, the aligned roots.
+        expected: (..., n, 3) metres, where the roots were expected.
+        camera: (3,) metres, the position of the only camera, or None if there are
+            several. Differences along its line of sight cost less, because one
+            silhouette says little about how far away a body is.
+
+    Returns:
+        The costs (..., n).
+
     """
-    # sums over axes of 3 take far longer
+    # axis by axis, because NumPy's sums over an axis of length 3 take far longer
     x, y, z = (places[..., axis] - expected[..., axis] for axis in range(3))
     along: Array | float = 0.0
     if camera is not None:
@@ -242,10 +267,18 @@ def transition_costs(
     root: Array | None = None,
     camera: Array | None = None,
 ) -> Array:
-    """Return the costs (n, m) of steps from each state of one frame to each of the next.
+    """Return the costs (n, m) of steps between the states of successive frames.
 
-    None costs more than a jump, unless it turns faster than possible. `root` (3,) is where the root is in the next
-    frame, if it is known, and `camera` (3,) the position of the only camera.
+    A step costs at most as much as a jump, unless it turns faster than possible.
+
+    Args:
+        exemplars: The poses of the clips.
+        before: The n states of one frame.
+        after: The m states of the next frame.
+        step: The time between the frames, and the usual differences.
+        root: (3,) metres, the root in the next frame, or None if it is unknown.
+        camera: (3,) metres, the position of the only camera, or None for several.
+
     """
     continued = Continuations.of(exemplars, before, step, root)
     codes = exemplars.codes[after.states]
@@ -255,9 +288,8 @@ def transition_costs(
         squared_distances(code, codes) / double + cost[:, None] for code, cost in speeds
     ]
     costs: Array = np.minimum.reduce(squares)  # TOYAMA2001 (dynamics)
-    costs = (
-        costs + 0.5 * (wrapped(after.yaws - continued.yaws[:, None]) / step.turn) ** 2
-    )
+    yaw_differences = wrapped(after.yaws - continued.yaws[:, None])  # (n, m)
+    costs = costs + 0.5 * (yaw_differences / step.turn) ** 2
     if root is None:
         costs += root_deviation_costs(after.places, continued.places[:, None], camera)
     costs = np.minimum(costs, JUMP_COST)

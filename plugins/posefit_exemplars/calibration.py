@@ -1,7 +1,8 @@
-"""A frame as it is reported: its pose with a calibrated posterior.
+"""The reported frame: its pose, with a calibrated posterior.
 
-The error of a pose depends on the cost of the silhouette, the spread of the sampled tracks and the number of cameras:
-they give a frame's expected error, in metres; standard deviations of joints and angles are multiples of it.
+The expected error of a frame, in metres, follows from the cost of the silhouette, the
+spread of the sampled tracks and the number of cameras. The standard deviations of
+joints and angles are multiples of it.
 """
 
 import json
@@ -21,15 +22,27 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate
 
-# per cent, and metres
-MIN_COST = 0.1
-MIN_SPREAD = 0.002
+# Below these the logarithms of cost and spread no longer fall.
+MIN_COST = 0.1  # per cent
+MIN_SPREAD = 0.002  # metres
 
 
 def evidence(
     skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int
 ) -> Array:
-    """Return the predictors (4,) of the error of a pose (66,): 1, logarithms of cost and spread, several cameras."""
+    """Return the predictors (4,) of the error of a pose.
+
+    These are 1, the logarithm of the cost, the logarithm of the spread of the posterior
+    around the pose, and 1 if there are several cameras, else 0.
+
+    Args:
+        skeleton: The person's skeleton.
+        posterior: The sampled poses and their weights.
+        pose: (66,) the reported pose.
+        cost: The cost of the reported pose, per cent.
+        cameras: How many cameras show the person.
+
+    """
     joints = skeleton.joints(posterior.poses)
     reported = skeleton.joints(pose)
     spread = float(
@@ -46,17 +59,20 @@ def evidence(
 
 
 def none_features(log: float) -> Array:
-    """Return the predictors (3,) of no mode being right: 1, the logarithm of the expected error, and its square."""
+    """Return the predictors (3,) of no mode being right.
+
+    These are 1, the logarithm of the expected error, and the square of that logarithm.
+    """
     return np.array([1.0, log, log * log])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """The corrections with which a frame's intervals and weights of modes hold as often as they claim."""
+    """The fitted corrections that calibrate the intervals and modes of a frame."""
 
     slopes: Array  # (4,) of the logarithm of the expected error, over `evidence`
-    range: tuple[float, float]  # of that logarithm in the training data
-    joint_spreads: Array  # (27,) standard deviations of each axis, in expected errors
+    range: tuple[float, float]  # the values of that logarithm in the training data
+    joint_spreads: Array  # (27,) standard deviation per axis, in expected errors
     angle_spreads: Array  # (66,) radians, for an expected error of a metre
     joint_factors: Array  # (levels, 27)
     angle_factors: Array  # (levels, 66)
@@ -68,11 +84,12 @@ class Calibration:
         return float(np.clip(self.slopes @ evidence, *self.range))
 
     def recalibration(self, log: float) -> Recalibration:
-        """Return the recalibration of a frame, from the logarithm of its expected error."""
-        spreads = math.exp(log) * self.joint_spreads, math.exp(log) * self.angle_spreads
+        """Return the recalibration of a frame with this logarithm of expected error."""
+        error = math.exp(log)  # metres
         none = float(logistic(self.none @ none_features(log)))
         return Recalibration(
-            *spreads,
+            error * self.joint_spreads,
+            error * self.angle_spreads,
             self.joint_factors,
             self.angle_factors,
             sharpness=self.sharpness,
@@ -82,23 +99,34 @@ class Calibration:
 
 @cache
 def stored_calibration() -> Calibration:
-    """Return the calibration that was fitted on the library's own people by `docs/studies/posterior.py`."""
+    """Return the calibration that `docs/studies/posterior.py` fitted to library people.
+
+    These are the people of the clips in the motion library.
+    """
     stored = json.loads(
         files("posefit_exemplars").joinpath("calibration.json").read_text("utf-8")
     )
-    (low, high), sharpness = stored.pop("range"), stored.pop("sharpness")
-    arrays = {
-        name: np.array(values)
-        for name, values in stored.items()
-        if name != "temperature"
-    }
+    low, high = stored.pop("range")
+    sharpness = stored.pop("sharpness")
+    # the tracker has the temperature as a constant
+    stored.pop("temperature")
+    arrays = {name: np.array(values) for name, values in stored.items()}
     return Calibration(range=(low, high), sharpness=sharpness, **arrays)
 
 
 def recalibrated(
     posterior: Posterior, pose: Array, cost: float, frame_costs: FrameCosts
 ) -> Posterior:
-    """Return the posterior around a reported pose (66,) and its cost, recalibrated; the cost of nothing is infinite."""
+    """Return the posterior of a frame with its recalibration.
+
+    Args:
+        posterior: The posterior around the reported pose.
+        pose: (66,) the reported pose.
+        cost: Its cost, per cent. In a frame without usable silhouettes it counts as
+            infinite.
+        frame_costs: The costs of the frame.
+
+    """
     calibration = stored_calibration()
     cost = cost if frame_costs.usable else math.inf
     values = evidence(
@@ -110,15 +138,18 @@ def recalibrated(
 
 
 def reported(estimate: Estimate) -> Frame:
-    """Return the frame of an estimate: its cost, its posterior, and what shows whether it is lost or exchanged."""
+    """Return the frame of an estimate, with its cost and posterior.
+
+    The details are evidence of whether the frame is lost or has sides exchanged.
+    """
     assert estimate.paths is not None
     pose = estimate.pose
     place = estimate.place
     frame_costs = estimate.frame_costs
     cost, areas = frame_costs.cost_and_areas(pose, place)
-    mirror_costs = (
-        frame_costs.mirror_costs(pose, place) if frame_costs.usable else np.empty(0)
-    )
+    mirror_costs = np.empty(0)
+    if frame_costs.usable:
+        mirror_costs = frame_costs.mirror_costs(pose, place)
     sides = frame_costs.side_odds(pose, place)
     details = {
         "usable": frame_costs.usable,

@@ -1,4 +1,4 @@
-"""The states of the model: poses of clips, what came after each of them, and codes by which they are compared."""
+"""The poses of recorded clips, how each continues, and codes that compare poses."""
 
 import hashlib
 from collections.abc import Iterable, Sequence
@@ -22,19 +22,19 @@ from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars import kernels
 
-# (n, D): two of them are as far apart as the joints of their poses, root mean square
+# (n, D): the distance of two codes is that of the joints of their poses, rms, metres
 Codes = NDArray[np.float32]
 Rows = NDArray[np.int64]
 
-# metres between the codes of two frames of a clip, or of the centres of two groups
+# Metres: the least distance of two states of a clip, and of the centres of two groups.
 MIN_FRAME_DISTANCE = 0.02
-GROUPS = 1000  # of similar poses; fewer where there are fewer poses
+GROUPS = 1000  # groups of similar poses, at most
 COARSE_GROUPS = 40
-NEAR_GROUPS = 4  # that are searched for the poses nearest to another one
+NEAR_GROUPS = 4  # groups that a search for the nearest poses looks into
 
 
 class Coding(NamedTuple):
-    """Principal components of the joints of bodies that are turned to yaw 0."""
+    """The principal components of the joints of bodies turned to yaw 0."""
 
     skeleton: Skeleton
     mean: Array  # (81,) metres
@@ -42,7 +42,7 @@ class Coding(NamedTuple):
 
     @classmethod
     def of(cls, skeleton: Skeleton, clips: Iterable[Codes]) -> Self:
-        """Return the components of the `facing_joints` (K, 81) of all clips, one after the other."""
+        """Return the components of the `facing_joints` (K, 81) of each of the clips."""
         count = 0
         total = np.zeros(3 * len(JOINTS))
         squares = np.zeros((3 * len(JOINTS), 3 * len(JOINTS)))
@@ -53,11 +53,9 @@ class Coding(NamedTuple):
             squares = squares + joints.T @ joints
         mean = total / count
         _, axes = np.linalg.eigh(squares - count * np.outer(mean, mean))
-        return cls(
-            skeleton,
-            mean,
-            axes[:, : -kernels.DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)),
-        )
+        # eigh sorts eigenvalues in ascending order: the last axes come first here
+        principal = axes[:, : -kernels.DIMENSIONS - 1 : -1]  # (81, D)
+        return cls(skeleton, mean, principal / np.sqrt(len(JOINTS)))
 
     def of_joints(self, joints: Codes) -> Codes:
         """Return the codes (K, D) of `facing_joints` (K, 81)."""
@@ -69,16 +67,18 @@ class Coding(NamedTuple):
 
 
 def facing_joints(skeleton: Skeleton, poses: Array) -> Codes:
-    """Return the joints (K, 81) of poses (K, 66) that are turned to yaw 0, metres."""
+    """Return the joints (K, 81), in metres, of poses (K, 66) turned to yaw 0."""
     facing = poses.copy()
     facing[:, 0] = 0.0
     return skeleton.joints(facing).reshape(len(poses), -1).astype(np.float32)
 
 
 def farthest_first(codes: Codes, max_groups: int) -> tuple[Rows, Rows]:
-    """Return centres (G,), each as far from those before it as any pose, and the group (K,) of each pose's nearest.
+    """Return the centres (G,) of groups of similar poses, and each pose's group (K,).
 
-    Farthest-first traversal: Gonzalez, Clustering to minimize the maximum intercluster distance, 1985.
+    Each new centre is the pose farthest from all centres so far: farthest-first
+    traversal (Gonzalez, Clustering to minimize the maximum intercluster distance,
+    1985). A pose belongs to the group of the nearest centre.
     """
     lengths = (codes**2).sum(axis=1)
     nearest = np.full(len(codes), np.inf, dtype=np.float32)
@@ -87,7 +87,8 @@ def farthest_first(codes: Codes, max_groups: int) -> tuple[Rows, Rows]:
     while True:
         squares = lengths - 2.0 * (codes @ codes[centres[-1]]) + lengths[centres[-1]]
         nearer = squares < nearest
-        nearest[nearer], groups[nearer] = squares[nearer], len(centres) - 1
+        nearest[nearer] = squares[nearer]
+        groups[nearer] = len(centres) - 1
         farthest = int(nearest.argmax())
         if len(centres) == max_groups or nearest[farthest] <= MIN_FRAME_DISTANCE**2:
             return np.array(centres), groups
@@ -95,15 +96,18 @@ def farthest_first(codes: Codes, max_groups: int) -> tuple[Rows, Rows]:
 
 
 class Tiles(NamedTuple):
-    """The codes of states in groups, `LANES` side by side; codes that fill up a group are infinitely far away."""
+    """The codes of states in groups, `LANES` side by side.
+
+    The last tile of a group is filled up with codes that are infinitely far away.
+    """
 
     codes: Codes  # (T, D, LANES)
-    states: Rows  # (T LANES,) whose codes they are
-    starts: Rows  # (G + 1,) the tile with which each group begins
+    states: Rows  # (T LANES,) the state of each code
+    starts: Rows  # (G + 1,) the first tile of each group
 
     @classmethod
     def of(cls, codes: Codes, members: Rows, starts: Rows) -> Self:
-        """Return the tiles of the codes of `members` (K,), in groups that begin at `starts` (G + 1,)."""
+        """Return tiles of `members` (K,), in groups that begin at `starts` (G + 1,)."""
         sizes = np.diff(starts)
         lanes = kernels.LANES
         tiles = np.append(0, np.cumsum(-(-sizes // lanes)))
@@ -112,42 +116,49 @@ class Tiles(NamedTuple):
         )
         states = np.zeros(lanes * tiles[-1], np.int64)
         filled = np.full((len(states), codes.shape[1]), np.inf, codes.dtype)
-        states[places], filled[places] = members, codes[members]
-        return cls(
-            np.ascontiguousarray(
-                filled.reshape(-1, lanes, codes.shape[1]).transpose(0, 2, 1)
-            ),
-            states,
-            tiles,
-        )
+        states[places] = members
+        filled[places] = codes[members]
+        by_tile = filled.reshape(-1, lanes, codes.shape[1])  # (T, LANES, D)
+        lanes_last = np.ascontiguousarray(by_tile.transpose(0, 2, 1))
+        return cls(lanes_last, states, tiles)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Exemplars:
-    """Poses (K, 66) in the order of their clips. A pose's yaw is free; its pitch and roll are the clip's."""
+    """The poses of clips, clip by clip, with what is learned from them.
 
-    poses: Array
+    The yaw of a state is free; its pitch and roll are those of the clip.
+    """
+
+    poses: Array  # (K, 66)
     codes: Codes  # (K, D) metres
-    places: Array  # (K, 3) metres: where the clip's root was
+    places: Array  # (K, 3) metres: the root in the clip
     times: Array  # (K,) seconds since the clip's first frame
     clips: Rows  # (K,) number of the clip
-    last_states: Rows  # (clips,) a clip's last pose
-    centres: Rows  # (G,) a pose of each group
+    last_states: Rows  # (clips,) the last pose of each clip
+    centres: Rows  # (G,) the central pose of each group
     groups: Rows  # (K,) the group of each pose
-    coarse_groups: Rows  # (K,) the same for a few large groups
+    coarse_groups: Rows  # (K,) the group of each pose among a few large groups
     members: Rows  # (K,) all poses, group by group
     starts: Rows  # (G + 1,) where each group begins in `members`
     tiles: Tiles  # of the codes, group by group
     centre_tiles: Tiles  # of the centres' codes, as one group
     coding: Coding
-    # of what it was learned from; empty where nothing of it is kept on the machine
+    # of the motions learned from; empty if nothing is cached on disk
     digest: bytes = b""
 
     @classmethod
     def of(
         cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False
     ) -> Self:
-        """Return the states of motions as the person with this skeleton would move, and of their mirror images."""
+        """Return the states of motions performed by a person with this skeleton.
+
+        Args:
+            motions: The motions to learn from.
+            skeleton: The person's skeleton.
+            mirrored: Whether the mirror images of the motions are learned too.
+
+        """
         learned = learned_from(motions, skeleton, mirrored)
         return cls.assembled(motions, skeleton, learned)
 
@@ -159,8 +170,8 @@ class Exemplars:
         learned: Arrays,
         digest: bytes = b"",
     ) -> Self:
-        """Return the states of motions from what was learned from these, see `learned_from`."""
-        counts = learned["counts"]  # of each clip; mirror images follow all motions
+        """Return the states of motions, from the arrays of `learned_from`."""
+        counts = learned["counts"]  # per clip; mirror images follow all motions
         ends = np.cumsum(counts)
         parts = list[tuple[Array, Array, Array]]()
         for number, rows in enumerate(np.split(learned["rows"], ends[:-1])):
@@ -199,20 +210,37 @@ class Exemplars:
 
     @cached_property
     def _line(self) -> tuple[float, Array]:
-        """How long a clip's part is of a line on which all clips lie one after the other, and where poses lie (K,)."""
+        """All clips one after the other on one line of time.
+
+        Returns:
+            The length of each clip's part of the line, and the positions (K,) of the
+            poses on it. One search in these finds times within any clip.
+
+        """
         length = 1.0 + float(self.times.max())
         return length, self.clips * length + self.times
 
     def continuation(self, states: Rows, seconds: float) -> tuple[Codes, Array, Array]:
-        """Return codes (n, D) of what came `seconds` after some states, their turns (n,) and displacements (n, 3).
+        """Return what the clips of some states show `seconds` later.
 
-        Displacements are those of a body whose yaw was 0. Between two poses all is interpolated; a clip that has
-        ended stays in its last pose, and, with negative seconds, one that has not begun in its first.
+        Values between two poses are interpolated. A clip stays in its last pose after
+        its end and, with negative seconds, in its first pose before its beginning.
+
+        Args:
+            states: (n,) the states that continue.
+            seconds: The time that passes, negative for what came before.
+
+        Returns:
+            The codes (n, D), the turns (n,) in radians, and the displacements (n, 3) in
+            metres of a body whose yaw was 0.
+
         """
-        last, (length, line) = self.last_states[self.clips[states]], self._line
+        last = self.last_states[self.clips[states]]
+        length, line = self._line
         times = np.clip(self.times[states] + seconds, 0.0, self.times[last])
         before = np.searchsorted(line, self.clips[states] * length + times, "right") - 1
         after = np.minimum(before + 1, last)
+        # 1e-9 s avoids a division by 0 at the end of a clip, where both are one pose
         gap = np.maximum(self.times[after] - self.times[before], 1e-9)
         share = np.clip((times - self.times[before]) / gap, 0.0, 1.0)[:, None]
 
@@ -231,22 +259,34 @@ class Exemplars:
         )
 
     def draw(self, count: int, rng: np.random.Generator) -> Rows:
-        """Return poses drawn at random, of a group in proportion to the square root of its size.
+        """Return `count` states drawn at random.
 
-        With equal weights of poses nearly all would stand; with equal weights of groups nearly all would be acrobatic.
+        A group is drawn in proportion to the square root of its size, and a pose of it
+        uniformly. With equal weights of poses nearly all would be standing poses; with
+        equal weights of groups nearly all would be acrobatic.
         """
         sizes = np.diff(self.starts)
         ends = np.cumsum(np.sqrt(sizes))
-        group = np.minimum(
-            np.searchsorted(ends, rng.uniform(0.0, ends[-1], count), "right"),
-            len(sizes) - 1,
-        )
-        return self.members[
-            self.starts[group] + (rng.random(count) * sizes[group]).astype(np.int64)
-        ]
+        drawn = rng.uniform(0.0, ends[-1], count)
+        group = np.minimum(np.searchsorted(ends, drawn, "right"), len(sizes) - 1)
+        ranks = (rng.random(count) * sizes[group]).astype(np.int64)  # in their groups
+        states: Rows = self.members[self.starts[group] + ranks]
+        return states
 
     def nearest(self, poses: Array, count: int) -> tuple[Rows, Codes]:
-        """Return the states nearest to `poses` (n, 66) in the groups near them; see `kernels.nearest_codes`."""
+        """Return the states nearest to poses, and their squared distances.
+
+        Only the few groups near each pose are searched.
+
+        Args:
+            poses: (n, 66).
+            count: How many states for each pose.
+
+        Returns:
+            The states (n, count), nearest first, and the squared distances (n, count),
+            infinite if the groups have fewer states.
+
+        """
         codes = self.coding.of_poses(poses)
         states, squares = kernels.nearest_codes(
             codes, self.near_groups(codes), self.tiles, count
@@ -254,7 +294,7 @@ class Exemplars:
         return states, squares
 
     def near_groups(self, codes: Codes) -> Rows:
-        """Return the few groups (n, g) whose centres are nearest to some codes (n, D)."""
+        """Return the few groups (n, g) with the centres nearest to codes (n, D)."""
         count = min(NEAR_GROUPS, len(self.centres))
         states: Rows = kernels.nearest_codes(
             codes, np.zeros((len(codes), 1), np.int64), self.centre_tiles, count
@@ -262,7 +302,11 @@ class Exemplars:
         return self.groups[states]
 
     def nearby_mean(self, poses: Array, count: int, spread: float) -> Array:
-        """Return the mean (n, 66) of the `count` poses of clips nearest to each of `poses`, whose yaw it has."""
+        """Return the mean (n, 66) of the clips' poses similar to each pose, at its yaw.
+
+        The `count` nearest poses are averaged. Their weights are Gaussian, with the
+        standard deviation `spread` in metres, and greatest for the nearest one.
+        """
         states, squares = self.nearest(poses, count)
         weights = np.exp(-0.5 * (squares - squares[:, :1]) / spread**2)
         differences = wrapped(self.poses[states] - poses[:, None])
@@ -271,7 +315,7 @@ class Exemplars:
         return np.asarray(poses + sums / weights.sum(axis=1, keepdims=True))
 
     def with_yaws(self, states: Rows, yaws: Array) -> Array:
-        """Return copies of the poses (n, 66) of some states, turned to yaws (n,)."""
+        """Return the poses (n, 66) of states (n,), turned to yaws (n,)."""
         poses = self.poses[states]
         poses[:, 0] = yaws
         return poses
@@ -280,10 +324,21 @@ class Exemplars:
 def learned_from(
     motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool
 ) -> Arrays:
-    """Return what takes long to learn from motions, and from their mirror images, which follow all of them.
+    """Return the arrays that take long to learn from motions.
 
-    They are the `rows` of each clip that are states, and how many, `counts`; `codes` with their `mean` and `axes`; and
-    `centres`, `groups` and `coarse_groups`, see `Exemplars`.
+    Args:
+        motions: The motions to learn from.
+        skeleton: The skeleton of the person who performs them.
+        mirrored: Whether their mirror images are learned too. These follow all motions.
+
+    Returns:
+        `rows`, the frames of each clip that are states, and `counts`, their number for
+        each clip; `codes` with their `mean` and `axes`; and `centres`, `groups` and
+        `coarse_groups`, see `Exemplars`.
+
+    Raises:
+        InputError: If there are no motions, or one has a single frame.
+
     """
     if not motions:
         raise InputError("exemplars must have motions to learn from, got none")
@@ -312,24 +367,25 @@ def learned_from(
         "mean": coding.mean,
         "axes": coding.axes,
         "centres": centres,
-        # of a thousand groups at most
+        # 16 bits are enough for a thousand groups
         "groups": groups.astype(np.int16),
         "coarse_groups": coarse_groups.astype(np.int16),
     }
 
 
-# the latest motions and their states: restarts, builds and cells of a sweep learn from
-# the same ones
+# The latest motions and their states. Restarts, builds and the cells of a sweep all
+# learn from the same motions.
 _latest = list[tuple[tuple[Motion, ...], Exemplars]]()
 
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton) -> Exemplars:
-    """Return the states of motions and their mirror images, by the joints of a person of average lengths.
+    """Return the states of motions and their mirror images, for an average person.
 
-    The latest are cached in the process, and what takes long on the machine.
+    The latest states are cached in the process. The arrays that take long to learn are
+    cached on disk.
     """
     average = replace(skeleton, offsets=average_skeleton().offsets)
-    # a copy: another thread may replace them at any time
+    # a copy, because another thread may replace the entries at any time
     for known, exemplars in [*_latest]:
         axes = exemplars.coding.skeleton.axes
         same = len(known) == len(motions) and all(map(is_, known, motions))
@@ -341,13 +397,14 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton) -> Exemplars:
             return exemplars
     learned = stored("exemplars", digest, lambda: learned_from(motions, average, True))
     exemplars = Exemplars.assembled(motions, average, learned, digest)
-    # one picture is looked up in two sets: what its prior learned from, and the library
+    # two entries, because one picture is looked up in two sets of motions: the ones its
+    # prior learned from, and the library
     _latest[:] = [(tuple(motions), exemplars), *_latest[:1]]
     return exemplars
 
 
 def _digest(motions: Sequence[Motion], skeleton: Skeleton) -> bytes:
-    """Return a digest of motions and of all that the states made of them depend on."""
+    """Return a digest of motions and of everything else that their states depend on."""
     heads = [(motion.name, motion.fps, len(motion)) for motion in motions]
     digest = hashlib.sha256(repr((state_of(__name__), heads)).encode())
     digest.update(skeleton.axes.tobytes())
@@ -359,17 +416,19 @@ def _digest(motions: Sequence[Motion], skeleton: Skeleton) -> bytes:
 
 
 def exemplars_for(task: Task) -> Exemplars:
-    """Return the states that a task may learn from; one set of them serves both directions."""
-    training = (
-        [motion.reversed() for motion in task.training]
-        if task.backwards
-        else task.training
-    )
+    """Return the states that a task may learn from.
+
+    A backwards task gets its motions reversed. They are reversed again here, so that
+    one set of states serves both directions.
+    """
+    training = task.training
+    if task.backwards:
+        training = [motion.reversed() for motion in training]
     return exemplars_of(training, task.body.skeleton)
 
 
 def mirror_image(motion: Motion) -> Motion:
-    """Return a motion mirrored in the plane x = 0: left and right are exchanged."""
+    """Return a motion mirrored in the plane x = 0, with left and right exchanged."""
     poses, translations = _mirrored(motion.skeleton, motion.poses, motion.translations)
     return replace(motion, poses=poses, translations=translations)
 

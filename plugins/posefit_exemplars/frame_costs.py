@@ -16,7 +16,11 @@ SMALL_FACTORS = (4, 2, 1)
 
 
 class FrameCosts:
-    """The silhouettes of one frame. `small` costs are of a picture with every fourth pixel of every fourth row."""
+    """The costs of poses in one frame, from its silhouettes and landmarks.
+
+    Costs in the `small` picture are cheaper and coarser: it has every fourth pixel of
+    every fourth row, or every second if it would be too small.
+    """
 
     def __init__(
         self, task: Task, observation: Observation, alone: bool = False
@@ -37,34 +41,37 @@ class FrameCosts:
         ]
         self._scene = (task.body, task.cameras, silhouettes)
         self._small_scene = (task.body, cameras, pictures)
-        # effort of a cost in the small picture, as a share of one at full size
+        # the effort of a cost in the small picture, as a share of a cost at full size
         self.small_share = 1.0 / factor**2
+        # the cameras that show something of the person
         self._views = known_views(task.cameras, silhouettes)
-        # of cameras that show something
-        self.skeleton, self.camera_count = task.body.skeleton, len(self._views)
+        self.camera_count = len(self._views)
+        self.skeleton = task.body.skeleton
         self.yaw = observation.yaw
         self.usable = observation.usable
         known = observation.translation if task.translation == "known" else None
-        # (3,) metres, where it is known
+        # (3,) metres, or None if the root is unknown
         self.root = None if known is None else np.asarray(known, dtype=np.float64)
-        # (3,) of the only camera that shows the person; None with several, which also show the depth
-        self.camera_position: Array | None = (
-            self._views[0].position if self.camera_count == 1 else None
-        )
+        # (3,) metres, or None if several cameras show the person: they also show depth
+        self.camera_position: Array | None = None
+        if self.camera_count == 1:
+            self.camera_position = self._views[0].position
 
     def aligned(self, poses: Array, places: Array) -> Array:
-        """Return the places (n, 3) of poses (n, 66): of the known root, or those near `places` (n, 3) that fit."""
+        """Return the places (n, 3) of poses (n, 66).
+
+        A known root gives the place. Otherwise it is the place near each of `places`
+        (n, 3) at which the pose fits the silhouettes.
+        """
         if self.root is not None or self._task.translation == "known":
             return self.at_root(places)
         return align(*self._scene, poses, places)
 
     def at_root(self, places: Array) -> Array:
-        """Return the known place of the root, once for each of `places` (n, 3); else these."""
-        return (
-            places
-            if self.root is None
-            else np.repeat(self.root[None], len(places), axis=0)
-        )
+        """Return the known root n times (n, 3), or `places` (n, 3) if it is unknown."""
+        if self.root is None:
+            return places
+        return np.repeat(self.root[None], len(places), axis=0)
 
     def small(self, poses: Array, places: Array) -> Array:
         """Return the costs (n,) of poses in the small picture."""
@@ -73,11 +80,11 @@ class FrameCosts:
         )[0]
 
     def full(self, poses: Array, places: Array) -> Array:
-        """Return the costs (n,) of poses."""
+        """Return the costs (n,) of poses at full size."""
         return pose_costs(*self._scene, poses, places, threads=self._task.threads)[0]
 
     def landmarks(self, poses: Array, places: Array) -> Array:
-        """Return the `landmark_likelihoods` (n, K, 2) of poses: 0 where the frame has no landmarks."""
+        """Return the `landmark_likelihoods` (n, K, 2), 0 if there are no landmarks."""
         if self.observation.landmarks is None:
             return np.zeros((len(poses), len(GROUPS) * len(self._task.cameras), 2))
         return landmark_likelihoods(
@@ -85,13 +92,20 @@ class FrameCosts:
         )
 
     def side_odds(self, pose: Array, place: Array) -> Array | None:
-        """Return the logarithms of the odds (2,) that legs, and arms, are as in a pose (66,), by all landmarks."""
+        """Return how likely a pose (66,) has left and right where the landmarks have.
+
+        Returns:
+            The logarithms of the odds (2,) for legs and for arms, or None if the frame
+            has no landmarks.
+
+        """
         marks = self.observation.landmarks
-        known = marks is not None and marks[..., 2].any()
-        return side_odds(self.landmarks(pose[None], place[None])[0]) if known else None
+        if marks is None or not marks[..., 2].any():
+            return None
+        return side_odds(self.landmarks(pose[None], place[None])[0])
 
     def contours(self, place: Array) -> list[MaskContours]:
-        """Return the contours of the masks in each view, of a person whose root is about at `place` (3,)."""
+        """Return each view's mask contours, for a person at about `place` (3,)."""
         cameras = enumerate(self._task.cameras)
         frame = [self.observation]
         return [
@@ -105,7 +119,12 @@ class FrameCosts:
         return float(costs[0]), areas[:, 0]
 
     def reflected(self, poses: Array, place: Array) -> Array:
-        """Return poses (n, 66) at about `place` (3,) reflected along each line of sight (cameras n, 66)."""
+        """Return poses (n, 66) near `place` (3,), reflected along each line of sight.
+
+        Returns:
+            The reflected poses (cameras n, 66), camera by camera.
+
+        """
         return np.concatenate(
             [
                 reflected_poses(self.skeleton, poses, facing(view, place))
@@ -114,7 +133,10 @@ class FrameCosts:
         )
 
     def mirror_costs(self, pose: Array, place: Array) -> Array:
-        """Return the costs (1 + cameras,) of a pose's mirror image, and of its reflection along each line of sight."""
+        """Return the costs of a pose's mirror image and reflections (1 + cameras,).
+
+        There is one reflection along each camera's line of sight.
+        """
         poses = pose[None]
         poses = np.concatenate(
             [poses, mirrored_poses(self.skeleton, poses), self.reflected(poses, place)]

@@ -1,25 +1,31 @@
-"""Distances between codes of poses, in numba: plain functions over arrays, shapes checked by the callers.
+"""Distances between codes of poses, compiled by Numba.
 
-The codes of `LANES` poses lie side by side in a tile, so that loops over lanes run in vector registers. `tiles` are
-`exemplars.Tiles`.
+The functions take plain arrays and rely on the callers for their shapes. The codes of
+`LANES` poses lie side by side in a tile, so that loops over lanes run in vector
+registers. `tiles` are `exemplars.Tiles`.
 """
 
 import numpy as np
 
 from posefit.arrays import inlined, jit
 
-DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
-# that are compared first
+DIMENSIONS = 24  # dimensions of a code; the remainder of the joints is below 5 mm
+# Dimensions that are compared first. They rule out most tiles.
 FIRST_DIMENSIONS = 6
 LANES = 32
 
 
 @inlined
 def lower_distances(distances, start, code, tile, partial):
-    """Lower `distances` (LANES,) to `start` and the squared distances of the codes of a tile (DIMENSIONS, LANES).
+    """Lower `distances` (LANES,) to those of a tile's codes (DIMENSIONS, LANES).
 
-    Returns whether any may be lower: codes are principal components, and the first few tell of most tiles that all
-    their codes are farther away. `partial` (LANES,) is room for these.
+    A distance is `start` plus the squared distance of a code from `code`. Codes are
+    principal components: the first few show that all codes of most tiles are farther
+    away, and the others are then not compared. `partial` (LANES,) is a buffer.
+
+    Returns:
+        Whether the first components left open that any distance is lower.
+
     """
     near = False
     for lane in range(LANES):
@@ -41,7 +47,11 @@ def lower_distances(distances, start, code, tile, partial):
 
 @jit
 def frames_apart(codes, min_square):
-    """Return the first frame of a clip with codes (T, D), those far from the latest returned one, and the last."""
+    """Return frames of a clip with codes (T, D) that are far apart.
+
+    These are the first frame, each frame far from the one returned before it, and the
+    last frame.
+    """
     frames = np.zeros(len(codes), np.int64)
     count = 1
     last = len(codes) - 1
@@ -58,7 +68,13 @@ def frames_apart(codes, min_square):
 
 @jit
 def nearest_codes(codes, groups, tiles, count):
-    """Return the states in `groups` (n, g) nearest to codes (n, D), and squared distances (or inf), both (n, count)."""
+    """Return the states in `groups` (n, g) nearest to codes (n, D), and distances.
+
+    Returns:
+        The states (n, count), nearest first, and the squared distances (n, count),
+        infinite if the groups have fewer states.
+
+    """
     squares = np.full((len(codes), count), np.inf, np.float32)
     states = np.zeros((len(codes), count), np.int64)
     distances = np.empty(LANES, np.float32)
@@ -76,25 +92,33 @@ def nearest_codes(codes, groups, tiles, count):
                     rank = last
                     if distances[lane] < squares[i, rank]:
                         while rank > 0 and distances[lane] < squares[i, rank - 1]:
-                            squares[i, rank], states[i, rank] = (
-                                squares[i, rank - 1],
-                                states[i, rank - 1],
-                            )
+                            squares[i, rank] = squares[i, rank - 1]
+                            states[i, rank] = states[i, rank - 1]
                             rank -= 1
-                        squares[i, rank], states[i, rank] = (
-                            distances[lane],
-                            tiles.states[LANES * t + lane],
-                        )
+                        squares[i, rank] = distances[lane]
+                        states[i, rank] = tiles.states[LANES * t + lane]
     return states, squares
 
 
 @jit
 def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, room, scale, limit):
-    """Return the states that some `rows` of a beam continue to, the row of each one's cheapest step, and its total.
+    """Return the states that rows of a beam can step to, each with its cheapest step.
 
-    Row i continues at `codes` (speeds, n, D), which cost `start_costs` (speeds, n); a step to a state in its `groups`
-    (n, g) costs the squared distance times `scale`, at the cheapest speed. Totals (n,) with a step are below `limit`.
-    `room` holds three arrays of a number for each place in the tiles; the first one is inf before and afterwards.
+    Args:
+        codes: (speeds, n, D) where the states of the beam continue.
+        start_costs: (speeds, n) costs of these continuations.
+        totals: (n,) the total of each state.
+        rows: The states that take a step.
+        groups: (n, g) the groups that each state can step to.
+        tiles: The codes of all states.
+        room: Three buffers with an entry for each place in the tiles. The first one is
+            infinite before and after the call.
+        scale: Cost of a unit of squared distance. The cheapest speed counts.
+        limit: Steps with totals at or above the limit are left out.
+
+    Returns:
+        The states, the row from which each is reached at least cost, and that total.
+
     """
     best, parents, reached = room
     distances = np.empty(LANES, np.float32)
@@ -123,7 +147,8 @@ def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, room, scale,
                             if best[place] == np.inf:
                                 reached[count] = place
                                 count += 1
-                            best[place], parents[place] = total, row
+                            best[place] = total
+                            parents[place] = row
     places = reached[:count].copy()
     steps = tiles.states[places], parents[places], best[places]
     best[places] = np.inf

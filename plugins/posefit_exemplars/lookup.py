@@ -1,11 +1,13 @@
-"""Where a search may begin: poses of clips whose silhouettes are like the observed ones, found in a table of codes.
+"""The start `lookup`: poses of clips whose silhouettes resemble the observed ones.
 
-The table has the silhouettes of some poses of clips, each turned to 24 yaws, as a camera sees them that looks straight
-at the person. The code of a silhouette is what a picture of 16 x 16 pixels shows of it, in principal components. One
-product of a matrix and a vector compares an observation with all of them; the costs of the nearest weigh these.
+A table holds the silhouettes of some poses of clips, each turned to 24 yaws, as seen by
+a camera that looks straight at the person. The code of a silhouette consists of the
+principal components of its picture of 16 x 16 pixels. One product of a matrix and a
+vector compares an observation with the whole table. The costs of the nearest poses then
+give their weights.
 
-After Brand, Shadow puppetry, 1999, and Li, Sun, Chen and Li's references 2 and 3: a silhouette suggests a pose, and a
-search then makes it fit.
+After Brand, Shadow puppetry, 1999, and Li, Sun, Chen and Li's references 2 and 3: a
+silhouette suggests a pose, and a search then makes it fit.
 """
 
 from functools import lru_cache
@@ -30,21 +32,21 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.exemplars import Exemplars, Rows, exemplars_for
 from posefit_exemplars.frame_costs import FrameCosts
 
-POSES = 2000  # drawn of the clips as `Exemplars.draw` does
-YAWS = 24  # that each is turned to
+POSES = 2000  # poses in a table, drawn by `Exemplars.draw`
+YAWS = 24  # yaws that each pose is turned to
 YAW_STEP = 2.0 * np.pi / YAWS
-ELEVATION = np.radians(10.0)  # between the tables of cameras that look down, or up
-DISTANCE = 4.3  # metres from which a camera of the table sees the person
+# There is one table for each multiple of this elevation of the camera.
+ELEVATION = np.radians(10.0)
+DISTANCE = 4.3  # metres from the camera of a table to the person
 FIELD_OF_VIEW = 0.85  # radians, of that camera
-# pixels of its pictures, and of the small ones that codes are made of
-PICTURE = 64
-SIDE = 16
-DIMENSIONS = 64  # of a code
-CANDIDATES = 512  # that are nearest in the table, whose costs are counted
-COSTS_SHARE = 0.08  # of a frame's evaluations: for these costs, at most
-TEMPERATURE = 4.0  # divides their costs
-# squared, of codes, to the nearest: 99 % of damaged silhouettes of unknown people are
-# nearer
+PICTURE = 64  # side of the camera's picture, pixels
+SIDE = 16  # side of the small picture that a code is made from, pixels
+DIMENSIONS = 64  # dimensions of a code
+CANDIDATES = 512  # poses, nearest in the table, that are compared by their costs
+COSTS_SHARE = 0.08  # share of a frame's evaluations that these costs take, at most
+TEMPERATURE = 4.0  # divides the costs of candidates
+# Nothing is suggested if the squared distance to the nearest code is larger. 99 % of
+# damaged silhouettes of unknown people are nearer.
 MAX_DISTANCE = 16.0
 YAW_TOLERANCE = np.radians(50.0)  # of a known yaw, to either side
 RNG_STREAM_TABLE = 61
@@ -52,40 +54,38 @@ Codes = NDArray[np.float32]  # (n, DIMENSIONS)
 
 
 class Table(NamedTuple):
-    """The codes of the silhouettes of states, turned to `YAWS` yaws, seen from the front of yaw 0."""
+    """The codes of silhouettes: states turned to `YAWS` yaws, the camera in front.
+
+    The camera sees a person of yaw 0 from the front.
+    """
 
     states: Rows  # (n,)
     mean: Codes  # (SIDE^2,)
     axes: Codes  # (SIDE^2, DIMENSIONS)
     codes: Codes  # (n YAWS, DIMENSIONS)
-    squares: Codes  # (n YAWS,) of their lengths
+    squares: Codes  # (n YAWS,) the squared lengths of the codes
 
     @classmethod
     def of(cls, exemplars: Exemplars, elevation: float) -> Self:
-        """Return the table of the average body that a camera sees from an elevation, radians.
+        """Return the table for an average body seen from an elevation, in radians.
 
-        It is made once on a machine for what the exemplars were learned from.
+        It is cached on disk if the exemplars are.
         """
         if not exemplars.digest:
             return cls(**_learned(exemplars, elevation))
         state = repr((state_of(__name__), elevation)).encode()
-        return cls(
-            **stored(
-                "lookup",
-                exemplars.digest + state,
-                lambda: _learned(exemplars, elevation),
-            )
-        )
+        digest = exemplars.digest + state
+        return cls(**stored("lookup", digest, lambda: _learned(exemplars, elevation)))
 
     def distances(self, picture: Mask) -> Codes:
-        """Return the squared distances (n, YAWS) of all silhouettes from that of a picture (height, width)."""
+        """Return the squared distances (n, YAWS) of all states from a picture."""
         code = (small_pictures(picture[None])[0] - self.mean) @ self.axes
         squares = self.squares - 2.0 * (self.codes @ code) + code @ code
         return np.asarray(squares.reshape(-1, YAWS))
 
 
 def _learned(exemplars: Exemplars, elevation: float) -> Arrays:
-    """Return the arrays of the table of an elevation: the silhouettes of some states at each yaw."""
+    """Return the arrays of a table: codes of the silhouettes of some states, by yaw."""
     body = Body.of(exemplars.coding.skeleton)
     states = np.arange(len(exemplars))
     if len(states) > POSES:
@@ -96,7 +96,8 @@ def _learned(exemplars: Exemplars, elevation: float) -> Arrays:
     poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
     camera = looking_at(0.0, elevation)
     small = list[Codes]()
-    for part in np.array_split(poses, YAWS):  # pictures take memory
+    # in parts, because pictures take memory
+    for part in np.array_split(poses, YAWS):
         masks = masks_of(body, camera, part, -body.skeleton.joints(part).mean(axis=1))
         small.append(small_pictures(masks))
     pixels = np.concatenate(small)
@@ -117,7 +118,7 @@ _table = lru_cache(maxsize=4)(Table.of)
 
 
 def looking_at(azimuth: float, elevation: float) -> Camera:
-    """Return the camera of the table: it looks at the origin from an azimuth and an elevation, radians."""
+    """Return a table's camera, which looks at the origin from these angles, radians."""
     level = Camera.around(
         np.zeros(3), azimuth, DISTANCE, (PICTURE, PICTURE), FIELD_OF_VIEW
     )
@@ -135,7 +136,10 @@ def looking_at(azimuth: float, elevation: float) -> Camera:
 
 
 def small_pictures(masks: Mask) -> Codes:
-    """Return the square about each person's borders as SIDE x SIDE pixels (n, SIDE^2), shares of 0 to 1."""
+    """Return the square around each person, scaled to SIDE x SIDE pixels (n, SIDE^2).
+
+    A pixel is the share, 0 to 1, that the person covers.
+    """
     small = np.empty((len(masks), SIDE, SIDE), np.uint8)
     for mask, pixels in zip(masks.view(np.uint8), small, strict=True):
         left, top, width, height = cv2.boundingRect(mask)
@@ -151,30 +155,35 @@ def small_pictures(masks: Mask) -> Codes:
 
 
 def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, float]:
-    """Return what an upright camera sees that looks straight at the person, and its azimuth and elevation, radians.
+    """Return what an upright camera sees that looks straight at the person.
 
-    It stands where the camera of the silhouette does, and the person fills most of its picture.
+    It has the position of the silhouette's camera, and the person fills most of its
+    picture.
+
+    Returns:
+        The mask (PICTURE, PICTURE), and the azimuth and elevation of the new camera in
+        radians.
+
     """
     mask = without_small_pieces(silhouette.mask)
     left, top, right, bottom = box_of(mask)
     corners = np.array(
         [[left, top], [right, top], [left, bottom], [right, bottom]], dtype=np.float64
     )
-    rays = (
-        np.column_stack([(corners - camera.centre) / camera.focal, np.ones(4)])
-        @ camera.rotation
-    )
+    directions = np.column_stack([(corners - camera.centre) / camera.focal, np.ones(4)])
+    rays = directions @ camera.rotation  # (4, 3)
     rays /= np.linalg.norm(rays, axis=1)[:, None]
     x, y, z = ray = rays.sum(axis=0) / np.linalg.norm(rays.sum(axis=0))
     azimuth = float(np.arctan2(-x, -z))
     elevation = float(np.arcsin(-y))
     straight = looking_at(azimuth, elevation)
     half = float(np.arccos(np.clip(rays @ ray, -1.0, 1.0)).max())
+    # 5 % of margin; the limit keeps the tangent finite for a person all around
     focal = 0.5 * PICTURE / np.tan(min(1.05 * half, 1.2))
     to_picture = pinhole_matrix([focal, focal], [PICTURE / 2.0, PICTURE / 2.0])
     from_image = np.linalg.inv(pinhole_matrix(camera.focal, camera.centre))
     homography = to_picture @ straight.rotation @ camera.rotation.T @ from_image
-    # OpenCV's pixel centres are whole numbers
+    # pixel centres are whole numbers in OpenCV, but halves here
     shift = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
     homography = np.linalg.inv(shift) @ homography @ shift
     picture = cv2.warpPerspective(
@@ -187,32 +196,40 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
 
 
 class Lookup:
-    """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones."""
+    """Suggests poses of clips, and their mirror images, by their silhouettes."""
 
     def __init__(self, task: Task) -> None:
-        self.task, self.exemplars = task, exemplars_for(task)
+        self.task = task
+        self.exemplars = exemplars_for(task)
 
     def nearest(
         self, observation: Observation, count: int, yaw: float | None = None
     ) -> tuple[Rows, Array, float] | None:
-        """Return the states and yaws (n,) whose silhouettes are most like those of a frame, and the least distance.
+        """Return the states whose silhouettes are most similar to those of a frame.
 
-        The distance is squared, and the mean over the cameras that show the whole person; None where none does. Yaws
-        are near a known one.
+        Args:
+            observation: The silhouettes of the frame.
+            count: How many states, at most.
+            yaw: The person's yaw in radians, or None if it is unknown. Yaws of states
+                are near it.
+
+        Returns:
+            The states (n,), their yaws (n,), and the least squared distance, a mean
+            over the cameras that show the whole person. None if no camera does.
+
         """
         total = np.zeros(1)
         views = list[tuple[Table, float]]()
-        for camera, silhouette in zip(
-            self.task.cameras, observation.silhouettes, strict=True
-        ):
+        pairs = zip(self.task.cameras, observation.silhouettes, strict=True)
+        for camera, silhouette in pairs:
             if np.isfinite(silhouette.extent).all():
                 picture, azimuth, elevation = straightened(camera, silhouette)
-                with uncounted():  # a table is learned, once a process
-                    table = _table(
-                        self.exemplars,
-                        float(np.round(elevation / ELEVATION) * ELEVATION),
-                    )
-                views.append((table, azimuth))  # whose yaws count from the camera
+                rounded = float(np.round(elevation / ELEVATION) * ELEVATION)
+                # making a table, once per process, is no cost of this frame
+                with uncounted():
+                    table = _table(self.exemplars, rounded)
+                views.append((table, azimuth))
+                # yaws in a table are relative to its camera, here to the first camera
                 turn = round((azimuth - views[0][1]) / YAW_STEP)
                 total = total + np.roll(table.distances(picture), turn, axis=1)
         if not views:
@@ -221,10 +238,10 @@ class Lookup:
         distances = total / len(views)
         if yaw is not None:
             distances[:, np.abs(wrapped(yaws - yaw)) > YAW_TOLERANCE] = np.inf
-        # of two yaws side by side the better one is an alternative
-        pairs = distances.reshape(len(distances), -1, 2)
-        better = pairs.argmin(axis=2)
-        flat = pairs.min(axis=2).ravel()
+        # of two neighbouring yaws only the better one is returned
+        neighbours = distances.reshape(len(distances), -1, 2)
+        better = neighbours.argmin(axis=2)
+        flat = neighbours.min(axis=2).ravel()
         count = min(count, len(flat))
         rows = np.argpartition(flat, count - 1)[:count]
         rows = rows[np.argsort(flat[rows], kind="stable")]
@@ -234,7 +251,10 @@ class Lookup:
         return views[0][0].states[states], chosen, float(flat[rows[0]])
 
     def posterior(self, observation: Observation) -> Posterior | None:
-        """Return the poses that a frame may show, with weights; None where its silhouettes are like none of them."""
+        """Return the poses that a frame may show, with weights.
+
+        None if no pose has similar silhouettes.
+        """
         if not observation.usable:
             return None
         known = self.task.yaw if observation.yaw is None else observation.yaw

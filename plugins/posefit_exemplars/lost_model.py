@@ -1,9 +1,11 @@
-"""How likely it is that a frame is lost, and that its left and right are exchanged.
+"""The probabilities that a frame is lost, and that its left and right are exchanged.
 
-The probabilities are those of two logistic models of the same evidence: what the pose costs, the cost ratios of its
-mirrored and reflected poses, the spread of the sampled tracks, how many of them have the other side, whether the person
-moves where they face, the angle of view and the number of cameras. Each value is used with its means over a moment and
-over a second: a lost track stays lost for a while, and masks that never fit mean less than one that fits worse now.
+Two logistic models give them from the same evidence: the cost of the pose, the cost
+ratios of its mirrored and reflected poses, the spread of the sampled tracks, the share
+of them with sides exchanged, whether the person moves in the direction they face, the
+angle of view, and the number of cameras. The models also use the means of each value
+over a moment and over a second. A lost track stays lost for a while, and a sudden rise
+in cost counts more than a steady high cost.
 """
 
 import json
@@ -26,16 +28,16 @@ from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import second_side
 
-LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
-# the least mean logarithm of the odds at which one camera's landmarks tell left from
-# right
+# Decay time of the mean of the landmarks' evidence of sides.
+LANDMARK_SECONDS = 0.5
+# Landmarks of one camera tell left from right if the mean logarithm of their odds is at
+# least this.
 MIN_SIDE_ODDS = 0.4
-MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # that the means reach back
+MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # decay times of the means
 
-
-# The evidence of a frame, each with the scale on which it enters the models.
+# The evidence of a frame. Each value enters the models on the scale given here.
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
-    # of the reported pose, where the person is visible
+    # cost of the reported pose, if the person is visible
     "cost": lambda value: math.log(max(value, 0.0) + 1.0),
     # the least cost of poses reflected along a line of sight, over the cost
     "reflected": math.log,
@@ -47,16 +49,16 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
     "speed": float,  # metres a second that it moves in any direction
     # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
     "across": float,
-    # cameras that show something of the person, at most `MAX_VIEWS`
+    # number of cameras that show something of the person, at most `MAX_VIEWS`
     "views": math.log2,
 }
-# before the first value; of other evidence 0
+# Values used until there is a first one; other evidence starts at 0.
 DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}
-MAX_VIEWS = 4  # nothing was fitted with more cameras
+MAX_VIEWS = 4  # the models were fitted with at most this many cameras
 MIRROR_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
-MOTION_SECONDS = 0.5  # over which the root's motion is measured
+MOTION_SECONDS = 0.5  # the root's motion is measured over this time
 MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence
-# of features
+# Names of the features: the evidence, then each of its means.
 NAMES = (
     *EVIDENCE,
     *(f"{name}, {reach}" for reach in MEAN_SECONDS for name in EVIDENCE),
@@ -66,28 +68,34 @@ NAMES = (
 def evidence_of(
     skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]
 ) -> dict[str, float]:
-    """Return the values of `EVIDENCE` that a frame with a posterior has by itself."""
+    """Return the values of `EVIDENCE` that depend on one frame alone.
+
+    Args:
+        skeleton: The person's skeleton.
+        frame: The frame, with a posterior.
+        cameras: The cameras.
+
+    """
     assert frame.posterior is not None
     distances = joint_distances(
         skeleton.joints(frame.posterior.poses), skeleton.joints(frame.pose)
     )
-    visible = [
-        camera
-        for camera, counts in zip(cameras, frame.areas, strict=True)
-        if counts.any()
-    ] or cameras
+    views = zip(cameras, frame.areas, strict=True)
+    visible = [camera for camera, counts in views if counts.any()] or cameras
+    across = 0.0
+    if len(visible) == 1:
+        turn = frame.pose[0] - facing(visible[0], frame.translation)
+        across = abs(math.sin(turn))
     values = {
         "farthest": float(distances.mean(axis=1).max()),
         "second": second_side(skeleton, frame.posterior, frame.pose),
-        "across": abs(math.sin(frame.pose[0] - facing(visible[0], frame.translation)))
-        if len(visible) == 1
-        else 0.0,
+        "across": across,
         "views": float(min(len(visible), MAX_VIEWS)),
     }
     if frame.details["usable"]:
-        mirrored, *reflected = (frame.details["mirror_costs"] + MIRROR_COST_OFFSET) / (
-            frame.cost + MIRROR_COST_OFFSET
-        )
+        # the offset keeps ratios of small costs near 1
+        other_costs = frame.details["mirror_costs"] + MIRROR_COST_OFFSET
+        mirrored, *reflected = other_costs / (frame.cost + MIRROR_COST_OFFSET)
         values |= {
             "cost": frame.cost,
             "reflected": float(min(reflected)),
@@ -99,15 +107,22 @@ def evidence_of(
 def root_motion(
     places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False
 ) -> dict[str, float]:
-    """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places."""
+    """Return the speed of the root `ahead`, where the person faces, and its `speed`.
+
+    Args:
+        places: (3,) metres, the latest places of the root.
+        yaw: The person's yaw, radians.
+        fps: Frames a second.
+        backwards: Whether the places are in reverse order of time.
+
+    Returns:
+        The two speeds in metres a second; nothing from fewer than two places.
+
+    """
     if len(places) < 2:
         return {}
-    velocity = (
-        (places[-1] - places[0])[[0, 2]]
-        * fps
-        / (len(places) - 1)
-        * (-1.0 if backwards else 1.0)
-    )
+    displacement = (places[-1] - places[0])[[0, 2]]  # (2,) along the ground
+    velocity = displacement * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
     ahead = float(velocity @ [math.sin(yaw), math.cos(yaw)])
     speed = float(np.linalg.norm(velocity))
     return {
@@ -124,15 +139,14 @@ class EvidenceMeans:
             [[-1.0 / (seconds * fps)] for seconds in MEAN_SECONDS.values()]
         )
         self._latest: dict[str, float] = {}
-        self._sums, self._weight = (
-            np.zeros((len(MEAN_SECONDS), len(EVIDENCE))),
-            np.zeros((len(MEAN_SECONDS), 1)),
-        )
+        self._sums = np.zeros((len(MEAN_SECONDS), len(EVIDENCE)))
+        self._weight = np.zeros((len(MEAN_SECONDS), 1))
 
     def features(self, values: Mapping[str, float]) -> Array:
-        """Return the evidence of the next frame and its means so far (3 E,), on the scale that was fitted.
+        """Return the features (3 E,) of the next frame: its evidence, and the means.
 
-        A missing value is that of the frame before, at first that of `DEFAULTS`.
+        A missing value is copied from the frame before, in the first frame from
+        `DEFAULTS`.
         """
         self._latest |= values
         now = np.array(
@@ -149,17 +163,17 @@ class EvidenceMeans:
 class LogisticModel(NamedTuple):
     """A logistic model of some features of a frame."""
 
-    rows: list[int]  # of the features that it uses
+    rows: list[int]  # the features that the model uses
     weights: Array
     bias: float
 
     def probability(self, features: Array) -> float:
-        """Return the probability for a frame with these features (3 E,)."""
+        """Return the probability of a frame with these features (3 E,)."""
         return float(logistic(features[self.rows] @ self.weights + self.bias))
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
-        """Return the model that JSON holds."""
+        """Return the model stored as JSON."""
         rows = [NAMES.index(name) for name in stored["weights"]]
         return cls(
             rows,
@@ -169,24 +183,26 @@ class LogisticModel(NamedTuple):
 
 
 class FailureClassifier(NamedTuple):
-    """The models of lost frames and of exchanged sides, and the probability from which sides are unknown."""
+    """The models of lost frames and of exchanged sides."""
 
     lost: LogisticModel
     sides: LogisticModel
-    unknown: float
+    unknown: float  # sides are unknown from this probability of `sides`
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
-        """Return the models that JSON holds."""
-        lost, sides = (
-            LogisticModel.from_dict(stored[name]) for name in ("lost", "sides")
-        )
+        """Return the models stored as JSON."""
+        lost = LogisticModel.from_dict(stored["lost"])
+        sides = LogisticModel.from_dict(stored["sides"])
         return cls(lost, sides, float(stored["unknown"]))
 
 
 @cache
 def stored_classifier() -> FailureClassifier:
-    """Return the models that `docs/studies/lost.py` fitted to people who are not in the library."""
+    """Return the models that `docs/studies/lost.py` fitted.
+
+    It fitted them to people who are not in the library.
+    """
     stored = files("posefit_exemplars").joinpath("lost_model.json").read_text("utf-8")
     return FailureClassifier.from_dict(json.loads(stored))
 
@@ -194,7 +210,7 @@ def stored_classifier() -> FailureClassifier:
 def with_failure_probabilities(
     frames: Iterable[Frame], task: Task, classifier: FailureClassifier
 ) -> Iterator[Frame]:
-    """Yield frames with the probabilities that they are lost, or have sides exchanged."""
+    """Yield frames with the probabilities of being lost and of exchanged sides."""
     means = EvidenceMeans(task.fps)
     side_sums = np.zeros(3)
     decay = math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
@@ -208,15 +224,15 @@ def with_failure_probabilities(
         )
         features = means.features(evidence)
         exchanged = classifier.sides.probability(features)
-        # left and right are unknown, or else known unless no sample has them as reported
+        # left and right are known unless the model or the landmarks say otherwise
         known = exchanged < classifier.unknown
         if (odds := frame.details.get("sides")) is not None:
             side_sums = decay * side_sums + [*odds, 1.0]
             legs, arms, count = side_sums
-            # its landmarks are better evidence than its silhouettes
+            # landmarks of one camera are better evidence than its silhouettes
             if len(task.cameras) == 1:
                 known = legs + arms >= MIN_SIDE_ODDS * count
-            # however many cameras agree: arms may have sides that legs have not
+            # arms may be right where legs are exchanged, even if several cameras agree
             known = bool(known and legs >= 0.0)
         recalibration = replace(
             frame.posterior.recalibration or Recalibration(), second_side=float(known)

@@ -1,8 +1,10 @@
-"""A hidden Markov model over the frames of the lag window: the likeliest path, weights of states, and sampled paths.
+"""A hidden Markov model over the frames of the lag window.
 
-A frame has states, which cost what their silhouettes do over a temperature, and steps from those of the frame before.
-The path is Viterbi's, and the weights are those of the forward-backward algorithm over the window. Paths are drawn from
-the posterior of the whole clip: the backward messages of the later frames weigh the states that a step may reach.
+The cost of a state is that of its silhouette over a temperature; steps between the
+states of successive frames have costs too. The Viterbi algorithm finds the likeliest
+path, and the forward-backward algorithm the weights of states. Sampled paths are drawn
+from the posterior of the whole clip: the backward messages of the later frames weigh
+the states that a step may reach.
 """
 
 from collections import deque
@@ -18,20 +20,21 @@ from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.exemplars import Rows
 
-# metres, root mean square over joints: samples that are nearer are of the reported
-# pose's mode
+# Metres, root mean square over joints. Samples nearer to the reported pose than this
+# belong to its mode.
 MODE_DISTANCE = 0.12
-# of a step: beyond it the likelihood would be 0, and so the sum of all might be
+# The cost of a step is at most this in the kernel. In single precision the likelihoods
+# of much costlier steps are 0, and if all were, their sum would be 0 too.
 MAX_KERNEL_COST = 80.0
 
 T = TypeVar("T")
 
 
 class FrameStates(NamedTuple):
-    """The costs, parents and weights of a frame's states, by the frames so far."""
+    """The costs, parents and weights of a frame's states, given the frames so far."""
 
     totals: Array  # (n,) costs of the likeliest path to each
-    parents: Rows  # (n,) the state of the frame before on that path, or -1
+    parents: Rows  # (n,) the previous state on that path, or -1
     likelihoods: Array  # (n,) of the silhouettes, the greatest 1
     # (m, n) likelihoods of steps from the frame before
     kernel: NDArray[np.float32] | None
@@ -41,7 +44,14 @@ class FrameStates(NamedTuple):
 def frame_states(
     costs: Array, before: FrameStates | None = None, steps: Array | None = None
 ) -> FrameStates:
-    """Return a frame whose states cost (n,), to which steps from the frame before cost (m, n)."""
+    """Return the states of a frame.
+
+    Args:
+        costs: (n,) the costs of the states.
+        before: The states of the frame before, or None in the first frame.
+        steps: (m, n) the costs of the steps from each state before.
+
+    """
     likelihoods = np.exp(costs.min() - costs)  # TOYAMA2001 (likelihood)
     if before is None or steps is None:
         forward = likelihoods / likelihoods.sum()
@@ -59,7 +69,11 @@ def frame_states(
 
 
 def windows(frames: Iterable[T], delay: int) -> Iterator[Sequence[T]]:
-    """Yield each frame with up to `delay` later ones, as soon as these have come; the sequence changes later."""
+    """Yield a window for each frame: the frame and up to `delay` later ones.
+
+    A window is yielded as soon as it is complete. All windows are one sequence, which
+    changes before the next one is yielded.
+    """
     waiting: deque[T] = deque()
     for frame in frames:
         waiting.append(frame)
@@ -80,7 +94,10 @@ def viterbi_state(window: Sequence[FrameStates]) -> int:
 
 
 def state_weights(window: Sequence[FrameStates]) -> Array:
-    """Return the weights (n,) of the states of the first frame, given all frames up to the last; they sum to 1."""
+    """Return the weights (n,) of the first frame's states, given the whole window.
+
+    They sum to 1.
+    """
     backward = np.ones(len(window[-1].totals))
     for frame in window[:0:-1]:
         assert frame.kernel is not None
@@ -94,23 +111,32 @@ def state_weights(window: Sequence[FrameStates]) -> Array:
 def mean_near(
     row: int, weights: Array, squares: Array, poses: Array, places: Array
 ) -> tuple[Array, Array]:
-    """Return the mean pose (66,) and place (3,) of the states similar to one of them, by weights (n,).
+    """Return the mean pose (66,) and place (3,) of the states similar to one of them.
 
-    `squares` (n,) are their squared distances from it, in standard deviations. The mean of all would be between a
-    stride and its mirrored half-cycle where both are likely.
+    The mean of all states would lie between a stride and its mirrored half-cycle if
+    both are likely.
+
+    Args:
+        row: The state whose similar states are averaged.
+        weights: (n,) the weights of the states.
+        squares: (n,) their squared distances from that state, in standard deviations.
+        poses: (n, 66) their poses.
+        places: (n, 3) their places.
+
     """
     shares = weights * np.exp(-0.5 * squares)
     shares[row] += np.finfo(np.float64).tiny
     shares /= shares.sum()
-    return poses[row] + shares @ wrapped(poses - poses[row]), places[row] + shares @ (
-        places - places[row]
-    )
+    pose = poses[row] + shares @ wrapped(poses - poses[row])
+    place = places[row] + shares @ (places - places[row])
+    return pose, place
 
 
 def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
-    """Return the likelihood (n,) of the later frames given each state of the first, up to a factor.
+    """Return the likelihood (n,) of the later frames given each state of the first.
 
-    `power` is what the likelihoods of silhouettes are raised to: below 1, the posterior is wider.
+    It is determined up to a factor. The likelihoods of silhouettes are raised to
+    `power`: below 1, the posterior is wider.
     """
     backward = np.ones(len(window[-1].totals), dtype=np.float32)
     for frame in window[:0:-1]:
@@ -122,10 +148,10 @@ def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
 
 
 class Sampling(NamedTuple):
-    """The number of paths that are drawn, and the power that likelihoods of silhouettes are raised to."""
+    """How paths are sampled."""
 
-    paths: int
-    power: float
+    paths: int  # how many are drawn
+    power: float  # the likelihoods of silhouettes are raised to it
 
 
 def sample_states(
@@ -134,11 +160,18 @@ def sample_states(
     sampling: Sampling,
     rng: np.random.Generator,
 ) -> Rows:
-    """Return states (K,) of the first frame, drawn given the states `rows` (K,) of the frame before it.
+    """Return states (K,) of the first frame, drawn from the posterior.
 
-    Without `rows` paths begin there, independently.
+    Args:
+        window: The first frame and the later ones that are known.
+        rows: (K,) the states of the paths in the frame before, or None if the paths
+            begin in the first frame, independently.
+        sampling: The number of paths K, and the power of likelihoods.
+        rng: The random numbers.
+
     """
-    first, (paths, power) = window[0], sampling
+    first = window[0]
+    paths, power = sampling
     weights = np.broadcast_to(
         first.likelihoods**power * backward_messages(window, power),
         (paths, len(first.totals)),
@@ -155,18 +188,21 @@ class SampledPaths(NamedTuple):
 
     poses: Array  # (K, 66)
     places: Array  # (K, 3) metres
-    similar: NDArray[np.bool_]  # (K,) which are of the reported pose's mode
+    similar: NDArray[np.bool_]  # (K,) whether in the mode of the reported pose
 
     @classmethod
     def of(
         cls, skeleton: Skeleton, poses: Array, places: Array, reported: Array
     ) -> Self:
-        """Return sampled poses (K, 66) at places (K, 3), and which of them are similar to the reported one (66,)."""
+        """Return poses (K, 66) at places (K, 3), compared to the reported one (66,)."""
         distances = joint_distances(skeleton.joints(poses), skeleton.joints(reported))
         return cls(poses, places, (distances**2).mean(axis=1) <= MODE_DISTANCE**2)
 
     def about(self, pose: Array, place: Array) -> Posterior:
-        """Return the posterior in which the mean of the paths similar to the likeliest is the reported pose."""
+        """Return the posterior around the reported pose (66,) at `place` (3,).
+
+        The paths similar to the reported pose are shifted until it is their mean.
+        """
         poses = self.poses.copy()
         places = self.places.copy()
         if self.similar.any():

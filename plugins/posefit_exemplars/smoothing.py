@@ -1,4 +1,4 @@
-"""A zero-phase filter of poses over time: a Gaussian that reaches as far ahead as back."""
+"""A zero-phase filter of poses over time: a Gaussian, equally far ahead and back."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -22,7 +22,7 @@ class Estimate:
     place: Array  # (3,)
     frame_costs: FrameCosts = field(repr=False)
     evaluations: float
-    # poses (n, 66) and places of diverse other states
+    # poses (n, 66) and places (n, 3) of diverse other states
     alternatives: tuple[Array, Array] = field(repr=False)
     paths: SampledPaths | None = None
 
@@ -30,9 +30,15 @@ class Estimate:
 def smoothed(
     estimates: Iterable[Estimate], spread: float, ahead: int
 ) -> Iterator[Estimate]:
-    """Yield each estimate as a mean of those up to `ahead` before and after it; the weights `spread` over some frames.
+    """Yield each estimate as a weighted mean of the estimates around it.
 
     A known root stays where it is.
+
+    Args:
+        estimates: The estimates of the frames, in order.
+        spread: Standard deviation of the Gaussian weights, frames.
+        ahead: How many frames before and after each one count.
+
     """
     before: deque[Estimate] = deque(maxlen=ahead)
     for window in windows(estimates, ahead):
@@ -54,9 +60,17 @@ def smoothed(
 def smoothed_pose(
     poses: Array, places: Array, k: int, spread: float
 ) -> tuple[Array, Array]:
-    """Return the weighted mean pose (66,) and place (3,) of frames (n, 66), (n, 3) about frame k.
+    """Return the weighted mean pose (66,) and place (3,) around frame k.
 
-    As many frames before as after it count, so that the mean of a steady movement is where it is.
+    Equally many frames before and after it count; otherwise the mean would lag behind a
+    steady movement, or run ahead of it.
+
+    Args:
+        poses: (n, 66) the poses of the frames.
+        places: (n, 3) their places.
+        k: The frame in the middle.
+        spread: Standard deviation of the weights, frames. 0 or less: no smoothing.
+
     """
     if spread <= 0.0:
         return poses[k], places[k]

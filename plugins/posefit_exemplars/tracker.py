@@ -1,4 +1,4 @@
-"""The tracker: its settings, the work of each frame, and the path that is reported `lag` frames later."""
+"""The tracker: its settings, and the path that it reports `lag` frames later."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -24,23 +24,27 @@ from posefit_exemplars.lookup import YAW_STEP, Lookup
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
-BEAM_STATES = 400
-FULL_SHARE = 0.6  # of the beam's evaluations: for full-size costs of states
-FIT_SHARE = 0.8  # of the budget: for fitting hypotheses
-MIN_EVALUATIONS = math.ceil(hypotheses.MIN_EVALUATIONS / FIT_SHARE)  # of a frame
-MIN_BEAM_EVALUATIONS = 60.0  # of a frame, where several cameras leave less open
-# of the small pictures: for where clips continue; the rest is for a search everywhere
+BEAM_STATES = 400  # states that a frame keeps
+# Shares of evaluations. Fits take FIT_SHARE of the budget and the beam takes the rest.
+FIT_SHARE = 0.8
+FULL_SHARE = 0.6  # share of the beam's evaluations for costs at full size
+# Evaluations per frame, at least: the hypotheses need their minimum.
+MIN_EVALUATIONS = math.ceil(hypotheses.MIN_EVALUATIONS / FIT_SHARE)
+# The beam's evaluations per frame, at least, if several cameras leave less open.
+MIN_BEAM_EVALUATIONS = 60.0
+# Share of the small pictures for states where clips continue. The others are for a
+# search everywhere.
 CONTINUED_SHARE = 0.25
-SEARCHES_PER_SECOND = 10.0  # everywhere
-SEARCHED_GROUPS = 200  # those that fit best anywhere, whose poses are evaluated
-GROUP_POSES = 20  # drawn at random, that stand for a group in a search everywhere
+SEARCHES_PER_SECOND = 10.0  # searches everywhere
+SEARCHED_GROUPS = 200  # best groups of a search everywhere, at most
+GROUP_POSES = 20  # poses of each such group that are evaluated, drawn at random
 YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 POSTERIOR_TEMPERATURE = 8.0  # divides silhouette costs in the posterior
-# over the temperature, of a state whose yaw is off by twice as much, for a thirtieth of
-# a second
+# Cost, over the temperature, of a yaw off by twice the tolerance or more, for a
+# thirtieth of a second.
 WRONG_YAW_COST = 4.0
-# metres: standard deviation of the codes of states that are averaged
-SIMILAR_DISTANCE = 0.06
+# Standard deviations for the mean of the states similar to the likeliest one.
+SIMILAR_DISTANCE = 0.06  # metres, of codes
 SIMILAR_YAW = np.radians(20.0)
 
 
@@ -54,14 +58,17 @@ class _BeamFrame(NamedTuple):
 
 
 class ExemplarTracker:
-    """The likeliest path through recorded clips (Toyama and Blake, 2001).
+    """Follows the likeliest path through recorded clips (Toyama and Blake, 2001).
 
     Settings:
-        spread: distance of joints from where a clip continues in a thirtieth of a second, metres, rms; above 0.
-        temperature: divides silhouette costs; above 0. Errors of successive frames are correlated, so more than 1.
-        lag: later frames that are used before a pose is reported, 0 or more.
-        smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        samples: tracks drawn from the posterior, 1 or more.
+        spread: distance of joints from where a clip continues, metres, rms, for a
+            thirtieth of a second; above 0.
+        temperature: divides silhouette costs; above 0. The default is more than 1,
+            because the errors of successive frames are correlated.
+        lag: number of later frames used before a pose is reported, 0 or more.
+        smoothing: standard deviation of the smoothing over time, thirtieths of a
+            second, 0 or more.
+        samples: number of tracks drawn from the posterior, 1 or more.
     """
 
     def __init__(
@@ -81,20 +88,21 @@ class ExemplarTracker:
         at_least("samples", samples, 1)
         if task.evaluations < MIN_EVALUATIONS:
             raise InputError(
-                f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}"
+                f"evaluations must be at least {MIN_EVALUATIONS} for exemplars,"
+                f" got {task.evaluations}"
             )
-        self.task, self.step, self.lookup = (
-            task,
-            beams.Step.of(task, spread),
-            Lookup(task),
-        )
+        self.task = task
+        self.step = beams.Step.of(task, spread)
+        self.lookup = Lookup(task)
         self.exemplars = self.lookup.exemplars
+        # at higher frame rates each frame counts for less, as it covers less time
         self.temperature = temperature / (30.0 / task.fps)
         self.lag = lag
         self.smoothing = smoothing * task.fps / 30.0  # frames
         fit_evaluations = FIT_SHARE * task.evaluations
         self.evaluations = task.evaluations - fit_evaluations  # of the beam
-        # later frames that the smoothing uses; the hypotheses get half of the others, and the path the rest
+        # the smoothing uses some of the later frames, the hypotheses half of the
+        # others, and the path the rest
         self.ahead = min(math.ceil(FILTER_REACH * self.smoothing), lag)
         fits_ahead = (lag - self.ahead) // 2
         self.path_ahead = lag - self.ahead - fits_ahead
@@ -107,7 +115,13 @@ class ExemplarTracker:
     def track(
         self, observations: Iterable[Observation], rng: np.random.Generator
     ) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation, `lag` observations later."""
+        """Yield a `Frame` for each observation, delayed by `lag` observations.
+
+        Args:
+            observations: The silhouettes and landmarks of the frames, in order.
+            rng: The random numbers.
+
+        """
         estimates = self.hypotheses.follow(
             self._path(observations, rng), rng.spawn(1)[0]
         )
@@ -120,9 +134,9 @@ class ExemplarTracker:
         """Yield the estimate of each frame on the likeliest path of the beam."""
         for window in markov.windows(self._beams(observations, rng), self.path_ahead):
             states = [frame.states for frame in window]
-            yield self._estimated(
-                window[0], markov.viterbi_state(states), markov.state_weights(states)
-            )
+            row = markov.viterbi_state(states)
+            weights = markov.state_weights(states)
+            yield self._estimated(window[0], row, weights)
 
     def _beams(
         self, observations: Iterable[Observation], rng: np.random.Generator
@@ -130,7 +144,7 @@ class ExemplarTracker:
         interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
         latest: _BeamFrame | None = None
         coming = iter(observations)
-        # whether there is a second frame is known only where frames are looked ahead
+        # without lag the second frame must not be awaited, so no frame counts as alone
         first = list(islice(coming, 2 if self.lag else 1))
         alone = len(first) == 1 and self.lag > 0 and not self.task.before
         for number, observation in enumerate(chain(first, coming)):
@@ -157,24 +171,23 @@ class ExemplarTracker:
         everywhere: bool,
         rng: np.random.Generator,
     ) -> tuple[Beam, Array, float]:
-        """Return the states of a frame, from `everywhere` or where clips continue, their costs, and the evaluations."""
+        """Return the states of a frame, their costs (n,), and the evaluations used.
+
+        States come from where clips continue and, if `everywhere`, from a search in all
+        poses. The costs at full size decide which of them the frame keeps.
+        """
         if before is not None and not frame_costs.usable:
+            # nothing is seen: clips continue, and all states cost the same
             beam = beams.next_states(
                 self.exemplars, before, self.step, BEAM_STATES, frame_costs.root
             )
-            return (
-                replace(beam, places=frame_costs.at_root(beam.places)),
-                np.zeros(len(beam)),
-                0.0,
-            )
+            beam = replace(beam, places=frame_costs.at_root(beam.places))
+            return beam, np.zeros(len(beam)), 0.0
         full, small = self._counts(frame_costs, before is None)
         beam, small_count = self._reachable(frame_costs, before, everywhere, small, rng)
         turn_costs = yaw_costs(beam.yaws, frame_costs.yaw) * 30.0 / self.task.fps
-        totals = (
-            beam.totals
-            + turn_costs
-            + frame_costs.small(self._poses(beam), beam.places) / self.temperature
-        )
+        small_costs = frame_costs.small(self._poses(beam), beam.places)
+        totals = beam.totals + turn_costs + small_costs / self.temperature
         small_count += len(beam)
         rows = beams.diverse_best(self.exemplars, beam, totals, full)
         beam = beam.rows(rows)
@@ -189,22 +202,19 @@ class ExemplarTracker:
         best = beams.diverse_best(
             self.exemplars, beam, beam.totals + costs, BEAM_STATES
         )
-        return (
-            beam.rows(best),
-            costs[best],
-            small_count * frame_costs.small_share + full_count,
-        )
+        evaluations = small_count * frame_costs.small_share + full_count
+        return beam.rows(best), costs[best], evaluations
 
     def _counts(self, frame_costs: FrameCosts, is_first: bool) -> tuple[int, int]:
-        """Return how many states of a frame have a cost in the whole picture, and how many in a small one."""
-        # the reported pose, its mirror images, and the fraction of a small picture's share
+        """Return how many states get a cost at full size, and how many in small."""
+        # for the reported pose, its mirror images, and a fraction of a small picture
         reserve = 3 + frame_costs.camera_count
         evaluations = self.evaluations
         if not is_first:  # several cameras leave less open
             evaluations = max(
                 evaluations / frame_costs.camera_count, MIN_BEAM_EVALUATIONS
             )
-        # no more states than have a cost in a small picture
+        # at most as many states at full size as in small
         full = int(
             min(
                 FULL_SHARE * evaluations,
@@ -221,9 +231,14 @@ class ExemplarTracker:
         count: int,
         rng: np.random.Generator,
     ) -> tuple[Beam, int]:
-        """Return at most `count` states: where clips continue or a track starts, and some from `everywhere`.
+        """Return at most `count` states that a frame may be in.
 
-        With them comes the number of small pictures that the search everywhere evaluated.
+        They are where clips continue, or near the first pose of a track; and, if
+        `everywhere` or in the first frame, states from anywhere that fit.
+
+        Returns:
+            The states, and the number of small pictures that the search used.
+
         """
         parts = list[Beam]()
         nearby = int(CONTINUED_SHARE * count)
@@ -237,15 +252,13 @@ class ExemplarTracker:
         elif self.task.first_pose is not None:
             parts.append(self._first_states(self.task.first_pose, nearby))
         if everywhere or before is None:
-            elsewhere, small_count = self._elsewhere(
-                frame_costs, before, count - nearby if parts else count, rng
-            )
+            room = count - nearby if parts else count
+            elsewhere, small_count = self._elsewhere(frame_costs, before, room, rng)
             if before is None and parts:
                 elsewhere = replace(elsewhere, totals=elsewhere.totals + JUMP_COST)
             parts.insert(0, elsewhere)
-        return self._placed(
-            frame_costs, beams.merged(*parts), before is not None
-        ), small_count
+        joined = beams.merged(*parts)
+        return self._placed(frame_costs, joined, before is not None), small_count
 
     def _elsewhere(
         self,
@@ -254,60 +267,62 @@ class ExemplarTracker:
         count: int,
         rng: np.random.Generator,
     ) -> tuple[Beam, int]:
-        """Return states that fit, from anywhere, and the number of small pictures that were evaluated."""
+        """Return at most `count` states from anywhere that fit.
+
+        Poses and yaws are tried first by the lookup, or at random if no camera shows
+        the whole person. Then the groups of the best are searched.
+
+        Returns:
+            The states, and the number of small pictures that were evaluated.
+
+        """
         group_count = min(SEARCHED_GROUPS, max(count // (4 * GROUP_POSES), 1))
         tried = max(count - group_count * GROUP_POSES, 1)
-        known = (
-            self.task.yaw
-            if before is None and frame_costs.yaw is None
-            else frame_costs.yaw
-        )
+        known = frame_costs.yaw
+        if before is None and known is None:
+            known = self.task.yaw
         nearest = self.lookup.nearest(frame_costs.observation, tried, known)
         if nearest is not None:
             states = np.resize(nearest[0], tried)
             yaws = np.resize(nearest[1], tried)
             yaws += YAW_STEP * rng.uniform(-0.5, 0.5, tried)
         else:  # no camera shows the whole person
-            middle, reach = (0.0, np.pi) if known is None else (known, YAW_TOLERANCE)
+            middle = 0.0 if known is None else known
+            reach = np.pi if known is None else YAW_TOLERANCE
             states = self.exemplars.draw(tried, rng)
             yaws = middle + rng.uniform(-reach, reach, tried)
         beam = self._placed(frame_costs, self._started(states, yaws, before), False)
-        best = np.argsort(
-            frame_costs.small(self._poses(beam), beam.places), kind="stable"
-        )[: 4 * group_count]
+        costs = frame_costs.small(self._poses(beam), beam.places)
+        # more groups than there is room for, because some have few poses
+        best = np.argsort(costs, kind="stable")[: 4 * group_count]
         members = self.exemplars.members
         starts = self.exemplars.starts
-        groups = [
-            members[starts[group] : starts[group + 1]]
-            for group in self.exemplars.groups[states[best]]
-        ]
-        poses = [
-            rows
-            if len(rows) <= GROUP_POSES
-            else rng.choice(rows, GROUP_POSES, replace=False)
-            for rows in groups
-        ]
+        poses = list[Rows]()
+        for group in self.exemplars.groups[states[best]]:
+            rows = members[starts[group] : starts[group + 1]]
+            if len(rows) > GROUP_POSES:
+                rows = rng.choice(rows, GROUP_POSES, replace=False)
+            poses.append(rows)
         yaws = np.repeat(yaws[best], [len(rows) for rows in poses])
-        # for that many poses, of more groups where they are small
         room = slice(count - tried)
         return self._started(np.concatenate(poses)[room], yaws[room], before), len(beam)
 
     def _first_states(self, angles: Array, count: int) -> Beam:
-        """Return the states, at most `count`, nearest to a first pose whose angles (63,) and yaw are known."""
+        """Return at most `count` states nearest to a first pose with angles (63,)."""
         yaw = self.task.yaw or 0.0
         codes = self.exemplars.codes
         code = self.exemplars.coding.of_poses(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
-        squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)  # and a constant
+        # squared distances up to a constant, which does not change their order
+        squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)
         turns = [-beams.CANDIDATE_TURN, 0.0, beams.CANDIDATE_TURN]
-        nearest = np.argsort(squares, kind="stable")[
-            : min(count // len(turns), BEAM_STATES)
-        ]
-        return self._started(
-            np.tile(nearest, len(turns)), yaw + np.repeat(turns, len(nearest)), None
-        )
+        room = min(count // len(turns), BEAM_STATES)
+        nearest = np.argsort(squares, kind="stable")[:room]
+        states = np.tile(nearest, len(turns))
+        yaws = yaw + np.repeat(turns, len(nearest))
+        return self._started(states, yaws, None)
 
     def _started(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:
-        """Return states that are reached by a jump, or that start a track."""
+        """Return states that a jump from `before` reaches, or that start a track."""
         total = 0.0
         place = self.task.anchor
         if before is not None:
@@ -325,7 +340,11 @@ class ExemplarTracker:
         return self.exemplars.with_yaws(beam.states, beam.yaws)
 
     def _placed(self, frame_costs: FrameCosts, beam: Beam, expected: bool) -> Beam:
-        """Return states with aligned roots; where they were `expected`, the distance from there adds to their costs."""
+        """Return states with aligned roots.
+
+        If the places of the states are `expected`, as where clips continue, the
+        distance from them is a cost.
+        """
         places = frame_costs.aligned(self._poses(beam), beam.places)
         totals = beam.totals
         if expected and self.task.translation != "known":
@@ -335,7 +354,14 @@ class ExemplarTracker:
         return replace(beam, places=places, totals=totals)
 
     def _estimated(self, frame: _BeamFrame, row: int, weights: Array) -> Estimate:
-        """Return the estimate of a frame: the weighted mean of the states like that of the path."""
+        """Return the estimate of a frame: the mean of the states similar to the path's.
+
+        Args:
+            frame: The beam of the frame.
+            row: The state on the path.
+            weights: (n,) the weights of the states.
+
+        """
         beam = frame.beam
         frame_costs = frame.frame_costs
         count = self.hypotheses.counts(frame_costs).diverse
@@ -354,13 +380,23 @@ class ExemplarTracker:
 
 
 def state_distances(codes: Codes, code: Codes, turns: Array) -> Array:
-    """Return the squared distances (n,) of codes (n, D) from one, and of turns (n,) from 0, in standard deviations."""
+    """Return the squared distances (n,) of states from one, in standard deviations.
+
+    Args:
+        codes: (n, D) the codes of the states.
+        code: (D,) the code of the one state.
+        turns: (n,) radians, the yaws relative to its yaw.
+
+    """
     squares = ((codes - code) ** 2).sum(axis=1) / SIMILAR_DISTANCE**2
     return np.asarray(squares + (wrapped(turns) / SIMILAR_YAW) ** 2)
 
 
 def yaw_costs(yaws: Array, known: float | None) -> Array:
-    """Return the costs (n,) of yaws (n,), radians, in a frame whose yaw is about `known`."""
+    """Return the costs (n,) of yaws (n,) in a frame with a yaw of about `known`.
+
+    A yaw within the tolerance costs nothing. Without a known yaw all are free.
+    """
     if known is None:
         return np.zeros(len(yaws))
     excess = np.abs(wrapped(yaws - known)) / YAW_TOLERANCE - 1.0

@@ -1,22 +1,22 @@
-"""The problem that optimisers minimise, and trackers that go from frame to frame.
+"""The problem that optimisers minimise, and trackers that follow it over frames.
 
 | looking for | file |
 |---|---|
-| the function that an optimiser minimises, which counts; the loop that minimises it. SAPSO (5) | problem.py |
-| the box [-1, 1]^d that every optimiser searches, and where a search starts in it | box.py |
+| the problem, which counts evaluations, and its search loop. SAPSO (5) | problem.py |
+| the box [-1, 1]^d of every search, and where a search starts in it | box.py |
 | proposals as poses: root angles, translation, a prior's coordinates | space.py |
-| where a search starts when poses are guessed for its frame | start.py |
-| what a prior is: poses as fewer numbers, and which of them are feasible; the tilt of the root with them | prior.py |
-| the cost of proposals for one observation, where a body is placed, and smaller pictures | cost.py |
-| what an optimiser is, and the base of adapters of other libraries | optimiser.py |
-| what a tracker is; the search a frame around a prediction. SAPSO section 4 | tracker.py |
-| weights of costs, how many samples they are worth | weights.py |
+| starts of a search from guessed poses | start.py |
+| priors: poses as fewer numbers, their feasibility, the tilt of the root | prior.py |
+| the cost of proposals for one observation, and aligning a body with it | cost.py |
+| optimisers, and the base of adapters of other libraries | optimiser.py |
+| trackers; one search per frame around a prediction. SAPSO section 4 | tracker.py |
+| weights of costs, and how many samples they are worth | weights.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
-| how likely a detector's landmarks are | landmarks.py |
-| checks of what optimisers and priors return | validation.py |
+| the likelihood of a detector's landmarks | landmarks.py |
+| checks of the answers of optimisers and priors | validation.py |
 | the loop that drives a tracker, and the audit of its frames | driving.py |
 | the build of one person, fitted with the poses | shape.py |
-| what many bodies cost in many frames, in one compiled call | bodies.py, body_kernels.py |
+| costs of many bodies in many frames, in one call | bodies.py, body_kernels.py |
 | one frame fitted to the contours of its masks | contours.py, contour_kernels.py |
 | CMA-ES | cma.py |
 | aligning and decoding, compiled | kernels.py |

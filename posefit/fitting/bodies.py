@@ -1,7 +1,8 @@
-"""What many bodies cost in frames whose poses are held: one compiled call for all pairs of a body and a frame.
+"""The costs of many bodies in frames with fixed poses, in one compiled call.
 
-A build is searched by trying bodies. One call a body and frame would fill one lane of the kernel and leave the others
-empty, and spend more time in Python than in the kernel. Each pair has the bits that it has alone.
+A build is searched by trying bodies. One call per body and frame would fill one lane of
+the kernel and leave the others empty, and spend more time in Python than in the kernel.
+Each pair of a body and a frame has the same bits as alone.
 """
 
 from collections.abc import Iterable, Sequence
@@ -33,9 +34,15 @@ from posefit.silhouette.sharing import parts_of, work_through
 def scaled_bodies(
     body: Body, lengths: Array, girths: Array, height: float | None
 ) -> tuple[Array, Array]:
-    """Return the bones (m, 26, 3) and radii (m, 26, 2) of a body scaled by m times lengths and girths (m, 26).
+    """Return the bones (m, 26, 3) and radii (m, 26, 2) of m scaled bodies.
 
-    With a `height` in metres each is scaled to that stature, as `Body.stature` has it.
+    Args:
+        body: The body.
+        lengths: (m, 26) factors of the bones' lengths.
+        girths: (m, 26) factors of the radii.
+        height: Each body is scaled to this stature in metres, see `Body.stature`. None:
+            statures stay.
+
     """
     offsets = body.skeleton.offsets * lengths[:, :, None]
     radii = body.radii * girths[:, :, None]
@@ -67,7 +74,7 @@ def _turned(body: Body, offsets: Array) -> Array:
 
 
 def _joint_radii(radii: Array) -> Array:
-    """Return the largest radius (m, 27) that a bone of radii (m, 26, 2) has at each joint."""
+    """Return the largest radius (m, 27) at each joint, of bones' radii (m, 26, 2)."""
     largest = np.zeros((len(JOINTS), len(radii)))
     np.maximum.at(largest, np.array(PARENTS[1:]), radii[:, :, 0].T)
     np.maximum.at(largest, np.arange(1, len(JOINTS)), radii[:, :, 1].T)
@@ -80,12 +87,12 @@ class ObservedFrames:
 
     observed: Sequence[Observed] = field(repr=False)  # one a camera
     borders: Array = field(repr=False)  # (f, views, 4) pixels, see `Silhouette.extent`
-    # of each frame: the views of which something is known, or all of them
+    # for each frame, the views that show something, or all if none does
     known: Sequence[Sequence[int]] = field(repr=False)
 
     @classmethod
     def of(cls, observations: Iterable[Observation]) -> Self:
-        """Return the silhouettes of some observations, of which nothing else is kept."""
+        """Return the stacked silhouettes of some observations."""
         stacks = list[list[tuple[Bits, Bits, int]]]()
         borders = list[list[tuple[float, float, float, float]]]()
         known = list[Sequence[int]]()
@@ -110,7 +117,17 @@ class ObservedFrames:
         places: Array,
         threads: int = 1,
     ) -> Areas:
-        """Return the areas (views, m, f, 3) R, B, Y of bodies in poses (f, 66), at places (m, f, 3)."""
+        """Return the areas (views, m, f, 3) R, B, Y of bodies in poses.
+
+        Args:
+            chain: The chain of their skeleton.
+            bodies: The m bodies.
+            cameras: The cameras.
+            poses: (f, 66).
+            places: (m, f, 3) metres.
+            threads: Number of threads. Does not change the areas.
+
+        """
         pairs = places.shape[0] * places.shape[1]
         count_poses(float(pairs * len(cameras)))
         areas = np.empty((len(cameras), *places.shape[:2], 3), np.int64)
@@ -134,7 +151,7 @@ class ObservedFrames:
         return areas
 
     def costs(self, areas: Areas, beta: float) -> Array:
-        """Return the costs (m, f) of areas (views, m, f, 3), the mean over the views of which something is known."""
+        """Return the costs (m, f) of areas (views, m, f, 3), means over known views."""
         by_view = mismatch(areas.reshape(-1, 3), beta).reshape(areas.shape[:3])
         costs = np.empty(areas.shape[1:3])
         for k, known in enumerate(self.known):
@@ -144,7 +161,7 @@ class ObservedFrames:
     def areas_of(
         self, body: Body, cameras: Sequence[Camera], poses: Array, places: Array
     ) -> Areas:
-        """Return the areas (views, f, 3) R, B, Y of one body in poses (f, 66) at places (f, 3)."""
+        """Return the areas (views, f, 3) R, B, Y of one body at places (f, 3)."""
         chain = body.skeleton.chain
         bodies = Bodies(chain.offsets[None], writeable(body.radii)[None])
         poses = writeable(poses)
@@ -158,16 +175,16 @@ class ObservedFrames:
         places: Array,
         beta: float,
     ) -> Array:
-        """Return the costs (f,) of one body in poses (f, 66) at places (f, 3). SAPSO (4)."""
+        """Return the costs (f,) of one body in poses at places (f, 3). SAPSO (4)."""
         areas = self.areas_of(body, cameras, poses, places)
         return np.asarray(self.costs(areas[:, None], beta)[0])
 
 
 @dataclass(frozen=True, eq=False)
 class HeldFrames:
-    """Frames whose poses are held while bodies are tried."""
+    """Frames with fixed poses, in which bodies are tried."""
 
-    body: Body  # whose skeleton the others share
+    body: Body  # all bodies have its skeleton, with other lengths
     cameras: Sequence[Camera]
     poses: Array = field(repr=False)  # (f, 66)
     places: Array = field(repr=False)  # (f, 3) metres
@@ -181,7 +198,7 @@ class HeldFrames:
         observations: Sequence[Observation],
         frames: Sequence[Frame],
     ) -> Self:
-        """Return the frames of some observations, held in the poses that were tracked in them."""
+        """Return the frames of some observations, with the poses of tracked frames."""
         return cls(
             body,
             cameras,
@@ -196,11 +213,11 @@ class HeldFrames:
         """Return the mean costs (m,) of bodies over the frames, 0 to 100. SAPSO (4).
 
         Args:
-            offsets: their bones (m, 26, 3) at rest, metres.
+            offsets: (m, 26, 3) metres, their bones at rest.
             radii: (m, 26, 2) metres.
-            aligned: whether the place of each is the one that fills the silhouettes' boxes.
-            beta: what the missed share counts, 0 to 1; 1 - beta the spilled share.
-            threads: the number that draw; the costs are the same with any.
+            aligned: whether each body is placed to fill the silhouettes' boxes.
+            beta: weight of the missed share, 0 to 1; the spilled share has 1 - beta.
+            threads: number of threads. Does not change the costs.
 
         """
         chain = self.body.skeleton.chain

@@ -1,4 +1,7 @@
-"""Many bodies in many frames, a pair a lane, in numba: plain functions over arrays, shapes checked by the callers."""
+"""Many bodies in many frames, one pair per lane, compiled by Numba.
+
+The functions take plain arrays and rely on the callers for their shapes.
+"""
 
 from typing import NamedTuple
 
@@ -40,7 +43,7 @@ class Observed(NamedTuple):
 
 @jit
 def place_bodies(chain, offsets, poses, joints):
-    """Write the joints (m, f, 27, 3) of m bodies in each of f poses, their roots at the origin."""
+    """Write the joints (m, f, 27, 3) of m bodies in f poses, roots at the origin."""
     frames = poses.shape[0]
     total = offsets.shape[0] * frames
     origins = np.zeros((frames, 3))
@@ -59,7 +62,10 @@ def place_bodies(chain, offsets, poses, joints):
 
 @jit
 def align_bodies(joints, joint_radii, cameras, borders, places):
-    """Move places (m, f, 3) to where joints (m, f, 27, 3) fill the borders (f, views, 4). Interpretation S4."""
+    """Move places (m, f, 3) to where joints (m, f, 27, 3) fill the borders.
+
+    The borders are (f, views, 4). Interpretation S4.
+    """
     rotations, translations, focals, centres = cameras
     for i in range(joints.shape[0]):
         for k in range(joints.shape[1]):
@@ -77,9 +83,10 @@ def align_bodies(joints, joint_radii, cameras, borders, places):
 
 @jit
 def count_pairs(chain, bodies, view, observed, poses, places, pairs, areas):
-    """Write the areas (m, f, 3) R, B, Y of some pairs, from the first one to the last of `pairs` (2,).
+    """Write the areas (m, f, 3) R, B, Y of the pairs from `pairs[0]` to `pairs[1]`.
 
-    Pair i f + k is body i in pose k of `poses` (f, 66), its root at `places` (m, f, 3).
+    Pair i f + k is body i in pose k of `poses` (f, 66), with the root at `places`
+    (m, f, 3).
     """
     frames = poses.shape[0]
     strips, words = observed.person.shape[1:]

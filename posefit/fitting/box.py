@@ -1,4 +1,4 @@
-"""The box that an optimiser searches, and functions on it; those that draw always end."""
+"""The box that an optimiser searches, and functions on it. All sampling terminates."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,18 +18,21 @@ REPAIR_STEPS = 32  # ours: points that `repair` tries along its line
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The distribution of a first population around a prediction, in the unit box. SAPSO (6), (7)."""
+    """The distribution of a first population, around a prediction. SAPSO (6), (7)."""
 
-    mean: Array  # (d,)
+    mean: Array  # (d,) in the unit box
     spread: Array  # (d,) standard deviations
     velocity: Array  # (d,) v_pred
-    weight: float = 1.0  # how likely it is, beside the others
-    # less likely ones, where several are possible; a population is drawn from all
+    weight: float = 1.0  # likelihood relative to the others
+    # less likely alternatives; a population is drawn from all
     others: Sequence["Start"] = ()
 
 
 class Space(Protocol):
-    """The box [-1, 1]^d, part of which is feasible, as an optimiser knows it. `SearchSpace` is one."""
+    """The box [-1, 1]^d as an optimiser knows it; part of it is feasible.
+
+    `SearchSpace` is one.
+    """
 
     @property
     def dimensions(self) -> int:
@@ -52,37 +55,46 @@ class Space(Protocol):
 
 
 def wrap(space: Space, proposals: Array) -> Array:
-    """Return proposals (..., d) with their periodic coordinates brought into [-1, 1)."""
+    """Return proposals (..., d) with their periodic coordinates in [-1, 1)."""
     if not space.periodic.any():
         return proposals
     return np.where(space.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
 
 
 def displacement(space: Space, origin: Array, target: Array) -> Array:
-    """Return target - origin (..., d), the short way round where a coordinate is periodic."""
+    """Return target - origin (..., d), the short way round in periodic coordinates."""
     return wrap(space, target - origin)
 
 
 def converted(space: Space, proposals: Array, origin: Space) -> Array:
-    """Return the proposals (n, d) in `space` that stand for the poses of these in `origin`, the space before.
+    """Return the proposals (n, d) in `space` with the same poses as these in `origin`.
 
-    A `Filter` needs it in `advance`. A space without a method `moved` is the same box in every frame.
+    A `Filter` needs it in `advance`, where `origin` is the space of the frame before. A
+    space without a method `moved` is the same box in every frame.
     """
     moved = getattr(space, "moved", None)
-    return (
-        np.array(proposals) if moved is None else np.asarray(moved(proposals, origin))
-    )
+    if moved is None:
+        return np.array(proposals)
+    return np.asarray(moved(proposals, origin))
 
 
 def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array:
-    """Return a first population (count, d) of feasible proposals, from the start or uniform. SAPSO (6).
+    """Return a first population (count, d) of feasible proposals. SAPSO (6).
 
-    What breaks a constraint is redrawn at most 100 times (Interpretation S7). Out of the box that is a coordinate by
-    itself: the coordinates of (6) are independent and the box is a product, so that this has the distribution of
-    redrawing the whole proposal. One still out of the box is then folded back into it. An infeasible proposal is
-    redrawn as a whole, and then becomes the start's mean, or the copy of a feasible one. Where nothing around the
-    start is feasible, the population is drawn from anywhere. Raises InputError where nothing at all is, and where the
-    count is no whole number above 0.
+    It is drawn from the space's start, or uniformly without one. Draws that break a
+    constraint are redrawn at most 100 times (Interpretation S7):
+
+    - A coordinate outside the box is redrawn alone. The coordinates of (6) are
+      independent and the box is a product, so this has the same distribution as
+      redrawing the whole proposal. If it is still outside, it is folded into the box.
+    - An infeasible proposal is redrawn as a whole. If it is still infeasible, it
+      becomes the start's mean, or a copy of a feasible proposal.
+
+    If nothing around the start is feasible, the population is drawn from anywhere.
+
+    Raises:
+        InputError: Nothing is feasible, or the count is no whole number above 0.
+
     """
     count = whole("count", count, 1)
     drawn = _drawn(space, space.start, rng, count)
@@ -90,7 +102,8 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
         drawn = _drawn(space, None, rng, count)
     if drawn is None:
         raise InputError(
-            f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws"
+            "the prior must find some of its range feasible,"
+            f" got none in {REDRAWS} x {count} draws"
         )
     return drawn
 
@@ -106,16 +119,26 @@ def _drawn(
     elif len(broken) == count > 0:
         return None
     elif len(broken):
-        drawn[broken] = drawn[
-            rng.choice(np.setdiff1d(np.arange(count), broken), len(broken))
-        ]
+        feasible = np.setdiff1d(np.arange(count), broken)
+        drawn[broken] = drawn[rng.choice(feasible, len(broken))]
     return drawn
 
 
 def _redrawn(
     space: Space, draw: Callable[[NDArray[np.int64]], Array], count: int, batch: int = 1
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Return what `draw` draws for rows (count,), each redrawn until it is feasible, and the rows that never are."""
+    """Return draws for each row, redrawn until they are feasible.
+
+    Args:
+        space: The box.
+        draw: Returns a proposal for each of some rows.
+        count: The number of rows.
+        batch: How many redraws of a row are made at once.
+
+    Returns:
+        The proposals (count, d), and the rows that never were feasible.
+
+    """
     drawn = draw(np.arange(count))
     broken = np.flatnonzero(~space.feasible(drawn))
     remaining = REDRAWS - 1
@@ -134,7 +157,10 @@ def _redrawn(
 def first_that_works(
     attempts: Array, works: NDArray[np.bool_], otherwise: Array | float
 ) -> Array:
-    """Return the first of each row's attempts (n, k, d) that works (n, k), and where none does `otherwise` (n, d)."""
+    """Return each row's first of attempts (n, k, d) that works (n, k).
+
+    A row without one gets `otherwise` (n, d).
+    """
     first = attempts[np.arange(len(works)), works.argmax(axis=1)]
     return np.where(np.asarray(works.any(axis=1))[:, None], first, otherwise)
 
@@ -142,7 +168,10 @@ def first_that_works(
 def _sample(
     space: Space, start: Start | None, rng: np.random.Generator, count: int
 ) -> Array:
-    """Return proposals (count, d) from the start or uniform, in the box, feasible or not."""
+    """Return proposals (count, d) in the box, feasible or not.
+
+    They are drawn from the start, or uniformly without one.
+    """
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
     mean = start.mean
@@ -163,7 +192,7 @@ def _sample(
         outside = np.abs(drawn) > 1.0
         if not outside.any():
             return drawn
-        # periodic ones are never among them
+        # periodic coordinates are never outside
         drawn[outside] = rng.normal(mean[outside], spread[outside])
     return fold(space, drawn)
 
@@ -171,19 +200,17 @@ def _sample(
 def sample_normal(
     space: Space, rng: np.random.Generator, means: Array, spread: Array
 ) -> Array:
-    """Return a normal draw (n, d) around each of n feasible means, standard deviations `spread` (d,) or (n, d).
+    """Return a normal draw (n, d) around each of n feasible means.
 
-    A coordinate that leaves the box is folded back into it, as at a mirror; what is infeasible is redrawn
-    at most 100 times and then stays at its mean.
+    `spread` (d,) or (n, d) has the standard deviations. A coordinate outside the box is
+    folded back into it, as at a mirror. An infeasible draw is redrawn at most 100
+    times, and then stays at its mean.
     """
     spread = np.broadcast_to(spread, means.shape)
 
     def draw(rows: NDArray[np.int64]) -> Array:
-        return fold(
-            space,
-            means[rows]
-            + spread[rows] * rng.standard_normal((len(rows), means.shape[1])),
-        )
+        normal = rng.standard_normal((len(rows), means.shape[1]))
+        return fold(space, means[rows] + spread[rows] * normal)
 
     drawn, broken = _redrawn(space, draw, len(means), BATCH)
     drawn[broken] = means[broken]
@@ -191,20 +218,21 @@ def sample_normal(
 
 
 def fold(space: Space, proposals: Array) -> Array:
-    """Return proposals (n, d) folded into the box: mirrored at its sides, periodic coordinates wrapped."""
+    """Return proposals (n, d) folded into the box, periodic coordinates wrapped.
+
+    Folding mirrors a coordinate at the sides of the box.
+    """
     folded = np.abs((proposals + 3.0) % 4.0 - 2.0) - 1.0
-    return (
-        np.where(space.periodic, wrap(space, proposals), folded)
-        if space.periodic.any()
-        else folded
-    )
+    if not space.periodic.any():
+        return folded
+    return np.where(space.periodic, wrap(space, proposals), folded)
 
 
 def repair(space: Space, proposals: Array, home: Array) -> Array:
-    """Return proposals (n, d), each infeasible one moved towards a feasible `home` until it is feasible.
+    """Return proposals (n, d), with infeasible ones moved towards a feasible `home`.
 
-    `home` is one point (d,) or one for each proposal (n, d). A moved proposal becomes the farthest feasible one of 32
-    evenly spaced points on the line between them.
+    `home` is one point (d,) or one for each proposal (n, d). A moved proposal becomes
+    the feasible point farthest from home, of 32 evenly spaced points on the line.
     """
     repaired = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
     repaired = np.where(np.isfinite(repaired), repaired, home)
@@ -212,13 +240,10 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
     if len(broken):
         home = np.broadcast_to(home, repaired.shape)[broken]
         shares = np.arange(REPAIR_STEPS - 1, 0, -1)[:, None] / REPAIR_STEPS
-        line = (
-            home[:, None]
-            + shares * displacement(space, home, repaired[broken])[:, None]
-        )
+        way = displacement(space, home, repaired[broken])
+        line = home[:, None] + shares * way[:, None]  # (broken, steps, d)
         line = np.clip(wrap(space, line), -1.0, 1.0)
-        works = space.feasible(line.reshape(-1, space.dimensions)).reshape(
-            line.shape[:2]
-        )
+        works = space.feasible(line.reshape(-1, space.dimensions))
+        works = works.reshape(line.shape[:2])
         repaired[broken] = first_that_works(line, works, home)
     return repaired

@@ -1,7 +1,8 @@
-"""What a filter carries from frame to frame, as plain values: a track that was interrupted goes on with it.
+"""The state of a filter as plain values, with which an interrupted track continues.
 
-Numbers, texts, arrays, and lists and mappings of them are kept; the filter's space and its generator are known to the
-tracker. A filter with anything else among its attributes starts anew when a track is resumed.
+Numbers, texts, arrays, and lists and mappings of them are kept. The tracker knows the
+filter's space and its generator. A filter with any other attribute starts over when a
+track is resumed.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,8 +19,8 @@ from posefit.fitting.space import SearchSpace
 # Builds an optimiser of a space, with a generator and the evaluations of its search.
 OptimiserMaker = Callable[[Space, np.random.Generator, int], Optimiser]
 
-CARRIED = "carried"  # the name among the details of a frame
-# of a space, those that the tracker has again before its first frame
+CARRIED = "carried"  # key in the details of a frame
+# Fields of a space that the tracker makes again before its first frame.
 FIXED = ("prior", "tilt", "translation", "root_order")
 KIND = "kind of value"
 GENERATORS = ("PCG64", "PCG64DXSM", "MT19937", "Philox", "SFC64")
@@ -27,13 +28,16 @@ PLAIN = (bool, int, float, str, type(None), np.generic)
 
 
 class UnknownError(Exception):
-    """A filter holds something that is no plain value."""
+    """A filter has an attribute that is no plain value."""
 
 
 def carried(
     optimiser: Any, space: SearchSpace, rng: np.random.Generator
 ) -> dict[str, Any]:
-    """Return what a filter holds after a frame, searched in `space`; nothing if it is no plain values."""
+    """Return the state of a filter after a frame that was searched in `space`.
+
+    It is empty if an attribute of the filter is no plain value.
+    """
     try:
         return {
             "optimiser": _kept(vars(optimiser), space, rng),
@@ -50,9 +54,16 @@ def revived(
     evaluations: int,
     make: OptimiserMaker,
 ) -> Optimiser:
-    """Return the filter that held a state, made by `make`; the generator stays as it is.
+    """Return a filter with a recorded state. The generator does not change.
 
-    Its space has what the state does not hold from `space`, that of another frame of the same track.
+    Args:
+        state: The state, from `carried`.
+        space: The space of another frame of the same track. It gives what the state
+            does not have.
+        rng: The generator of the filter.
+        evaluations: The budget of a search.
+        make: Builds the filter.
+
     """
     known = {name: _made(value) for name, value in state["space"].items()}
     space = replace(space, **known)
@@ -64,12 +75,12 @@ def revived(
 
 
 def plugin_of(optimiser: Optimiser) -> Any:
-    """Return what a plugin has made, of an optimiser that posefit may have wrapped."""
+    """Return the optimiser of a plugin, without posefit's wrapper."""
     return getattr(optimiser, "plugin", optimiser)
 
 
 def with_carried(frame: Any, state: Mapping[str, Any] | None) -> Any:
-    """Return a frame with what a filter carries from it, or without that."""
+    """Return a frame with the state of a filter, or without one if it is None."""
     details = {name: value for name, value in frame.details.items() if name != CARRIED}
     if state is not None:
         details[CARRIED] = state
@@ -85,7 +96,7 @@ def _fields(space: SearchSpace) -> dict[str, Any]:
 
 
 def _kept(value: Any, space: Any, rng: Any) -> Any:
-    """Return a value, of plain ones. Raises UnknownError where there is another one in it."""
+    """Return a value as plain values. Raises UnknownError if that is impossible."""
     if value is space:
         return {KIND: "space"}
     if value is rng:
@@ -111,7 +122,7 @@ def _kept(value: Any, space: Any, rng: Any) -> Any:
 
 
 def _made(kept: Any, space: Any = None, rng: Any = None) -> Any:
-    """Return the value of which `_kept` returned this."""
+    """Return the value from which `_kept` made this."""
     if not isinstance(kept, Mapping):
         return kept.copy() if isinstance(kept, np.ndarray) else kept
     kind = kept[KIND]

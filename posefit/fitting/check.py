@@ -9,11 +9,11 @@ from posefit.errors import InputError
 from posefit.hints import choices_of, resolved
 from posefit.reading import cut, quoted, suggestion
 
-MAX_BITS = 1_024  # of a whole number, so that it can be written down
+MAX_BITS = 1_024  # bits of a whole number, so that it can be printed
 
 
 def at_least(name: str, value: float, least: float) -> None:
-    """Raise InputError where a number is below the least it may be, or is not finite."""
+    """Raise InputError if a number is less than `least` or not finite."""
     if not (math.isfinite(value) and value >= least):
         raise InputError(f"{name} must be at least {least:g}, got {value}")
 
@@ -21,25 +21,26 @@ def at_least(name: str, value: float, least: float) -> None:
 def between(
     name: str, value: float, low: float, high: float, *, ends: bool = True
 ) -> None:
-    """Raise InputError where a number is not in low to high, with or without the ends."""
+    """Raise InputError if a number is not in low to high, with or without the ends."""
     inside = low <= value <= high if ends else low < value < high
     if not inside:
-        way = (
-            f"lie in {low:g} to {high:g}"
-            if ends
-            else f"lie between {low:g} and {high:g}"
-        )
-        raise InputError(f"{name} must {way}, got {cut(str(value))}")
+        way = f"in {low:g} to {high:g}" if ends else f"between {low:g} and {high:g}"
+        raise InputError(f"{name} must lie {way}, got {cut(str(value))}")
 
 
 def positive(name: str, value: float) -> None:
-    """Raise InputError where a number is not finite and above 0."""
+    """Raise InputError if a number is not finite or not above 0."""
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(f"{name} must be above 0, got {value}")
 
 
 def whole(name: str, value: object, least: int) -> int:
-    """Return a whole number as an int. Raises InputError where it is none, or below the least it may be."""
+    """Return a whole number as an int.
+
+    Raises:
+        InputError: If the value is no whole number, or less than `least`.
+
+    """
     if (
         isinstance(value, bool)
         or not isinstance(value, Integral)
@@ -49,14 +50,13 @@ def whole(name: str, value: object, least: int) -> int:
             f"{name} must be a whole number of at least {least}, got {quoted(value)}"
         )
     if value < least:
-        raise InputError(
-            f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}"
-        )
+        range_ = f"at least {least}" if least else "0 or more"
+        raise InputError(f"{name} must be {range_}, got {quoted(int(value))}")
     return int(value)
 
 
 def finite_number(name: str, value: object) -> float:
-    """Return a finite number as a float. Raises InputError where it is none."""
+    """Return a finite number as a float. Raises InputError for anything else."""
     try:
         number = (
             float(value)
@@ -71,27 +71,33 @@ def finite_number(name: str, value: object) -> float:
 
 
 def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
-    """Return two values. Raises InputError where it is anything else; `what` says what was expected."""
-    values = value.tolist() if hasattr(value, "tolist") else value  # an array
+    """Return a pair of values.
+
+    Raises InputError for anything else. `what` names what was expected.
+    """
+    # an array has `tolist`
+    values = value.tolist() if hasattr(value, "tolist") else value
     if not isinstance(values, tuple | list) or len(values) != 2:
         raise InputError(f"{name} must be {what}, got {quoted(value)}")
     return values[0], values[1]
 
 
 def one_of(name: str, value: object, known: Iterable[object]) -> None:
-    """Raise InputError listing the choices where a value is none of them."""
+    """Raise InputError with the known choices if a value is not among them."""
     known = tuple(known)
     if value not in known:
         hint = suggestion(value, map(str, known)) if isinstance(value, str) else ""
-        raise InputError(
-            f"{name} must be one of {', '.join(map(str, known))}, got {quoted(value)}{hint}"
-        )
+        listed = ", ".join(map(str, known))
+        raise InputError(f"{name} must be one of {listed}, got {quoted(value)}{hint}")
 
 
 def choices(settings: Any, values: Mapping[str, object]) -> None:
-    """Raise InputError where a value is none of those that its annotation, a `Literal`, lists.
+    """Raise InputError if a value is not listed in its annotation, a `Literal`.
 
-    `settings` is a function with such parameters, or a class with such attributes; `values` may hold others too.
+    Args:
+        settings: A function or a class, with annotated parameters or attributes.
+        values: The values by name. Names without a `Literal` are ignored.
+
     """
     for name, annotation in settings.__annotations__.items():
         if listed := choices_of(resolved(settings, annotation)):

@@ -1,7 +1,9 @@
-"""CMA-ES, the evolution strategy with covariance matrix adaptation, within a box and its constraint, with restarts.
+"""CMA-ES, the evolution strategy with covariance matrix adaptation, with restarts.
 
-N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772, 2016. A. Auger, N. Hansen, A restart CMA evolution
-strategy with increasing population size, CEC 2005. What the tutorial leaves open is as the library cmaes has it.
+It searches a box with a constraint. N. Hansen, The CMA Evolution Strategy: A Tutorial,
+arXiv:1604.00772, 2016. A. Auger, N. Hansen, A restart CMA evolution strategy with
+increasing population size, CEC 2005. Details that the tutorial leaves open follow the
+library cmaes.
 """
 
 import math
@@ -19,42 +21,44 @@ from posefit.fitting.weights import effective_sample_size
 from posefit.reading import cut
 
 ALPHA_COV = 2.0
-LAG = 0.1  # of the decomposition, appendix B.2
-GROWTH = 2  # IPOP: a restart has a population so many times as large
-# ours: draws over those needed, and the least share of feasible ones assumed
-SURPLUS = 1.25
-MIN_SHARE = 0.25
-CHECKED = 10  # ours: generations after which a search may have ended
-# as cmaes has them; TolX in first step sizes
+LAG = 0.1  # lag of the decomposition, appendix B.2
+GROWTH = 2  # IPOP: factor on the population of a restart
+SURPLUS = 1.25  # ours: draws over the number needed
+MIN_SHARE = 0.25  # ours: the least share of feasible draws that is assumed
+CHECKED = 10  # ours: generations between checks of whether a search has ended
+# Values of cmaes. TolX is in first step sizes.
 TOL_FUN = 1e-12
 TOL_X = 1e-12
 TOL_X_UP = 1e4
-# longest axis over the shortest, as cmaes has it; the tutorial means their squares
+# Longest axis over the shortest, as in cmaes. The tutorial means their squares.
 CONDITION = 1e14
-# ours, as cmaes has it: replaces eigenvalues that rounding makes negative, and keeps
-# divisors from 0
+# Ours, as in cmaes. It replaces eigenvalues that rounding makes negative, and keeps
+# divisors from 0.
 SMALL = 1e-8
 
 
 class Rates(NamedTuple):
-    """How fast mean, step size and covariance follow what is selected: the tutorial's Table 1."""
+    """The learning rates of mean, step size and covariance: the tutorial's Table 1."""
 
-    mu_eff: float  # how many selected steps the weighted ones are worth
-    c_sigma: float  # of the step size's path
-    d_sigma: float  # the step size's damping
-    c_c: float  # of the covariance's path
-    c_1: float  # of the covariance, from its path
-    c_mu: float  # of the covariance, from the population
+    mu_eff: float  # effective number of selected steps
+    c_sigma: float  # rate of the step size's path
+    d_sigma: float  # damping of the step size
+    c_c: float  # rate of the covariance's path
+    c_1: float  # rate of the covariance, from its path
+    c_mu: float  # rate of the covariance, from the population
     chi: float  # the mean length of a standard normal vector
 
 
 def default_population_size(dimensions: int) -> int:
-    """Return lambda, the usual number of proposals a generation."""
+    """Return lambda, the usual number of proposals per generation."""
     return 4 + math.floor(3.0 * math.log(dimensions))  # HANSEN2016 (48)
 
 
 def constants(dimensions: int, population: int) -> tuple[Array, Rates]:
-    """Return the weights (lambda,) of a population of 4 or more, best first, and the rates that follow from them."""
+    """Return the weights (lambda,) of a population, best first, and their rates.
+
+    The population must be 4 or more.
+    """
     n = dimensions
     mu = population // 2
     # HANSEN2016 (49)
@@ -90,30 +94,36 @@ def constants(dimensions: int, population: int) -> tuple[Array, Rates]:
 
 
 class Strategy:
-    """A normal distribution N(m, sigma^2 C) that moves towards what costs least, a generation at a time.
+    """A normal distribution N(m, sigma^2 C) that moves towards the least costs.
 
-    `mean` (d,), `sigma` and `covariance` (d, d) are m, sigma and C; `step_path` and `path` (d,) are the evolution paths
-    p_sigma and p_c; `axes` (d, d) and `lengths` (d,) are B and D, with C = B D^2 B' when it was last decomposed.
+    `mean` (d,), `sigma` and `covariance` (d, d) are m, sigma and C. `step_path` and
+    `path` (d,) are the evolution paths p_sigma and p_c. `axes` (d, d) and `lengths`
+    (d,) are B and D, with C = B D^2 B' at the last decomposition.
     """
 
     def __init__(self, mean: Array, spread: Array, population: int) -> None:
-        """Start around `mean` (d,) with standard deviations `spread` (d,), generations of `population` proposals."""
+        """Start around a mean.
+
+        Args:
+            mean: (d,) the mean of the first generation.
+            spread: (d,) its standard deviations.
+            population: The number of proposals in a generation.
+
+        """
         d = len(mean)
-        self.mean, self.sigma = (
-            np.array(mean, dtype=np.float64),
-            math.sqrt(float((spread**2).mean())),
-        )
-        # the least is ours
+        self.mean = np.array(mean, dtype=np.float64)
+        self.sigma = math.sqrt(float((spread**2).mean()))
+        # the least deviation is ours
         self.covariance = np.diag(np.maximum(spread / self.sigma, 1e-6) ** 2)
-        self.step_path, self.path, self.generation = np.zeros(d), np.zeros(d), 0
+        self.step_path = np.zeros(d)
+        self.path = np.zeros(d)
+        self.generation = 0
         self.weights, self.rates = constants(d, population)
         self.total = float(self.weights.sum())
         # HANSEN2016 (B.2)
         self.every = max(1, math.floor(LAG / (d * (self.rates.c_1 + self.rates.c_mu))))
-        self.tol_x, self.recent = (
-            TOL_X * self.sigma,
-            deque[Array](maxlen=10 + math.ceil(30 * d / population)),
-        )
+        self.tol_x = TOL_X * self.sigma
+        self.recent = deque[Array](maxlen=10 + math.ceil(30 * d / population))
         self.decompose()
 
     def decompose(self) -> None:
@@ -128,17 +138,18 @@ class Strategy:
         self.whitening = self.axes / self.lengths @ self.axes.T
 
     def sample(self, rng: np.random.Generator, count: int) -> Array:
-        """Return so many draws (count, d)."""
+        """Return draws (count, d)."""
         z = rng.standard_normal((count, len(self.mean)))  # HANSEN2016 (38)
         y = z @ self.scaled.T  # HANSEN2016 (39)
         return np.asarray(self.mean + self.sigma * y)  # HANSEN2016 (40)
 
     def learn(self, proposals: Array, costs: Array) -> None:
-        """Adapt to a generation of proposals (n, d), drawn here or moved since, and their finite costs (n,)."""
-        weights, (mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi) = (
-            self.weights,
-            self.rates,
-        )
+        """Adapt to a generation of proposals (n, d) with finite costs (n,).
+
+        The proposals were drawn here, and may have been moved since.
+        """
+        weights = self.weights
+        mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi = self.rates
         d = len(self.mean)
         mu = len(costs) // 2
         order = costs.argsort(kind="stable")
@@ -174,7 +185,7 @@ class Strategy:
             self.decompose()
 
     def ended(self) -> bool:
-        """Return whether the search has come to an end: nothing changes any more, or it diverges."""
+        """Return whether the search has ended: nothing changes, or it diverges."""
         variances = self.covariance.diagonal()
         axis = self.scaled[:, self.generation % len(self.mean)]
         return bool(  # HANSEN2016 (B.3)
@@ -188,16 +199,23 @@ class Strategy:
 
 
 class CMAES:
-    """Covariance matrix adaptation. It starts around the prediction with its spread, or anywhere with `spread`.
+    """Covariance matrix adaptation, from the prediction or anywhere.
 
-    It learns from the better half of a population and against the worse one (active CMA). When it stagnates it starts
-    again from a fresh draw with twice the population (IPOP). As many proposals are drawn as should make enough feasible
-    ones; where these are too few, others are moved towards the best of the last generation until they are feasible. Of
-    a draw beyond the box it learns where it was drawn, as worse than all others; its cost counts for the best alone.
+    It starts around the prediction with its spread, or anywhere with `spread`. It
+    learns from the better half of a population and against the worse half (active CMA).
+    When it stagnates, it starts again from a fresh draw with twice the population
+    (IPOP).
+
+    The number of draws should give enough feasible proposals. If there are too few,
+    others are moved towards the best of the last generation until they are feasible. A
+    draw outside the box is learned at the point where it was drawn, as worse than all
+    others; the cost of its moved proposal counts only for the best.
 
     Settings:
-        population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen 2016.
-        spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
+        population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen
+            2016.
+        spread (sigma): the first step size without a prediction, in half-ranges of the
+            box, above 0. Ours.
     """
 
     def __init__(
@@ -221,10 +239,11 @@ class CMAES:
         self._start(self.anywhere if space.start is None else space.start.spread)
 
     def _start(self, spread: Array) -> None:
-        """Start around a feasible prediction, or else around a fresh draw."""
+        """Start around a feasible prediction, or around a fresh draw."""
         if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
             raise InputError(
-                f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}"
+                "spread must be above 0 in some coordinate and negative in none,"
+                f" got {cut(str(spread))}"
             )
         start = self.space.start
         self.home = draw_population(self.space, self.rng, 1)[0]
@@ -235,12 +254,10 @@ class CMAES:
         self.asked = self._drawn()
 
     def _drawn(self) -> Array:
-        """Return the next population (n, d), and keep what the strategy learns of it."""
+        """Return the next population (n, d), and keep the points that are learned."""
         n = self.population_size
-        drawn = wrap(
-            self.space,
-            self.strategy.sample(self.rng, math.ceil(SURPLUS * n / self.share)),
-        )
+        count = math.ceil(SURPLUS * n / self.share)
+        drawn = wrap(self.space, self.strategy.sample(self.rng, count))
         feasible = self.space.feasible(drawn)
         self.share = max(np.count_nonzero(feasible) / len(drawn), MIN_SHARE)
         population = drawn[feasible][:n]
@@ -250,8 +267,9 @@ class CMAES:
         if not len(moved):
             return population
         repaired = repair(self.space, moved, self.home)
-        # a point on a side is not what was drawn: learned as if it were, many of them
-        # would widen the distribution across the box, and nothing would narrow it
+        # A point moved to a side of the box was not drawn there. If many of them were
+        # learned as if they were, they would widen the distribution across the box, and
+        # nothing would narrow it.
         beyond = np.linalg.norm(moved - np.clip(moved, -1.0, 1.0), axis=1)
         self.beyond[len(population) :] = beyond
         learned = np.where(beyond[:, None] > 0.0, moved, repaired)
@@ -264,18 +282,17 @@ class CMAES:
         return self.asked.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Adapt mean, step size and covariance, and start again where the search has come to an end."""
+        """Adapt mean, step size and covariance, and restart if the search has ended."""
         check_tell(self.waiting, proposals, costs)
         self.waiting = 0
         known = finite_costs(costs)
         mean = self.strategy.mean
         self.home = self.asked[known.argmin()]
-        # what lies beyond the box costs more than all that is in it, and the more the
-        # farther away it is
+        # draws outside the box cost more than all inside, and more the farther they are
         # HANSEN2016 (B.5)
         ranked = np.where(self.beyond > 0.0, known.max() + self.beyond, known)
         learned = self.learned
-        # the mean goes on past the end of a circle, and so must what it learns from
+        # the mean continues past the end of a circle, and so must the learned points
         if self.space.periodic.any():
             learned = mean + displacement(self.space, mean, learned)
         self.strategy.learn(learned, ranked)

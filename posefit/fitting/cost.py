@@ -1,4 +1,4 @@
-"""The cost of a pose: how much the silhouettes of its body differ from the observed ones."""
+"""The cost of a pose: how much its silhouettes differ from the observed ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -39,11 +39,13 @@ def align(
     poses: Array,
     anchors: Array,
 ) -> Array:
-    """Return the translations (n, 3) that bring poses (n, 66) to the silhouettes' boxes. Interpretation S4, `aligned`.
+    """Return the translations (n, 3) with which poses fill the silhouettes' boxes.
 
-    Each border of a box says where the outermost disc of the body must touch, and that is linear in the translation:
-    `focal (x + t_x) +- focal radius = (border - centre) (z + t_z)`. All borders of all views are solved for together,
-    by least squares, starting from anchors (n, 3). A border at the image's edge is unknown and does not count.
+    Interpretation S4, `aligned`. The outermost disc of the body must touch each border
+    of a box, and that is linear in the translation: `focal (x + t_x) +- focal radius =
+    (border - centre) (z + t_z)`. All borders of all views are solved together, by least
+    squares, starting from anchors (n, 3). A border at the edge of the image is unknown
+    and does not count.
     """
     translations = writeable(anchors.copy())
     move_to_borders(
@@ -61,18 +63,19 @@ def align(
 
 @dataclass(frozen=True, eq=False)
 class SilhouetteCost:
-    """The cost of proposals for one observation, from one camera or several: a pure function. SAPSO (4).
+    """The cost of proposals for one observation, a pure function. SAPSO (4).
 
-    Call it with proposals (n, d) of its space for their costs (n,), 0 to 100: the mean over the views. A proposal's
-    cost has the same bits whatever the others are and however many threads work. A `Problem` counts the calls.
+    Call it with proposals (n, d) of its space for their costs (n,), 0 to 100: the mean
+    over the views. The cost of a proposal has the same bits whatever the other
+    proposals are, and with any number of threads. A `Problem` counts the calls.
 
     Args:
-        body: the person's.
+        body: the person's body.
         cameras: one or several.
-        silhouettes: one a camera, of its size.
-        space: the box of proposals, and the poses they stand for.
-        beta: what the missed share counts, 0 to 1; 1 - beta the spilled share.
-        threads: the number that draw; the costs are the same with any.
+        silhouettes: one per camera, of its size.
+        space: the box of proposals, which decodes them to poses.
+        beta: weight of the missed share, 0 to 1; the spilled share has 1 - beta.
+        threads: number of threads. Does not change the costs.
         blank: whether all silhouettes may be empty, as in the middle of a track.
 
     """
@@ -91,13 +94,15 @@ class SilhouetteCost:
     def __post_init__(self) -> None:
         if len(self.cameras) != len(self.silhouettes) or not self.cameras:
             raise InputError(
-                f"silhouettes must be one a camera ({len(self.cameras)}), got {len(self.silhouettes)}"
+                f"silhouettes must be one a camera ({len(self.cameras)}),"
+                f" got {len(self.silhouettes)}"
             )
         for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
             if silhouette.size != (camera.width, camera.height):
                 size = (camera.height, camera.width)
                 raise InputError(
-                    f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}"
+                    f"mask must have shape {size}, the camera's,"
+                    f" got {silhouette.mask.shape}"
                 )
         if not self.blank and not any(
             silhouette.mask.any() for silhouette in self.silhouettes
@@ -128,9 +133,10 @@ class SilhouetteCost:
         return costs
 
     def coarser(self, factor: int) -> "SilhouetteCost":
-        """Return the same cost on every `factor`th pixel of every `factor`th row; made once.
+        """Return the same cost on every `factor`th pixel of every `factor`th row.
 
-        It has the same space, and a proposal means the same pose. See `posefit.silhouette.mask`.
+        It is made once. It has the same space, and a proposal decodes to the same pose.
+        See `posefit.silhouette.mask`.
         """
         if factor not in self._coarser:
             self._coarser[factor] = replace(
@@ -145,12 +151,21 @@ class SilhouetteCost:
         return self._coarser[factor]
 
     def decode(self, proposals: Array) -> tuple[Array, Array]:
-        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space says so."""
+        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d).
+
+        They are aligned if the translation of the space is `aligned`.
+        """
         poses, translations = self.space.decode(proposals)
         return poses, self._aligned(poses, translations)
 
     def cost_and_areas(self, poses: Array, translations: Array) -> tuple[Array, Areas]:
-        """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
+        """Return the costs (n,) and R, B, Y (views, n, 3) of poses at translations.
+
+        Args:
+            poses: (n, 66).
+            translations: (n, 3) metres, the roots.
+
+        """
         return pose_costs(
             self.body,
             self.cameras,
@@ -163,7 +178,7 @@ class SilhouetteCost:
 
     @cached_property
     def on_device(self) -> bool:
-        """Whether a device draws the poses: then all of them at once, and threads have nothing to share."""
+        """Whether a device rasterises the poses: all at once, without threads."""
         return any(silhouette.device is not None for silhouette in self.silhouettes)
 
     @cached_property
@@ -175,13 +190,14 @@ class SilhouetteCost:
         return known_views(views, self.silhouettes)
 
     def _cost(self, poses: Array, translations: Array) -> Array:
-        """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
-        return mean_over_views(
-            [costs_in(*view, poses, translations, self.beta) for view in self._drawings]
-        )
+        """Return the costs (n,) of decoded poses at translations, on one thread."""
+        by_view = [
+            costs_in(*view, poses, translations, self.beta) for view in self._drawings
+        ]
+        return mean_over_views(by_view)
 
     def _aligned(self, poses: Array, translations: Array) -> Array:
-        """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""
+        """Return the translations (n, 3) of decoded poses, aligned if needed."""
         if self.space.translation != "aligned":
             return translations
         return align(self.body, self.cameras, self.silhouettes, poses, translations)

@@ -1,4 +1,4 @@
-"""Arrays of other libraries, such as PyTorch and JAX, taken and given back through DLPack."""
+"""Arrays of other libraries, such as PyTorch and JAX, converted through DLPack."""
 
 import sys
 from collections.abc import Callable
@@ -14,12 +14,25 @@ CPU = 1  # DLPack's number of this device
 
 
 def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
-    """Return values as a NumPy array, and the function that turns results (n,) into an array of the values' library.
+    """Return values as a NumPy array, and a function that converts results back.
 
-    An array on the CPU is not copied; one on another device is copied from there, and its results back to it. Results
-    have the values' type where that is a floating one: float32 of JAX or PyTorch gives float32. NumPy's arrays, and
-    whatever has no `__dlpack__`, are returned as they are, and so are their results. Raises InputError, beginning with
-    the name, for an array without numbers to read: one that is traced (`jit`, `vmap`) or needs a gradient.
+    An array on the CPU is not copied. From another device it is copied, and its results
+    are copied back. Results have the type of the values if that is a floating type:
+    float32 of JAX or PyTorch gives float32. NumPy's arrays, and values without
+    `__dlpack__`, are returned as they are, and so are their results.
+
+    Args:
+        name: The name of the values in messages.
+        values: The array.
+
+    Returns:
+        The NumPy array, and a function that turns results (n,) into an array of the
+        values' library.
+
+    Raises:
+        InputError: The array has no numbers to read, because it is traced (`jit`,
+            `vmap`) or needs a gradient.
+
     """
     if isinstance(values, np.ndarray | np.generic) or not hasattr(values, "__dlpack__"):
         return values, lambda results: results
@@ -27,9 +40,11 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
         here = values.__dlpack_device__()[0] == CPU
         array = np.from_dlpack(values) if here else np.from_dlpack(values, device="cpu")
     except (AttributeError, BufferError, RuntimeError, TypeError) as error:
+        kind_of_array = f"{type(values).__module__}.{type(values).__name__}"
         raise InputError(
-            f"{name} must be an array that DLPack can read: neither traced by jit or vmap nor with a gradient, "
-            f"got {type(values).__module__}.{type(values).__name__}: {quoted(str(error).splitlines()[0])}"
+            f"{name} must be an array that DLPack can read: neither traced by jit or"
+            f" vmap nor with a gradient, got {kind_of_array}:"
+            f" {quoted(str(error).splitlines()[0])}"
         ) from None
     if hasattr(values, "__array_namespace__"):
         library = values.__array_namespace__()

@@ -1,6 +1,8 @@
-"""The one loop that drives a tracker: its frames are checked, its evaluations counted, costs and areas computed again.
+"""The one loop that drives a tracker.
 
-A broken rule ends the track with one line that names the tracker; a wrong figure is noted in an `Audit`, and put right.
+It checks the frames, counts evaluations, and computes costs and areas again. A broken
+rule ends the track with one line that names the tracker. A wrong figure is corrected
+and noted in an `Audit`.
 """
 
 import math
@@ -19,27 +21,25 @@ from posefit.reading import quoted
 from posefit.silhouette.cost import pose_costs
 from posefit.silhouette.drawn import PoseCount, uncounted
 
-# ours: a frame may draw so many beyond its evaluations, as to draw its result once more
+# Ours: a frame may rasterise this many poses beyond its evaluations, for example its
+# result once more.
 UNCOUNTED_POSES = 10
-# ours: costs are rounded where they are added up in another order
+# Ours: rounding of costs that are added in another order.
 COST_TOLERANCE = 1e-6
 
 
 @dataclass(eq=False)
 class Audit:
-    """What a tracker, named `name`, reports wrongly of its frames; `warnings` has a line for each kind.
+    """The wrong figures in a tracker's frames; `warnings` has a line for each kind."""
 
-    `beta` is that of the cost that it reports.
-    """
-
-    name: str
-    beta: float
-    # by kind: the first of them, and how many
+    name: str  # the name of the tracker
+    beta: float  # the weight in the cost that it reports
+    # by kind: the message of the first finding, and the number of findings
     _findings: dict[str, tuple[str, int]] = field(default_factory=dict)
 
     @property
     def warnings(self) -> list[str]:
-        """One line for each kind: the first of it, and how many frames it concerns."""
+        """One line for each kind: its first finding, and the number of frames."""
         return [
             f"{first} ({count} such frame{'s' if count > 1 else ''})"
             for first, count in self._findings.values()
@@ -68,22 +68,38 @@ def drive(
     observations: Iterable[Observation],
     rng: np.random.Generator,
 ) -> Iterator[Frame]:
-    """Yield a tracker's frame for each observation, with the time that it took; `make` makes the tracker of the task.
+    """Yield a tracker's frame for each observation, with the time that it took.
 
-    Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
-    pose. An honest frame stays as it is. Raises BrokenRuleError where a frame is missing or wrong.
+    Poses are counted as they are rasterised, see `posefit.silhouette.drawn`. Areas and
+    costs are computed again from the poses. A frame with right figures does not change.
+
+    Args:
+        make: Makes the tracker of a task.
+        audit: Gets the wrong figures.
+        task: The task.
+        observations: The frames, in order.
+        rng: The random numbers.
+
+    Yields:
+        A checked frame for each observation.
+
+    Raises:
+        BrokenRuleError: A frame is missing or breaks a rule.
+
     """
-    waiting = deque[Observation]()  # taken, and without their frames
-    reading = np.zeros(2)  # the clocks of what is no time of the tracker
+    waiting = deque[Observation]()  # taken observations, without frames yet
+    reading = np.zeros(2)  # time of reading observations, which is not the tracker's
     unreadable: Exception | None = None
 
     def taken() -> Iterator[Observation]:
+        """Yield the observations, and measure the time of reading them."""
         nonlocal unreadable
         coming = iter(observations)
         while True:
             start = clocks()
             try:
-                with uncounted():  # to render a motion is no evaluation
+                # rendering a motion is no evaluation
+                with uncounted():
                     observation = next(coming)
             except StopIteration:
                 return
@@ -95,7 +111,7 @@ def drive(
             waiting.append(observation)
             yield observation
 
-    # ValueErrors of its settings, and libraries that are missing, are the user's
+    # ValueErrors of settings and missing libraries are mistakes of the user
     with plugin_errors(audit.name, "construction", (ValueError, ImportError)):
         tracker = make(task)
     source = taken()
@@ -115,7 +131,7 @@ def drive(
                 frame = next(frames, None)
         except BrokenRuleError as broken:
             if unreadable is not None and broken.__cause__ is unreadable:
-                # what could not be read is not the tracker's fault
+                # an unreadable observation is not the tracker's fault
                 raise unreadable from None
             raise
         if frame is None:
@@ -123,12 +139,13 @@ def drive(
         seconds, cpu_seconds = (clocks() - reading - start).tolist()
         if not waiting:
             raise audit.broken(
-                f"track must yield a frame for each observation, got {yielded + 1} for {yielded}"
+                "track must yield a frame for each observation,"
+                f" got {yielded + 1} for {yielded}"
             )
         observation = waiting.popleft()
         if rule := _broken(frame, axes):
             raise audit.broken(rule)
-        # it may have drawn poses for observations that it looks at ahead
+        # poses of the observations ahead may have been rasterised already
         ahead = task.evaluations * len(waiting)
         counted = math.ceil(drawn.poses / len(task.cameras)) - evaluations - ahead
         leeway = UNCOUNTED_POSES * (yielded + 1 + len(waiting))
@@ -143,7 +160,8 @@ def drive(
             audit.note(
                 "budget",
                 yielded,
-                f"use at most {task.evaluations:,} evaluations, got {frame.evaluations:,}",
+                f"use at most {task.evaluations:,} evaluations,"
+                f" got {frame.evaluations:,}",
             )
         frame = _with_true_cost(frame, yielded, task, observation, audit)
         yielded = yielded + 1
@@ -151,12 +169,13 @@ def drive(
         yield replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
     if waiting or next(source, None) is not None:
         raise audit.broken(
-            f"track must yield a frame for each observation, got {yielded} and then no more"
+            "track must yield a frame for each observation,"
+            f" got {yielded} and then no more"
         )
 
 
 def clocks() -> Array:
-    """Return what the clock shows now, and the CPU time of this process's threads (2,), in seconds."""
+    """Return the time now, and the CPU time of this process (2,), seconds."""
     return np.array([time.perf_counter(), time.process_time()])
 
 
@@ -171,9 +190,11 @@ def _broken(frame: object, axes: FreeAxes) -> str:
     if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
         return f"a translation must be 3 finite metres, got {frame.translation}"
     if not isinstance(frame.evaluations, int | np.integer) or frame.evaluations < 0:
-        return f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}"
-    if np.ndim(frame.trace) != 2 or np.shape(frame.trace)[1] != 2:
-        return f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}"
+        came = quoted(frame.evaluations)
+        return f"evaluations must be a whole number, 0 or more, got {came}"
+    shape = np.shape(frame.trace)
+    if len(shape) != 2 or shape[1] != 2:
+        return f"a trace must be (n, 2), evaluations and costs, got shape {shape}"
     if rule := axes.broken(np.asarray(frame.pose)[None, 3:]):
         return f"a pose must {rule}"
     return ""
@@ -182,12 +203,13 @@ def _broken(frame: object, axes: FreeAxes) -> str:
 def _with_true_cost(
     frame: Frame, number: int, task: Task, observation: Observation, audit: Audit
 ) -> Frame:
-    """Return the frame with the areas and the cost of its pose, and note where it reports others."""
+    """Return the frame with its pose's true areas and cost, and note wrong ones."""
     pose = np.asarray(frame.pose, np.float64)[None]
     place = np.asarray(frame.translation, np.float64)[None]
-    # without bits that it may change
+    # copies without the packed bits, which the tracker may have changed
     observed = [replace(silhouette) for silhouette in observation.silhouettes]
-    with uncounted():  # to check a frame is no evaluation
+    # checking a frame is no evaluation
+    with uncounted():
         costs, counts = pose_costs(
             task.body, task.cameras, observed, pose, place, audit.beta
         )
@@ -214,14 +236,15 @@ def _with_true_cost(
 
 
 def with_evaluations(frame: Frame, evaluations: int) -> Frame:
-    """Return a frame with so many evaluations; those of its trace are stretched to them."""
+    """Return a frame with another number of evaluations, its trace stretched to it."""
     stretched = frame.trace.copy()
     stretched[:, 0] = stretched[:, 0] * evaluations // max(frame.evaluations, 1)
     return replace(frame, evaluations=evaluations, trace=stretched)
 
 
 def _short(value: object) -> str:
-    text = (
-        f"{value:.6g}" if isinstance(value, float) else str(np.asarray(value).tolist())
-    )
+    """Return a value as text of at most 80 characters."""
+    text = str(np.asarray(value).tolist())
+    if isinstance(value, float):
+        text = f"{value:.6g}"
     return text if len(text) <= 80 else text[:77] + "..."

@@ -1,12 +1,17 @@
-"""Aligning and decoding proposals, in numba: plain functions over arrays, shapes checked by the callers."""
+"""Aligning and decoding proposals, compiled by Numba.
+
+The functions take plain arrays and rely on the callers for their shapes.
+"""
 
 import numpy as np
 
 from posefit.arrays import jit
 
-ROUNDS = 3  # which joint is outermost depends a little on where the body stands
-DAMPING = 1e-9  # keeps the 3 x 3 system solvable where a silhouette has too few borders
-# metres; a joint that is nearer, or behind the camera, counts as that far
+# The outermost joint depends a little on the place of the body, so the system is solved
+# several times.
+ROUNDS = 3
+DAMPING = 1e-9  # keeps the 3 x 3 system solvable if a silhouette has too few borders
+# Metres. A joint nearer than this, or behind the camera, counts as this far away.
 NEAREST = 1e-3
 
 
@@ -14,10 +19,12 @@ NEAREST = 1e-3
 def move_to_borders(
     joints, radii, rotations, offsets, focals, centres, borders, translations
 ):
-    """Move translations (n, 3) to where joints (n, 27, 3) fill the borders (views, 4): left, top, right, bottom.
+    """Move translations (n, 3) to where joints (n, 27, 3) fill the borders (views, 4).
 
-    Each known border is one linear equation, r . t = gap. The least squares over all of them solve A t = b, where A,
-    here xx to zz, is the sum of r r' and b that of gap r; the damping pulls t towards where it was.
+    The borders are left, top, right, bottom. Each known border is one linear equation,
+    r . t = gap. The least squares over all of them solve A t = b, where A, here xx to
+    zz, is the sum of r r', and b is the sum of gap r. The damping pulls t towards its
+    former value.
     """
     views = borders.shape[0]
     count = joints.shape[1]
@@ -100,7 +107,10 @@ def move_to_borders(
 
 @jit
 def add_components(latents, components, angles):
-    """Add components (m, k) times latents (n, m) to angles (n, k), in one order: a row always has the same bits."""
+    """Add components (m, k) times latents (n, m) to angles (n, k).
+
+    The order of the sums is fixed, so that a row always has the same bits.
+    """
     for i in range(latents.shape[0]):
         for m in range(latents.shape[1]):
             latent = latents[i, m]
@@ -112,10 +122,14 @@ def add_components(latents, components, angles):
 def unpack_proposals(
     proposals, centre, half, anchor, mean, poses, translations, latents
 ):
-    """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite.
+    """Write root angles, translations and latents of proposals (n, d).
 
-    Pitch and roll are added to the tilt that belongs to the latents, the last coordinates, by `mean` (3 + m, 2) of a
-    `Tilt`. The translation is searched where there are coordinates for it, else it is the anchor.
+    Pitch and roll are added to the tilt expected for the latents, by `mean` (3 + m, 2)
+    of a `Tilt`. Without coordinates for it, the translation is the anchor.
+
+    Returns:
+        Whether all values are finite.
+
     """
     first = proposals.shape[1] - latents.shape[1]
     total = 0.0

@@ -1,4 +1,4 @@
-"""How far joints are from a detector's landmarks, whose left and right may be exchanged."""
+"""The likelihood of a detector's landmarks, which may have left and right exchanged."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, MIRROR, Skeleton
 from posefit.silhouette.rasteriser import NEAR
 
-# joints whose left and right a detector exchanges together or not at all
+# Joints that a detector exchanges together or not at all.
 _TOGETHER = (
     ("femur", "tibia", "toes"),
     ("humerus", "radius"),
@@ -24,9 +24,9 @@ GROUPS = [
     for bones in _TOGETHER
 ]
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
-# metres between a joint and its landmark; much longer distances count little more
+# Metres between a joint and its landmark. Much longer distances count little more.
 DEVIATION = 0.05
-# share of the frames in which left and right of each group are exchanged
+# Share of the frames in which each group has left and right exchanged.
 EXCHANGED = np.array([0.3, 0.13, 0.35])
 PERSISTENCE = 0.5  # correlation of exchanges a thirtieth of a second apart
 
@@ -38,10 +38,19 @@ def landmark_likelihoods(
     poses: Array,
     places: Array,
 ) -> Array:
-    """Return how likely poses (n, 66) at places (n, 3) make landmarks (V, 27, 3): logarithms (n, K, 2).
+    """Return the logarithms of the likelihoods (n, K, 2) of landmarks, given poses.
 
-    K are the groups of each view; each is as it is, or has left and right exchanged. Landmarks are those of an
-    `Observation`. A joint counts by its confidence; distances have a Cauchy distribution.
+    K are the groups of each view. The last axis is for the group as it is, and with
+    left and right exchanged. A joint counts by its confidence. Distances have a Cauchy
+    distribution.
+
+    Args:
+        skeleton: The person's skeleton.
+        cameras: The cameras.
+        landmarks: (V, 27, 3), see `Observation`.
+        poses: (n, 66).
+        places: (n, 3) metres.
+
     """
     joints = skeleton.joints(poses, places)
     groups = []
@@ -51,24 +60,23 @@ def landmark_likelihoods(
         for group in GROUPS:
             both = []
             for same in (group, MIRRORED[group]):
-                off = (
-                    np.linalg.norm(pixels[:, group] - view[same, :2], axis=-1)
-                    * metres[:, group]
-                )
+                apart = np.linalg.norm(pixels[:, group] - view[same, :2], axis=-1)
+                off = apart * metres[:, group]  # (n, joints) metres
                 both.append(np.log1p(0.5 * (off / DEVIATION) ** 2) @ view[same, 2])
             groups.append(-np.stack(both, axis=-1))
     return np.stack(groups, axis=1)
 
 
 def usually_exchanged(likelihoods: Array) -> Array:
-    """Return how often the groups (K,) of `landmark_likelihoods` (..., K, 2) are exchanged."""
+    """Return how often the groups (K,) of likelihoods (..., K, 2) are exchanged."""
     return np.tile(EXCHANGED, likelihoods.shape[-2] // len(GROUPS))
 
 
 def landmark_costs(likelihoods: Array, exchanged: Array | None = None) -> Array:
     """Return the negative logarithms (...) of `landmark_likelihoods` (..., K, 2).
 
-    `exchanged` (..., K) is how likely each group is exchanged; as often as any frame's, where nothing is known.
+    `exchanged` (..., K) has the probability of each group to be exchanged, by default
+    its usual share of frames.
     """
     direct = likelihoods[..., 0]
     other = likelihoods[..., 1]
@@ -82,13 +90,19 @@ def landmark_costs(likelihoods: Array, exchanged: Array | None = None) -> Array:
 
 
 def exchanged_next(exchanged: Array, seconds: float) -> Array:
-    """Return how likely groups (..., K) are exchanged `seconds` later, by how likely they are now."""
+    """Return the probabilities of exchanged groups (..., K) `seconds` later."""
     usual = np.tile(EXCHANGED, exchanged.shape[-1] // len(GROUPS))
     return np.asarray(usual + PERSISTENCE ** (30.0 * seconds) * (exchanged - usual))
 
 
 def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
-    """Return how likely groups (..., K) are exchanged, by `landmark_likelihoods` and how likely they were before."""
+    """Return the probabilities of exchanged groups (..., K), given the landmarks.
+
+    Args:
+        likelihoods: (..., K, 2) from `landmark_likelihoods`.
+        exchanged: (..., K) the probabilities before the landmarks were seen.
+
+    """
     return logistic(
         np.log(exchanged)
         - np.log1p(-exchanged)
@@ -98,9 +112,14 @@ def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
 
 
 def side_odds(likelihoods: Array) -> Array:
-    """Return the logarithms of the odds (2,) that legs, and arms, are on a pose's sides, by its likelihoods (K, 2).
+    """Return the log odds (2,) that a pose has legs, and arms, on the right sides.
 
-    Unknown landmarks add 0, and each limb of each view at most the odds of its usual share of exchanges.
+    Unknown landmarks add 0. Each limb of each view adds at most the odds of its usual
+    share of exchanges.
+
+    Args:
+        likelihoods: (K, 2) from `landmark_likelihoods` of the pose.
+
     """
     limb = np.arange(len(likelihoods)) % len(GROUPS)
     usual = usually_exchanged(likelihoods)

@@ -1,4 +1,4 @@
-"""How far an estimate is from the truth. Poses are (T, 66) radians, joints (T, 27, 3) metres."""
+"""Errors of an estimate. Poses are (T, 66) radians, joints (T, 27, 3) metres."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 def pose_error_degrees(
     truth: Array, estimate: Array, dimensions: NDArray[np.bool_] | None = None
 ) -> Array:
-    """Return the mean absolute difference of the angles (T,) in degrees, wrapped. SAPSO (8), Interpretation S13.
+    """Return the mean absolute difference of the angles (T,) in degrees, wrapped.
 
-    All 66 angles count, padding too, unless `dimensions` (66,) chooses some.
+    SAPSO (8), Interpretation S13. All 66 angles count, padding too, unless `dimensions`
+    (66,) chooses some.
     """
     difference = np.degrees(np.abs(wrapped(truth - estimate)))
     # SAPSO (8)
@@ -35,12 +36,15 @@ def mean_error(errors: Array) -> float:
 
 
 def error_spread(errors: Array) -> float:
-    """Return the standard deviation of a sequence's errors (T,), with divisor T. SAPSO (10)."""
+    """Return the standard deviation of errors (T,), with divisor T. SAPSO (10)."""
     return float(np.std(errors))  # SAPSO (10)
 
 
 def geodesic_degrees(truth: Array, estimate: Array) -> Array:
-    """Return the mean angle (T,) in degrees between true and estimated rotations of the root and 21 inner joints."""
+    """Return the mean angle (T,) between true and estimated rotations, degrees.
+
+    The root and the 21 inner joints count.
+    """
     root = geodesic(
         rotation_from_root_angles(truth[:, :3]),
         rotation_from_root_angles(estimate[:, :3]),
@@ -55,18 +59,18 @@ def geodesic_degrees(truth: Array, estimate: Array) -> Array:
 
 
 def mpjpe_mm(truth: Array, joints: Array) -> Array:
-    """Return the mean distance (T,) of the joints in millimetres, both roots at one point.
+    """Return the mean distance (T,) of the joints in millimetres, with aligned roots.
 
-    The root is moved to the origin on both sides, as is usual where one camera leaves the depth open. All 27 joints
-    count, the root with its zero.
+    Both roots are moved to the origin, as is usual because one camera leaves the depth
+    open. All 27 joints count, the root with its zero.
     """
     return np.asarray(1e3 * joint_distances(truth, joints).mean(axis=1))
 
 
 def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
-    """Return the mean distance (T,) of the joints in millimetres after the best rotation, scale and translation.
+    """Return the mean distance (T,) of the joints in millimetres, Procrustes-aligned.
 
-    That is Procrustes alignment, frame by frame.
+    Each frame gets the best rotation, scale and translation.
     """
     target = truth - truth.mean(axis=1, keepdims=True)
     source = joints - joints.mean(axis=1, keepdims=True)
@@ -81,16 +85,19 @@ def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
 
 
 def iou(areas: NDArray[np.int64]) -> Array:
-    """Return the intersection over union (n,) of areas R, B, Y (n, 3); 1 where both are empty."""
+    """Return the intersection over union (n,) of areas R, B, Y (n, 3); 1 if empty."""
     total = areas.sum(axis=1)
     return np.asarray(np.where(total > 0, areas[:, 2] / np.maximum(total, 1), 1.0))
 
 
 def lost_rate(mpjpe: Array) -> float:
-    """Return the share of frames whose MPJPE (T,) in millimetres is above 150."""
+    """Return the share of frames with an MPJPE (T,) above 150 mm."""
     return float((mpjpe > LOST_MM).mean())
 
 
 def skill(error: float, baseline: float) -> float | None:
-    """Return 1 - error / baseline: 1 is perfect, 0 no better than the baseline; None where the baseline is 0."""
+    """Return 1 - error / baseline: 1 is perfect, 0 no better than the baseline.
+
+    None if the baseline is 0.
+    """
     return 1.0 - error / baseline if baseline > 0.0 else None

@@ -1,4 +1,4 @@
-"""What an optimiser is, and the base of optimisers made from another library's ask and tell."""
+"""Optimisers, and the base of adapters of another library's ask and tell."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -17,7 +17,10 @@ class Optimiser(Protocol):
     """Proposes populations and learns their costs; nothing to inherit."""
 
     def ask(self) -> Array:
-        """Return the next population (n, d) in [-1, 1]^d; an empty one, (0, d), ends the search."""
+        """Return the next population (n, d) in [-1, 1]^d.
+
+        An empty population, (0, d), ends the search.
+        """
         ...
 
     def tell(self, proposals: Array, costs: Array) -> None:
@@ -29,51 +32,67 @@ class Filter(Optimiser, Protocol):
     """An optimiser that carries its particles from frame to frame."""
 
     def advance(self, space: Space) -> None:
-        """Go on to the next frame, whose box is `space`; its `start` holds the tracker's prediction."""
+        """Continue with the next frame.
+
+        Args:
+            space: Its box. The `start` of the box is the tracker's prediction.
+
+        """
         ...
 
 
-# Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a numpy Generator that is the
-# only source of randomness, and keyword-only settings. The driver fills in the settings `evaluations`, the budget of
-# one search, and `iterations`, the populations after the first that this budget holds, for a factory that takes them.
-# A factory whose attribute `baseline` is true is the chance that others are held against: the kit of checks does not
-# ask it to beat chance.
+# Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a
+# NumPy Generator that is the only source of randomness, and keyword-only settings. For
+# a factory that takes them, the driver fills in two settings: `evaluations`, the budget
+# of one search, and `iterations`, the populations after the first that this budget
+# holds. A factory with a true attribute `baseline` is the chance that others are
+# compared with: the kit of checks does not ask it to beat chance.
 OptimiserFactory = Callable[..., Optimiser]
 
-# What becomes of an optimiser in the next frame: a new one starts around the prediction, SAPSO (6), (7); the same
-# one, a `Filter`, carries its particles on; or a new one starts anywhere.
+# The optimiser of the next frame: a new one that starts around the prediction, SAPSO
+# (6), (7); the same one, a `Filter`, with its particles; or a new one that starts
+# anywhere.
 NextFrame = Literal["start", "carry", "forget"]
 
 
 def finite_costs(costs: Array) -> Array:
-    """Return costs (n,) that any library can work with: at most 1e15 to either side, nan the worst of all."""
+    """Return costs (n,) limited to +-1e15, nan as the worst, for any library."""
     return np.asarray(np.fmax(np.fmin(costs, WORST), -WORST))
 
 
 def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
-    """Raise InputError where `tell` gets anything else than a cost for each proposal of `ask`.
+    """Raise InputError unless `tell` gets one cost for each proposal of `ask`.
 
-    So many proposals wait for their costs; 0 before `ask` and after `tell`.
+    Args:
+        waiting: How many proposals wait for their costs, 0 before `ask` and after
+            `tell`.
+        proposals: The proposals that `tell` got.
+        costs: The costs that `tell` got.
+
     """
     if not waiting:
         raise InputError("tell must follow ask, got costs before proposals")
     for name, values, dimensions in (("costs", costs, 1), ("proposals", proposals, 2)):
         shape = np.shape(values)
         if len(shape) != dimensions or shape[0] != waiting:
-            came = (
-                "one number"
-                if not shape
-                else shape[0]
-                if len(shape) == dimensions
-                else f"an array of shape {shape}"
-            )
+            came = f"an array of shape {shape}"
+            if not shape:
+                came = "one number"
+            elif len(shape) == dimensions:
+                came = str(shape[0])
             raise InputError(f"tell must get {waiting} {name}, got {came}")
 
 
 class Adapter(ABC):
-    """Asks a library for proposals and tells it costs: infeasible proposals are repaired, and costs are finite.
+    """Asks a library for proposals, and tells it costs.
 
-    `home` (d,) is a feasible proposal, towards which the others are moved until they are feasible.
+    Infeasible proposals are repaired, and costs are made finite.
+
+    Args:
+        space: The box.
+        home: (d,) a feasible proposal. Infeasible ones are moved towards it until they
+            are feasible.
+
     """
 
     def __init__(self, space: Space, home: Array) -> None:
@@ -83,11 +102,14 @@ class Adapter(ABC):
 
     @abstractmethod
     def propose(self) -> Array:
-        """Return the library's next proposals (n, d), whatever is feasible; (0, d) once it has ended."""
+        """Return the library's next proposals (n, d), feasible or not.
+
+        An empty array, (0, d), means that it has ended.
+        """
 
     @abstractmethod
     def learn(self, proposals: Array, costs: Array) -> None:
-        """Tell the library the finite costs (n,) of what it proposed; `proposals` (n, d) are the repaired ones."""
+        """Tell the library the finite costs (n,) of its repaired `proposals` (n, d)."""
 
     def ask(self) -> Array:
         """Return the next population (n, d), the same one until its costs are told."""
@@ -96,7 +118,10 @@ class Adapter(ABC):
         return repair(self._space, self._asked, self._home)
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Let the library learn the costs (n,). Raises InputError where they are not those of what was asked for."""
+        """Let the library learn the costs (n,) of the latest population.
+
+        Raises InputError if they do not belong to it.
+        """
         check_tell(0 if self._asked is None else len(self._asked), proposals, costs)
         self.learn(np.asarray(proposals), finite_costs(costs))
         self._asked = None

@@ -1,7 +1,6 @@
-"""What a prior is: a space of joint angles with few coordinates, in the manner of scikit-learn.
+"""Priors: joint angles as a few coordinates, with an interface like scikit-learn's.
 
-And the tilt of the body that belongs to them: the root is no part of a prior, but its pitch and roll depend on the
-pose.
+The root is no part of a prior, but its pitch and roll, the tilt, depend on the pose.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,15 +16,16 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
 
-RIDGE = 0.05  # ours: of the regression, where a latent's range is 2
-# ours: radians to either side, from which on any tilt is allowed
+RIDGE = 0.05  # ours: ridge of the regression, for latents scaled to a range of 2
+# Ours: radians to either side. A wider range allows any tilt.
 TURNS_OVER = 0.75 * np.pi
 
 
 class Latents(Protocol):
-    """Maps joint angles (n, 63) to latents (n, m) and back: a `Prior` once it is fitted, or one that needs no fit.
+    """Maps joint angles (n, 63) to latents (n, m) and back.
 
-    `inverse_transform` and `feasible` must return the same bits for a row whatever the other rows are.
+    A fitted `Prior` is one, and so is a map that needs no fit. `inverse_transform` and
+    `feasible` must return the same bits for a row whatever the other rows are.
     """
 
     low: Array  # (m,) the range of the latents, constraint 1
@@ -40,25 +40,34 @@ class Latents(Protocol):
         ...
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return which latents (n, m) are poses at all (n,), constraint 2; constraint 1 is checked by the box."""
+        """Return which latents (n, m) are poses (n,), constraint 2.
+
+        The box checks constraint 1.
+        """
         ...
 
 
 class Prior(Latents, Protocol):
-    """Latents that are learned. The root is no part of a prior: SAPSO section 2.
+    """Learned latents. The root is no part of a prior: SAPSO section 2.
 
-    It is built as `factory(**settings)`, settings keyword-only. `low`, `high` and the methods beside `fit` may be used
-    only after `fit`.
+    It is built as `factory(**settings)`, with keyword-only settings. `low`, `high` and
+    all methods but `fit` may be used only after `fit`.
     """
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn from joint angles (T, 63) in radians, of a person with this skeleton, and return itself."""
+        """Learn from joint angles, and return itself.
+
+        Args:
+            angles: (T, 63) radians.
+            skeleton: The person's skeleton.
+
+        """
         ...
 
 
 @dataclass(eq=False, repr=False)
 class Components:
-    """Latents along given directions: joint angles are a mean plus a sum of components."""
+    """Latents along directions: joint angles are a mean plus a sum of components."""
 
     mean: Array  # (63,)
     components: Array  # (m, 63), orthonormal
@@ -74,7 +83,7 @@ class Components:
         """Return the joint angles (n, 63) of latents (n, m)."""
         angles = np.empty((len(latents), len(self.mean)))
         angles[:] = self.mean
-        # a matrix product's last bits depend on rows and machine
+        # not a matrix product: its last bits depend on the other rows and the machine
         # SAPSO 2.1.3 recovery
         add_components(writeable(latents), writeable(self.components), angles)
         return angles
@@ -90,16 +99,15 @@ PriorFactory = Callable[..., Prior]
 
 @dataclass(frozen=True, eq=False)
 class Tilt:
-    """The pitch and roll that belong to latents: their mean by ridge regression, and how far off they are.
+    """The pitch and roll of latents: their mean by ridge regression, and its residuals.
 
-    The mean is affine in the latents, and never beyond its range for the training poses.
+    The mean is affine in the latents, and limited to its range over the training poses.
     """
 
-    # (3 + m, 2) radians: the least and most of the mean, where all latents are 0, and a
-    # unit of each
+    # (3 + m, 2) radians: the least and the greatest mean, its value at latents of 0,
+    # and the slope of each latent
     mean: Array
-    # (2,) radians: the range of what is added to the mean; pi to either side is the
-    # whole circle
+    # (2,) radians: the range of the residuals; pi to either side is the whole circle
     low: Array
     high: Array  # (2,)
 
@@ -109,12 +117,16 @@ class Tilt:
     ) -> Self:
         """Learn from the poses of one motion or more.
 
-        The range holds a `share` of the residuals of each of the two angles, and `margin` radians more to either side.
+        Args:
+            prior: The fitted prior.
+            motions: The motions.
+            share: The range holds this share of the residuals of each angle.
+            margin: Radians added to the range on either side.
+
         """
         tilts = np.concatenate([motion.poses[:, 1:3] for motion in motions])
-        latents = np.asarray(
-            prior.transform(np.concatenate([motion.poses[:, 3:] for motion in motions]))
-        )
+        angles = np.concatenate([motion.poses[:, 3:] for motion in motions])
+        latents = np.asarray(prior.transform(angles))
         scales = 0.5 * (np.asarray(prior.high) - np.asarray(prior.low))
         scaled = latents / np.where(scales > 0.0, scales, 1.0)
         middle = np.arctan2(np.sin(tilts).mean(axis=0), np.cos(tilts).mean(axis=0))
@@ -140,12 +152,17 @@ class Tilt:
         )
 
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
-        """Return the middle and the half sides (2,) of the box around what was added last (2,).
+        """Return the middle and the half sides (2,) of a box of residuals.
 
-        It extends as far as `reach` (2,) to either side, and stays in the range, near whose end it is off the middle.
+        The box stays in the range, so that near an end of the range its middle is not
+        the last residual.
+
+        Args:
+            added: (2,) the last residual.
+            reach: (2,) radians, the half sides at most.
+
         """
         half = np.minimum(reach, 0.5 * (self.high - self.low))
         whole = self.high - self.low >= 2.0 * np.pi - 1e-12
-        return np.where(
-            whole, added, np.clip(added, self.low + half, self.high - half)
-        ), half
+        inside = np.clip(added, self.low + half, self.high - half)
+        return np.where(whole, added, inside), half

@@ -1,4 +1,4 @@
-"""A function to minimise, and the loop in which an optimiser minimises it: all that posefit asks of an optimiser.
+"""A function to minimise, and the loop in which an optimiser minimises it.
 
     from posefit import Problem, minimise, optimiser
 
@@ -6,8 +6,9 @@
     minimise(problem, optimiser("sapso")(space, rng))
     print(problem.best_cost, problem.evaluations)
 
-Everything that posefit searches is a problem: a frame of a track, a person's build, a numbered instance of a suite, an
-episode of an environment. The problem counts its evaluations and remembers its best proposal; nothing else does.
+Everything that posefit searches is a problem: a frame of a track, a person's build, a
+numbered instance of a suite, an episode of an environment. The problem counts its
+evaluations and remembers its best proposal; nothing else does.
 """
 
 import warnings
@@ -42,11 +43,12 @@ class BudgetSpentError(Exception):
 def minimise(
     problem: "Problem", optimiser: Optimiser, *, budget_known: bool = False
 ) -> "Problem":
-    """Return the problem, once an optimiser has used its budget.
+    """Let an optimiser use the budget of a problem, and return the problem.
 
-    The search ends when the optimiser proposes nothing, or a population larger than the rest of the budget, which is
-    not evaluated. It warns where the optimiser ends before half of the budget is used, unless the optimiser was built
-    with the budget (`budget_known`): the schedules of some follow it.
+    The search ends when the optimiser proposes nothing, or a population larger than the
+    rest of the budget, which is not evaluated. A warning tells if the optimiser ends
+    before half of the budget is used, unless it was built with the budget
+    (`budget_known`), which some schedules follow.
 
     Args:
         problem: what to minimise; it must have a budget.
@@ -58,12 +60,16 @@ def minimise(
 
     Raises:
         BudgetError: the budget does not hold the first population.
-        InputError: the problem has no budget, the optimiser proposed nothing, or no cost was a finite number.
+        InputError: the problem has no budget, the optimiser proposed nothing, or no
+            cost was a finite number.
 
     >>> import numpy as np
     >>> from posefit import optimiser, suite
-    >>> problem = suite("posefit-2026.3", function=1, instance=17, dimension=9, budget=200)
-    >>> minimise(problem, optimiser("cma")(problem.space, np.random.default_rng(0))).evaluations
+    >>> problem = suite(
+    ...     "posefit-2026.3", function=1, instance=17, dimension=9, budget=200
+    ... )
+    >>> cma = optimiser("cma")(problem.space, np.random.default_rng(0))
+    >>> minimise(problem, cma).evaluations
     200
 
     """
@@ -99,21 +105,24 @@ def minimise(
 class Problem:
     """A function to minimise over proposals in the box [-1, 1]^d.
 
-    Call it with proposals (n, d) for their costs (n,), or with one proposal (d,) for a float. Every proposal counts as
-    one evaluation, whether it is feasible or not.
+    Call it with proposals (n, d) for their costs (n,), or with one proposal (d,) for a
+    float. Every proposal counts as one evaluation, whether it is feasible or not.
 
     Args:
         cost: returns the costs (n,) of proposals (n, d).
         space: the box, as an optimiser knows it.
         budget: the largest number of evaluations; None for any number.
-        repair: moves infeasible proposals (n, d) before they are evaluated; by default they are evaluated as they are.
-        noisy: where calls return costs with noise, these (n,), of proposals (n, d) and the number of evaluations before
-            them; the best and the trace are always of `cost`.
+        repair: moves infeasible proposals (n, d) before they are evaluated; by default
+            they are evaluated as they are.
+        noisy: returns the noisy costs (n,) that a call returns, from the proposals
+            (n, d) and the number of evaluations before them. By default a call returns
+            `cost`. The best and the trace are always of `cost`.
         targets: costs to be reached, falling.
         id: names the problem in messages.
 
-    Attributes that a problem lacks are those of its cost function: `problem.decode` of a frame, `problem.look` of a
-    suite's. Attributes have the names of COCO's problems where those have them.
+    A problem also has the attributes of its cost function, such as `problem.decode` in
+    a frame and `problem.look` in a suite. Attributes have the same names as in COCO's
+    problems, if these have them.
 
     >>> import numpy as np
     >>> from posefit.testing.toy import Toy, sphere
@@ -156,17 +165,20 @@ class Problem:
         """Forget all evaluations: the count, the best and the trace."""
         self.evaluations = 0
         self.best_cost = np.inf
-        # where the cost fell: evaluations so far, and the proposal (d,) with its cost
+        # each fall of the cost: evaluations so far, the cost, and the proposal (d,)
         self._falls: list[tuple[int, float, Array]] = []
 
     def __call__(self, proposals: Any) -> Any:
         """Return the costs (n,) of proposals (n, d), or the cost of one proposal (d,).
 
-        Arrays may be of any library that has DLPack; the costs come as an array of the same library.
+        Arrays may be of any library that has DLPack; the costs come as an array of the
+        same library.
 
         Raises:
-            ValueError: the shape does not fit, or a number is not finite. Nothing is counted.
-            BudgetSpentError: the budget does not hold so many. Nothing is evaluated.
+            ValueError: the shape is wrong, or a number is not finite. Nothing is
+                counted.
+            BudgetSpentError: the budget does not hold all proposals. Nothing is
+                evaluated.
 
         """
         values, back = as_numpy("proposals", proposals)
@@ -174,11 +186,12 @@ class Problem:
         rows = checked.reshape(-1, self.dimension)
         if len(rows) > self.remaining_evaluations:
             raise BudgetSpentError(
-                f"{self.id}: {self.remaining_evaluations:.0f} of {self.budget} evaluations are left, got {len(rows)}"
+                f"{self.id}: {self.remaining_evaluations:.0f} of {self.budget}"
+                f" evaluations are left, got {len(rows)}"
             )
         if self._repair is not None:
             rows = self._repair(rows)
-        # a copy: a cost function that works in place would change what is remembered
+        # a copy, because a cost function that works in place would change the record
         costs = self.cost(rows.copy())
         if not isinstance(costs, np.ndarray) or costs.shape != (len(rows),):
             came = getattr(costs, "shape", type(costs).__name__)
@@ -192,9 +205,10 @@ class Problem:
         return float(measured[0]) if checked.ndim == 1 else back(measured)
 
     def count(self, rows: Array, costs: Array) -> None:
-        """Count proposals (n, d) that cost (n,), and remember each whose cost is the lowest so far. SAPSO (5).
+        """Count proposals (n, d) with costs (n,), and remember the best. SAPSO (5).
 
-        A call does this itself; it is for those who have the costs already, of several problems in one call.
+        A call does this itself. Use it if the costs are known already, as when one call
+        evaluates several problems.
         """
         # nan < x is False, so nan never becomes the best
         for k in np.flatnonzero(costs < self.best_cost):  # SAPSO (5)
@@ -205,7 +219,7 @@ class Problem:
         self.evaluations += len(rows)
 
     def checked(self, proposals: object) -> Array:
-        """Return proposals (d,) or (n, d) as float64. Raises ValueError for anything else."""
+        """Return proposals (d,) or (n, d) as float64; raise ValueError for others."""
         try:
             values = np.asarray(proposals)
             if values.dtype.kind == "c":
@@ -228,15 +242,21 @@ class Problem:
 
     @property
     def remaining_evaluations(self) -> float:
-        """How many evaluations the budget has left; infinite without one."""
+        """The number of evaluations left in the budget; infinite without a budget."""
         return np.inf if self.budget is None else self.budget - self.evaluations
 
     @property
     def best(self) -> Array:
-        """The best proposal (d,) so far, as it was evaluated. Raises ValueError before there is one."""
+        """The best proposal (d,) so far, as it was evaluated.
+
+        Raises:
+            ValueError: no proposal has a finite cost yet.
+
+        """
         if not self._falls:
             raise InputError(
-                f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost"
+                f"{self.id} must have been evaluated,"
+                f" got {self.evaluations} evaluations and no cost"
             )
         return self._falls[-1][2].copy()
 
@@ -248,9 +268,9 @@ class Problem:
 
     @property
     def trace(self) -> tuple[Array, Array]:
-        """The evaluations (k,) at which the cost fell, and the last one; with the best cost (k,) at each.
+        """The evaluations (k,) at which the cost fell, and the best cost (k,) at each.
 
-        It begins with the first cost that is a finite number.
+        The last evaluation is added. The trace begins with the first finite cost.
         """
         used = [float(used) for used, _, _ in self._falls]
         costs = [cost for _, cost, _ in self._falls]
@@ -291,7 +311,7 @@ class Problem:
         return np.zeros(self.dimension) if start is None else start.mean.copy()
 
     def initial_solution_proposal(self, restart: int = 0) -> Array:
-        """Return the proposal (d,) to start from first, and a random one for each restart."""
+        """Return the proposal (d,) to start from, or a random one for a restart."""
         if not restart:
             return self.initial_solution
         rng = np.random.default_rng([getattr(self, "instance", 0), restart])
@@ -299,13 +319,14 @@ class Problem:
         return drawn
 
     def __getattr__(self, name: str) -> Any:
-        # only called for what a problem lacks; `cost` itself is missing in a copy that is being made
+        # only called for attributes that a problem lacks; `cost` itself is missing in a
+        # copy while it is made
         if name.startswith("_") or name == "cost" or not hasattr(self.cost, name):
             raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
         return getattr(self.cost, name)
 
     def __copy__(self) -> "Problem":
-        """Return a problem with the same count, best and trace, which are its own from now on."""
+        """Return an independent problem with the same count, best and trace."""
         twin: Problem = object.__new__(Problem)
         twin.__dict__.update(self.__dict__, cost=copy(self.cost), _falls=[*self._falls])
         return twin
@@ -315,8 +336,9 @@ class Problem:
 
     def __getstate__(self) -> Any:
         raise PicklingError(
-            f"{self.id} counts evaluations in its own process and cannot be sent to another: make it there, as with "
-            "posefit.suite, or give it whole populations, in one process"
+            f"{self.id} counts evaluations in its own process and cannot be sent to"
+            " another: make it there, as with posefit.suite, or give it whole"
+            " populations, in one process"
         )
 
     def __repr__(self) -> str:
@@ -325,9 +347,10 @@ class Problem:
 
 @final
 class Problems:
-    """n problems side by side, a row each: they count and remember in arrays what one `Problem` does by itself.
+    """Several problems, one per row: counts and bests as arrays.
 
-    Their proposals are evaluated together, in one compiled call, by whoever owns them, and then counted here.
+    The owner evaluates their proposals together, in one compiled call, and then counts
+    them here.
     """
 
     def __init__(self, count: int, dimension: int) -> None:
@@ -340,17 +363,17 @@ class Problems:
         return len(self.evaluations)
 
     def __getitem__(self, row: int) -> Problem:
-        """Return the problem of a row for a search of its own: nothing of it is evaluated yet."""
+        """Return the problem of a row as a new `Problem`, without evaluations."""
         return self._makers[range(len(self))[row]]()
 
     def begin(self, row: int, make_problem: Callable[[], Problem]) -> None:
-        """Start a row afresh: its count and its best are reset, and `make_problem` makes its problem when asked for."""
+        """Reset the count and the best of a row; `make_problem` makes its problem."""
         self._makers[row] = make_problem
         self.evaluations[row] = 0
         self.best_costs[row] = np.inf
 
     def count(self, rows: NDArray[np.int64], proposals: Array, costs: Array) -> None:
-        """Count the proposals (m, k, d) of some rows (m,), which cost (m, k), and remember the best of each."""
+        """Count proposals (m, k, d) with costs (m, k) in rows (m,); keep the best."""
         self.evaluations[rows] += costs.shape[1]
         least = costs.min(axis=1)
         better = np.flatnonzero(least < self.best_costs[rows])

@@ -1,7 +1,8 @@
-"""A race of modes: where a search may start in several places, each is searched a little, and the best ones longer.
+"""A race of modes: short searches from several starts, then long ones from the best.
 
-The first costs say which starts are worth a search at all, and the costs after a short search which of them are worth
-the rest of the budget. Each search is a problem; together they have the budget of one.
+The weights tell which starts are worth a short search, and the costs after it which are
+worth the rest of the budget. Each search is a problem; together they have the budget of
+one.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,13 +13,13 @@ import numpy as np
 from posefit.fitting.box import Start
 from posefit.fitting.problem import Problem
 
-# ours, as all that follow: of the weight of the likeliest start; less likely ones are
-# not searched
+# All constants are ours. Starts with less than this share of the likeliest start's
+# weight are not searched.
 MIN_WEIGHT = 0.05
-SHORT_SHARE = 0.5  # of the budget: for a short search from each start
-MIN_SHORT = 40  # evaluations of a short search
-FINALISTS = 2  # that are searched longer
-# of the spread of a start: what a finalist starts with, around its best proposal
+SHORT_SHARE = 0.5  # share of the budget for the short searches
+MIN_SHORT = 40  # evaluations of a short search, at least
+FINALISTS = 2  # starts that are searched longer
+# A finalist starts around its best proposal with this share of its first spread.
 FINAL_SPREAD = 0.5
 
 # Searches from a start within a number of evaluations.
@@ -26,7 +27,7 @@ Search = Callable[[Start, int], Problem]
 
 
 def race(starts: Sequence[Start], search: Search, budget: int) -> list[list[Problem]]:
-    """Return the searches from each start that took part, in a budget of evaluations; the cheapest start first.
+    """Return the searches from each start that took part, the cheapest start first.
 
     Args:
         starts: where to search, the likeliest first.
@@ -34,7 +35,7 @@ def race(starts: Sequence[Start], search: Search, budget: int) -> list[list[Prob
         budget: the evaluations of all searches together.
 
     Returns:
-        The problems of each start: its short search, and the long one if it was a finalist.
+        The problems of each start: its short search, and the long one of a finalist.
 
     """
     short_budget = int(SHORT_SHARE * budget)

@@ -1,4 +1,7 @@
-"""The build of one person: factors on the bone lengths and radii of a body, fitted to a few frames with the poses."""
+"""The build of one person: factors on bone lengths and radii, fitted to a few frames.
+
+The poses of the frames are fitted in turns with the build.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -44,12 +47,15 @@ NAMES = (
     *(f"{name} girth" for name in GIRTHS),
 )
 
-# How far adults differ: standard deviations and correlations of the logarithms of lengths over stature, of the 4082 men
-# and 1986 women of ANSUR II (Gordon et al. 2014, NATICK/TR-15/007) with either sex weighing the same. Computed from its
-# public data: thighs trochanterion to lateral femoral epicondyle, shanks from there to the lateral malleolus, feet foot
-# length, torso trochanterion to cervicale, neck cervicale to the crown, shoulders biacromial breadth, upper arms
-# acromion to radiale, forearms radiale to stylion and the hand. No measure of it is the distance of the hip joints:
-# theirs is ours, and so are girths, which are wide, as clothes count, and scale, wider than adults' 0.054.
+# How much adults differ: standard deviations and correlations of the logarithms of
+# lengths over stature. They are computed from the public data of ANSUR II (Gordon et
+# al. 2014, NATICK/TR-15/007), 4082 men and 1986 women, with equal weight of both sexes.
+# Measures: thighs trochanterion to lateral femoral epicondyle, shanks from there to the
+# lateral malleolus, feet foot length, torso trochanterion to cervicale, neck cervicale
+# to the crown, shoulders biacromial breadth, upper arms acromion to radiale, forearms
+# radiale to stylion and the hand. ANSUR II does not measure the distance of the hip
+# joints, so its spread is ours. So are the spreads of girths, which are wide because
+# clothes count, and of scale, which is wider than the 0.054 of adults.
 PROPORTIONS_SPREAD = {
     "thighs": 0.049,
     "shanks": 0.044,
@@ -75,25 +81,26 @@ PROPORTIONS_CORRELATION = np.array(
 SCALE_SPREAD = 0.10
 HIPS_SPREAD = 0.06
 GIRTH_SPREAD = 0.30
-# by how much more a length between joints differs than one between landmarks on the
-# skin; ours
+# Added spread of lengths between joints, over lengths between landmarks on the skin.
+# Ours.
 JOINT_SPREAD = 0.01
-REACH = 3.0  # spreads to either side that are searched
+REACH = 3.0  # the search reaches this many spreads to either side
 PULL = 0.15  # cost of a build that is one spread away from the average
-# Of poses with the body, then of the body with the poses: the spread of CMA-ES's first draws, in spreads of
-# people, and its generations. The second round begins near the end of the first.
+# Each round fits the poses with the body, and then the body with the poses. It has the
+# spread of CMA-ES's first draws, in spreads of people, and the number of generations.
+# The second round begins near the end of the first.
 ROUNDS = ((0.5, 60), (0.2, 20))
 
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
-    """Return which bones (26, groups) belong to which group, as 0 and 1."""
+    """Return which bones belong to which group, (26, groups) of 0 and 1."""
     return np.array(
         [[float(kind(bone) in group) for group in groups.values()] for bone in BONES]
     )
 
 
 def _covariance() -> Array:
-    """Return the covariance (17, 17) of the logarithms of people's factors, in the order of `NAMES`."""
+    """Return the covariance (17, 17) of the logarithms of factors, as in `NAMES`."""
     spread = np.array(
         [
             SCALE_SPREAD,
@@ -117,15 +124,16 @@ _GIRTHS = _members(GIRTHS)
 COVARIANCE = _covariance()
 SPREAD = np.sqrt(np.diag(COVARIANCE))
 PRECISION = np.linalg.inv(COVARIANCE)
-# What any length may be off although contours agree, as people are no cones: about the least that four cameras leave
-# of people whose radii differ bone by bone, 2.0 to 3.5 % on average (docs/studies/builds.py).
+# Error of lengths that stays when contours agree, because people are not cones. It is
+# about the least error with four cameras of people with different radii on each bone,
+# 2.0 to 3.5 % on average (docs/studies/builds.py).
 MODEL_SPREAD = np.array([0.0, *[0.03] * len(LENGTHS), *[0.0] * len(GIRTHS)])
-# of independent factors of deviation 1, those of people
+# Maps independent numbers of deviation 1 to the logarithms of people's factors.
 _ROOT = np.linalg.cholesky(COVARIANCE)
 
 
 def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
-    """Return a body with its lengths and radii multiplied by factors (17,), in the order of `NAMES`.
+    """Return a body with lengths and radii multiplied by factors (17,), see `NAMES`.
 
     With a `height` in metres the result is scaled to it.
     """
@@ -138,7 +146,7 @@ def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
 
 
 def _scales(factors: Array) -> tuple[Array, Array]:
-    """Return the scales of bones' lengths and of their girths (m, 26) by factors (m, 17)."""
+    """Return scales of bones' lengths and girths (m, 26), from factors (m, 17)."""
     scale = factors[:, :1]
     lengths, girths = np.split(np.log(factors[:, 1:]), [len(LENGTHS)], axis=1)
     return scale * np.exp(lengths @ _LENGTHS.T), scale * np.exp(girths @ _GIRTHS.T)
@@ -146,18 +154,18 @@ def _scales(factors: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A fitted body, and how uncertain its factors are."""
+    """A fitted body, and the uncertainty of its factors."""
 
     body: Body
     factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
     # (17,) standard deviation of each factor's logarithm
     spread: Array = field(repr=False)
     cost: float  # mean over the frames
-    # metres, to which it was scaled; None where it was fitted
+    # metres, the given height, or None if it was fitted
     height: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the build as summary.json holds it."""
+        """Return the build's entry in summary.json."""
         factors, spread = (
             dict(zip(NAMES, values.tolist(), strict=True))
             for values in (self.factors, self.spread)
@@ -182,16 +190,27 @@ def fit_shape(
     beta: float = BETA,
     threads: int = 1,
 ) -> Shape:
-    """Return the shape that fits all observations best, fitted in turns with their poses.
+    """Return the shape that fits all observations best, fitted in turns with the poses.
 
-    `follow` tracks the observations with a body. With a `height` in metres the person is so tall; one camera alone
-    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. `beta`
-    is that of the cost, and any number of `threads` gives the same shape. How uncertain the factors are is not known
-    yet: their `spread` is that of all people.
+    The uncertainty of the factors is not known yet: their `spread` is that of all
+    people.
+
+    Args:
+        body: The body that is scaled.
+        cameras: The cameras.
+        observations: The frames.
+        follow: Tracks the observations with a body.
+        rng: The random numbers.
+        height: The person's height in metres, or None if it is fitted. One camera alone
+            cannot show how large a person is.
+        aligned: Whether the places of poses are aligned, for each body that is tried.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
+        threads: Number of threads. Does not change the result.
+
     """
 
     def cost(factors: Array) -> Array:
-        """Return the mean costs (m,) of the frames, whose poses are held, for factors (m, 17)."""
+        """Return the mean costs (m,) of the frames for factors (m, 17)."""
         offsets, radii = scaled_bodies(body, *_scales(factors), height)
         return held.costs(offsets, radii, aligned, beta, threads)
 
@@ -206,7 +225,10 @@ def fit_shape(
 
 @dataclass(frozen=True, eq=False)
 class FactorBox:
-    """The box that builds are searched in: [-1, 1]^17, whose half-range is `REACH` spreads of uncorrelated numbers."""
+    """The box in which builds are searched, [-1, 1]^17.
+
+    Its half-range is `REACH` spreads of uncorrelated numbers.
+    """
 
     start: Start
     dimensions: int = len(NAMES)
@@ -232,15 +254,15 @@ def _search(
     """
 
     def evaluate(proposals: Array) -> Array:
+        """Return the costs (m,) of proposals, with a pull to the average build."""
         points = REACH * proposals  # in spreads of people
         logs = np.array([_ROOT @ point for point in points])
         pulls = np.array([PULL * float(point @ point) for point in points])
         return np.asarray(cost(np.exp(logs)) + pulls)
 
     mean = np.clip(np.linalg.solve(_ROOT, np.log(start)) / REACH, -1.0, 1.0)
-    box = FactorBox(
-        Start(mean, np.full(len(NAMES), width / REACH), np.zeros(len(NAMES)))
-    )
+    spread = np.full(len(NAMES), width / REACH)
+    box = FactorBox(Start(mean, spread, np.zeros(len(NAMES))))
     population = default_population_size(len(NAMES))
     optimiser = CMAES(box, rng, population_size=population)
     problem = Problem(evaluate, box, population * generations, id="the build")

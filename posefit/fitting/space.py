@@ -1,4 +1,4 @@
-"""The box that optimisers search: proposals in [-1, 1]^d, and the poses they stand for."""
+"""The box that optimisers search: proposals in [-1, 1]^d, and their poses."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -20,7 +20,7 @@ Translation = Literal["known", "searched", "aligned"]  # Interpretation S4
 RootOrder = Literal["yaw_first", "xyz"]
 TRANSLATIONS: tuple[Translation, ...] = ("known", "searched", "aligned")
 
-# ours: how far yaw, pitch and roll are searched to either side
+# Ours: the range of yaw, pitch and roll to either side.
 ROOT_RANGE_DEGREES = (45.0, 15.0, 15.0)
 TRANSLATION_RANGE = (0.5, 0.5, 0.5)  # ours: metres to either side
 
@@ -29,9 +29,10 @@ TRANSLATION_RANGE = (0.5, 0.5, 0.5)  # ours: metres to either side
 class SearchSpace:
     """Maps proposals (n, d) in [-1, 1]^d to poses (n, 66) and translations (n, 3).
 
-    A proposal's coordinates, in this order: root yaw, pitch, roll in radians; the translation in metres, where it is
-    searched; the latents of the prior. Where there is a `tilt`, pitch and roll are what is added to the mean of the
-    latents, and the box of both moves with the last pose.
+    The coordinates of a proposal are, in this order: root yaw, pitch, roll in radians;
+    the translation in metres, if it is searched; the latents of the prior. With a
+    `tilt`, pitch and roll are added to their mean for the latents, and the box of both
+    moves with the last pose.
     """
 
     prior: Latents = field(repr=False)
@@ -60,16 +61,16 @@ class SearchSpace:
         one_of("translation", self.translation, TRANSLATIONS)
         if self.root_order == "xyz" and self.tilt is not None:
             raise InputError(
-                'tilt must be "box" where the root is in the order xyz, got a learned one'
+                'tilt must be "box" where the root is in the order xyz,'
+                " got a learned one"
             )
         for name in ("root_range", "translation_range"):
             reach = np.asarray(getattr(self, name))
             if reach.shape != (3,) or not (
                 np.isfinite(reach).all() and (reach >= 0.0).all()
             ):
-                raise InputError(
-                    f"{name} must be 3 numbers of 0 or more, got {quoted(reach.tolist())}"
-                )
+                came = quoted(reach.tolist())
+                raise InputError(f"{name} must be 3 numbers of 0 or more, got {came}")
         low = np.asarray(self.prior.low)
         high = np.asarray(self.prior.high)
         middle = [self.root_centre, 0.5 * (low + high)]
@@ -86,7 +87,7 @@ class SearchSpace:
 
     @property
     def dimensions(self) -> int:
-        """How many coordinates a proposal has."""
+        """The number of coordinates of a proposal."""
         return len(self.centre)
 
     def around(
@@ -95,9 +96,10 @@ class SearchSpace:
         start: Start | None = None,
         anchor: Array | None = None,
     ) -> "SearchSpace":
-        """Return the space whose yaw range, and searched translation, are centred on coordinates (d,).
+        """Return the space with its yaw range centred on coordinates (d,).
 
-        With a tilt so are pitch and roll, within its range.
+        A searched translation is centred on them too, and so are pitch and roll of a
+        tilt, within its range.
         """
         root = np.array([coordinates[0], *self.root_centre[1:]])
         if self.tilt is not None:
@@ -112,11 +114,11 @@ class SearchSpace:
         )
 
     def coordinates(self, proposals: Array) -> Array:
-        """Return the coordinates (..., d), in radians, metres and latents, of proposals (..., d)."""
+        """Return the coordinates (..., d) of proposals: radians, metres and latents."""
         return self.centre + self.half * proposals
 
     def proposals(self, coordinates: Array) -> Array:
-        """Return the proposals (..., d) of coordinates (..., d), the nearest ones in the box."""
+        """Return the proposals (..., d) in the box nearest to coordinates (..., d)."""
         away = coordinates - self.centre
         away[..., :3] = wrapped(away[..., :3])
         return np.clip(away / np.where(self.half > 0.0, self.half, 1.0), -1.0, 1.0)
@@ -124,8 +126,12 @@ class SearchSpace:
     def decode(self, proposals: Array) -> tuple[Array, Array]:
         """Return the poses (n, 66) and translations (n, 3) of proposals (n, d).
 
-        An aligned translation is only its anchor here; the problem, which has the silhouette, aligns it.
-        Raises InputError where the shape does not fit or a proposal is not finite.
+        An aligned translation is only its anchor here. The problem, which has the
+        silhouettes, aligns it.
+
+        Raises:
+            InputError: The shape is wrong, or a proposal is not finite.
+
         """
         proposals = writeable(proposals)
         d = len(self.centre)
@@ -156,7 +162,7 @@ class SearchSpace:
         return poses, translations
 
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
-        """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
+        """Return which proposals (n, d) lie in the box and are poses. SAPSO 2.2."""
         latents = slice(self.dimensions - len(self.prior.low), None)
         allowed = self.prior.feasible(
             self.centre[latents] + self.half[latents] * proposals[:, latents]
@@ -164,5 +170,5 @@ class SearchSpace:
         return np.asarray(allowed & (np.abs(proposals) <= 1.0).all(axis=1))
 
     def moved(self, proposals: Array, origin: "SearchSpace") -> Array:
-        """Return the proposals (n, d), the nearest in the box, that mean here what these (n, d) mean in `origin`."""
+        """Return the proposals (n, d) nearest to the poses of these in `origin`."""
         return self.proposals(origin.centre + origin.half * proposals)

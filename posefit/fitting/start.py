@@ -1,8 +1,9 @@
-"""Where a search starts when a plugin guesses which poses a frame may show: their modes, and draws around them.
+"""Starts of a search around the poses that a plugin guesses for a frame.
 
-The plugin is an `Initialiser`: `posterior(observation)` returns weighted poses, or None where it knows of none; the
-search is then blind. Poses near each other are a mode. The modes are projected onto the prior's latents, and
-a first population is drawn from all of them. An optimiser sees this as `start` of its space.
+The plugin is an `Initialiser`: `posterior(observation)` returns weighted poses, or None
+for a blind search. Poses near each other form a mode. The modes are projected onto the
+prior's latents, and a first population is drawn around all of them. An optimiser sees
+this as the `start` of its space.
 """
 
 from collections.abc import Sequence
@@ -19,45 +20,44 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, clusters_of, poses_apart
 
 MAX_MODES = 8
-# metres, the mean over joints, beyond which poses are of different modes: a library is
-# that rough
+# Metres, mean over joints. Poses farther apart belong to different modes: a library is
+# about that coarse.
 MODE_RADIUS = 0.2
 MODE_SPREAD = 0.08  # standard deviation of a mode, in half-ranges of the box
-# pixels of the picture in which projected poses are compared, and by how much it is
-# smaller at most
+# Projected poses are compared in a small picture: its least side in pixels, and the
+# greatest factor by which it is smaller.
 MIN_SMALL_SIDE = 40
 MAX_FACTOR = 4
-TEMPERATURE = 2.0  # divides their costs
+TEMPERATURE = 2.0  # divides the costs in the small picture
 INFEASIBLE_COST = 5.0  # added to the cost of a pose that the prior does not allow
-# metres along an axis, and radians, that the right one of searched poses is off
-JOINT_ERROR = 0.06
-ANGLE_ERROR = 0.25
+# Errors of the right one of several searched poses.
+JOINT_ERROR = 0.06  # metres along an axis
+ANGLE_ERROR = 0.25  # radians
 
 
 def modes_apart(
     skeleton: Skeleton, posterior: Posterior
 ) -> list[tuple[float, Posterior]]:
-    """Return the modes of weighted poses, the likeliest first: each with its weight and its poses, its medoid first."""
+    """Return the modes of weighted poses, the likeliest first.
+
+    A mode has a weight and poses, its medoid first.
+    """
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
     clusters = clusters_of(distances, posterior.weights, MODE_RADIUS)[:MAX_MODES]
     modes = []
     for weight, medoid, members in clusters:
         rows = np.append(medoid, members[members != medoid])
-        modes.append(
-            (
-                weight,
-                Posterior(
-                    posterior.poses[rows],
-                    posterior.translations[rows],
-                    posterior.weights[rows],
-                ),
-            )
+        mode = Posterior(
+            posterior.poses[rows],
+            posterior.translations[rows],
+            posterior.weights[rows],
         )
+        modes.append((weight, mode))
     return modes
 
 
 def start_in(cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]) -> Start:
-    """Return the start of a search around modes of what it may show, the likeliest first: see `starts_in`."""
+    """Return the start of a search around modes, with the others; see `starts_in`."""
     first, *others = starts_in(cost, modes)
     return replace(first, others=others)
 
@@ -65,10 +65,11 @@ def start_in(cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]) -> 
 def starts_in(
     cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]
 ) -> list[Start]:
-    """Return a start around each mode of what a search may show, the likeliest first.
+    """Return a start around each mode, the likeliest first.
 
-    Each mode is around that of its poses which, projected onto the latents, costs least in a small picture; these costs
-    weigh the modes again, as a space that cannot show a pose need not be searched there.
+    The poses of a mode are projected onto the latents, and the start is around the pose
+    of least cost in a small picture. These costs give the modes new weights, because a
+    space that cannot represent a pose need not be searched there.
     """
     space = cost.space
     side = min(cost.silhouettes[0].size)
@@ -93,7 +94,10 @@ def starts_in(
 
 
 def coordinates_of(space: SearchSpace, poses: Array, translations: Array) -> Array:
-    """Return the coordinates (n, d) nearest to poses (n, 66); a learned tilt is the one expected of their latents."""
+    """Return the coordinates (n, d) nearest to poses (n, 66).
+
+    A learned tilt is replaced by the tilt expected for the latents.
+    """
     root = poses[:, :3].copy()
     if space.tilt is not None:
         root[:, 1:] = 0.0
@@ -104,7 +108,14 @@ def coordinates_of(space: SearchSpace, poses: Array, translations: Array) -> Arr
 
 
 def posterior_of(poses: Array, places: Array, costs: Array) -> Posterior:
-    """Return what one frame may show, by the poses (n, 66) at which its searches ended: cheaper ones are likelier."""
+    """Return the posterior of a frame from the results of its searches.
+
+    Args:
+        poses: (n, 66) the pose that each search found.
+        places: (n, 3) metres, their roots.
+        costs: (n,) their costs. Cheaper poses are likelier.
+
+    """
     errors = Recalibration(
         np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR)
     )

@@ -35,58 +35,62 @@ from posefit.silhouette.mask import Areas, Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
 # k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted
-# step
+# step.
 SPREAD = 1.0
-HISTORY_FRAMES = 3  # how far back a prediction looks
-TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
-TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
-RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
-# in the details of a frame: (d,) of its pose in the search space
-COORDINATES = "coordinates"
-# Interpretation S5: their floor, in half-ranges of the box, so that a still subject
-# keeps some spread
+# Interpretation S5: the floor of these deviations, in half-ranges of the box, so that a
+# still subject keeps some spread.
 FLOOR = 0.05
-# of a frame: with fewer, a guess would leave too few for a search. Ours
+HISTORY_FRAMES = 3  # frames that a prediction looks back
+TILT_SHARE = 0.99  # ours: the search covers the tilts of this share of training poses
+TILT_MARGIN_DEGREES = 5.0  # ours: about the difference between people's ways to stand
+RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
+# Key in the details of a frame: the coordinates (d,) of its pose in the search space.
+COORDINATES = "coordinates"
+# Evaluations of a frame. With fewer, a guess would leave too few for a search. Ours.
 MIN_GUESSED_EVALUATIONS = 100
 
 
 @dataclass(frozen=True)
 class Observation:
-    """What is known of one frame: a silhouette a camera, and the root's translation where that is known."""
+    """The evidence of one frame: one silhouette per camera, and what else is known."""
 
     silhouettes: Sequence[Silhouette] = field(repr=False)
-    translation: Array | None = None  # (3,) metres
-    # False: it shows too little to learn from, and a tracker holds its pose
+    translation: Array | None = None  # (3,) metres, the root, or None if unknown
+    # False: the frame shows too little of the person, and a tracker holds its pose
     usable: bool = True
-    # radians: about which way the person faces; None where it is unknown
+    # radians, roughly the way that the person faces, or None if unknown
     yaw: float | None = None
-    # (V, 27, 3) of joints: column and row, pixels, and confidence, 0 to 1, 0 for an unknown joint; None for none at all
+    # (V, 27, 3) column and row of each joint in pixels, and confidence, 0 to 1, 0 for
+    # an unknown joint; None without a detector
     landmarks: Array | None = field(default=None, repr=False)
-    # of an earlier track, to be tried among others: the pose (66,) and the root's place (3,) metres
+    # the pose (66,) and the root (3,) in metres of an earlier track, a candidate
     estimate: tuple[Array, Array] | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a tracker estimates in one frame; the time it took is measured where the tracker is driven."""
+    """The estimate of a tracker in one frame.
+
+    The loop that drives the tracker measures the time.
+    """
 
     pose: Array = field(repr=False)  # (66,)
     translation: Array  # (3,) metres
     cost: float
     areas: Areas = field(repr=False)  # (views, 3): R, B, Y
     evaluations: int
-    # (k, 2) the evaluations at which the cost fell, and the last one; with the best cost at each
+    # (k, 2) evaluations at which the cost fell, and the last one, with the best cost
     trace: Array = field(default_factory=lambda: np.empty((0, 2)), repr=False)
-    # what else it may be, where a tracker reports it
+    # the distribution of poses, or None if the tracker reports none
     posterior: Posterior | None = field(default=None, repr=False)
-    # how likely it is that the frame is lost, 0 to 1, where a tracker reports it
+    # probability that the frame is lost, or None if the tracker reports none
     lost: float | None = None
-    # what the person does, such as "walk", where a tracker reports it
+    # the activity of the person, such as "walk", or None if the tracker reports none
     activity: str | None = None
-    # whatever else a tracker reports
+    # anything else that the tracker reports
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     seconds: float = 0.0
-    # of all threads of the process: unlike `seconds` it does not grow on a busy machine
+    # CPU time of all threads; unlike `seconds` it does not grow on a busy machine
     cpu_seconds: float = 0.0
 
     @property
@@ -101,38 +105,40 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a tracker knows before the first frame."""
+    """The knowledge of a tracker before the first frame."""
 
     body: Body
     cameras: Sequence[Camera]
     evaluations: int  # the budget of a frame
-    # radians: about where the person faces in the first frame; None for anywhere
+    # radians, roughly the way that the person faces in the first frame; None: unknown
     yaw: float | None
-    # (3,) metres: about where the person's root is in the first frame, unless
-    # observations tell
+    # (3,) metres, roughly the root in the first frame, unless observations have it
     anchor: Array
     translation: Translation = "known"  # Interpretation S4
     fps: float = 30.0
-    # what may be learned from
+    # motions to learn from
     training: Sequence[Motion] = field(default=(), repr=False)
-    # (63,) joint angles in the first frame, where they are known
+    # (63,) joint angles in the first frame, or None if they are unknown
     first_pose: Array | None = None
-    # what the first frame may show, where it was guessed: modes with their weights, see `posefit.fitting.start`
+    # guessed modes of the first frame with their weights, see `posefit.fitting.start`
     modes: Sequence[tuple[float, Posterior]] = field(default=(), repr=False)
-    # guesses them; None for a blind search
+    # builds what guesses the modes; None for a blind search
     start: "InitialiserFactory | None" = field(default=None, repr=False)
-    # earlier ones, where an interrupted track goes on
+    # earlier frames of a track that is continued
     before: Sequence[Frame] = field(default=(), repr=False)
-    # whether frames hold what a filter carries, so that another process can go on
+    # whether frames hold the state of a filter, so that another process can continue
     resumable: bool = False
     threads: int = 1
     # whether observations and training come in reverse, the last one first
     backwards: bool = False
-    # radians a second that the yaw turns at most; None where it is unknown
+    # radians a second, the fastest turn of the yaw, or None if unknown
     fastest_turn: float | None = None
 
     def __post_init__(self) -> None:
-        """Count the angles of all training about the axes of the body's skeleton: turns in space stay what they are."""
+        """Express training angles about the axes of the body's skeleton.
+
+        The rotations in space stay the same.
+        """
         training = [
             motion.about_axes_of(self.body.skeleton) for motion in self.training
         ]
@@ -140,14 +146,15 @@ class Task:
 
     @property
     def angles(self) -> Array:
-        """The joint angles (T, 63) of all motions that may be learned from."""
+        """The joint angles (T, 63) of all training motions."""
         return np.concatenate([motion.poses[:, 3:] for motion in self.training])
 
 
 class Tracker(Protocol):
     """Follows a person through a sequence; nothing to inherit.
 
-    It takes one observation before it yields a frame, unless it is registered as one that looks ahead.
+    It takes one observation before it yields a frame, unless it is registered with
+    `looks_ahead`.
     """
 
     def track(
@@ -166,20 +173,21 @@ class Initialiser(Protocol):
     """Guesses which poses an observation may show; nothing to inherit."""
 
     def posterior(self, observation: Observation) -> Posterior | None:
-        """Return weighted poses with their translations; None where it knows of none, and the search is blind."""
+        """Return weighted poses with translations, or None for a blind search."""
         ...
 
 
-# Builds an initialiser, as `factory(task, **settings)`: a Task and keyword-only settings.
+# Builds an initialiser, as `factory(task, **settings)`, with keyword-only settings.
 InitialiserFactory = Callable[..., Initialiser]
 
 
 def guessed_modes(
     task: Task, observation: Observation
 ) -> Sequence[tuple[float, Posterior]]:
-    """Return the modes of what an observation may show; none where nothing guesses them, or the pose is known.
+    """Return the guessed modes of the poses that an observation may show.
 
-    A very small budget is for the search alone.
+    There are none if the pose is known, if the task has nothing that guesses, or if the
+    budget is so small that the search needs all of it.
     """
     if task.start is None or task.first_pose is not None or not observation.usable:
         return ()
@@ -191,19 +199,26 @@ def guessed_modes(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Prediction:
-    """Where the next frame's pose is sought, where the search starts, and what a pose costs. SAPSO (4), (6), (7).
+    """The box of a search, its start, and the cost of a pose. SAPSO (4), (6), (7).
 
     Settings:
-        spread (k): standard deviations of the start, as multiples of the predicted step, 0 or more. Interpretation S5.
-        floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Interpretation S5.
-        root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
-        tilt: pitch and roll are "learned" with the latents, or a "box" around upright; by default learned, and a box
-            to the letter of the paper. Interpretation S16.
-        beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
-        start: what guesses the first pose where the yaw is unknown, by name, "blind" for nothing; by default "lookup".
-        relocalise_gap: in footage, frames of a gap after which several starts look all around; 0 never. Ours.
-        variant: "paper" is the letter of SAPSO's paper: the step before the latest (Interpretation S12), a box of tilts
-            (S16), and a root that turns about x, then y, then z (S3).
+        spread (k): standard deviations of the start, as multiples of the predicted
+            step, 0 or more. Interpretation S5.
+        floor: their least value, in half-ranges of the box, above 0, so that a still
+            subject keeps some spread. Interpretation S5.
+        root_range_degrees: range of yaw, pitch and roll to either side of the last
+            frame's. Ours.
+        tilt: pitch and roll are "learned" with the latents, or a "box" around upright.
+            Default: learned; a box with variant "paper". Interpretation S16.
+        beta: weight of the missed share, 0 to 1; the spilled share has 1 - beta. SAPSO
+            (4).
+        start: name of the start that guesses the first pose if the yaw is unknown,
+            "blind" for none. Default: "lookup".
+        relocalise_gap: in footage, frames of a gap after which several starts search
+            all yaws; 0: never. Ours.
+        variant: "paper" follows SAPSO's paper to the letter: the step before the latest
+            (Interpretation S12), a box of tilts (S16), and a root that turns about x,
+            then y, then z (S3).
     """
 
     spread: float = SPREAD
@@ -228,20 +243,25 @@ class Prediction:
         whole("relocalise_gap", self.relocalise_gap, 0)
 
     def tilted(self, prior: Latents, training: Sequence[Motion]) -> Tilt | None:
-        """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""
-        if (
-            self.tilt or ("box" if self.variant == "paper" else "learned")
-        ) == "box" or not training:
+        """Return the tilt learned with the latents, or None for a box of tilts."""
+        tilt = self.tilt
+        if tilt is None:
+            tilt = "box" if self.variant == "paper" else "learned"
+        if tilt == "box" or not training:
             return None
-        return Tilt.of(
-            prior, training, TILT_SHARE, float(np.radians(TILT_MARGIN_DEGREES))
-        )
+        margin = float(np.radians(TILT_MARGIN_DEGREES))
+        return Tilt.of(prior, training, TILT_SHARE, margin)
 
 
 class Predictor:
-    """Goes from frame to frame: gives the space of the next one, and takes the best proposal in it.
+    """Predicts the space of the next frame, and takes the best proposal in it.
 
-    A `tilt` that was learned from the task's training before is not learned again.
+    Args:
+        task: The task.
+        prior: The fitted prior.
+        prediction: The settings.
+        tilt: The tilt, if it was learned from the task's training before.
+
     """
 
     def __init__(
@@ -259,7 +279,8 @@ class Predictor:
         if task.yaw is None:
             reach[0] = np.pi
         centre = np.array([task.yaw or 0.0, 0.0, 0.0])
-        if self._tilt is not None:  # the first frame looks at all tilts
+        # the first frame searches all tilts
+        if self._tilt is not None:
             centre[1:], reach[1:] = self._tilt.around(np.zeros(2), np.full(2, np.inf))
         self._space = SearchSpace(
             prior,
@@ -277,26 +298,30 @@ class Predictor:
         ]
         # coordinates of the latest gbest, the newest last
         self._latest: list[Array] = earlier[-HISTORY_FRAMES:]
-        self.guess_evaluations = 0  # that the guess of the latest start took
+        self.guess_evaluations = 0  # evaluations of the guess of the latest start
 
     def space(self, observation: Observation) -> SearchSpace:
-        """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
+        """Return the box of the next frame, with the start in it. SAPSO (6), (7).
+
+        It is centred on the last result.
+        """
         self.guess_evaluations = 0
-        self._space = (
-            self._next_space(observation.translation)
-            if self._latest
-            else self._first_space(observation)
-        )
+        if self._latest:
+            self._space = self._next_space(observation.translation)
+        else:
+            self._space = self._first_space(observation)
         return self._space
 
     def commit(self, proposal: Array) -> None:
         """Take the best proposal (d,) of the latest space."""
-        self._latest = [*self._latest, self._space.coordinates(proposal)][
-            -HISTORY_FRAMES:
-        ]
+        latest = [*self._latest, self._space.coordinates(proposal)]
+        self._latest = latest[-HISTORY_FRAMES:]
 
     def _first_space(self, observation: Observation) -> SearchSpace:
-        """Return the box of the first frame: it starts around guessed modes, a known pose, or anywhere."""
+        """Return the box of the first frame.
+
+        The search starts around guessed modes or a known pose, or anywhere.
+        """
         task = self._task
         space = self._space
         if observation.translation is not None:
@@ -313,9 +338,10 @@ class Predictor:
     def _guessed_start(
         self, space: SearchSpace, observation: Observation
     ) -> tuple[Start | None, int]:
-        """Return the start around guessed modes, if there are any, and the evaluations that the guess took.
+        """Return the start around guessed modes, or None, and the guess's evaluations.
 
-        An initialiser is a plugin, and counts nothing: the poses that it draws are counted.
+        An initialiser is a plugin and does not count its evaluations. So the poses that
+        it rasterises are counted.
         """
         task = self._task
         drawn = PoseCount()
@@ -334,21 +360,21 @@ class Predictor:
         return start, math.ceil(drawn.poses / len(task.cameras))
 
     def _next_space(self, anchor: Array | None) -> SearchSpace:
-        """Return the box around the last result, whose start is spread as wide as the last step."""
+        """Return the box around the last result, with the last step as its spread."""
         latest = self._latest
         space = self._space
-        # only the first frame looks all around
+        # only the first frame searches all yaws
         if self._task.yaw is None or self._tilt is not None:
             reach = np.radians(self._prediction.root_range_degrees)
             if self._tilt is not None:
                 reach[1:] = self._tilt.around(space.root_centre[1:], reach[1:])[1]
             space = replace(space, root_range=reach)
         space = space.around(latest[-1], anchor=anchor)
-        # Interpretation S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
+        # Interpretation S12: v_pred = gbest_t - gbest_{t-1}, zero without such a pair
         back = 2 if self._prediction.variant == "paper" else 1
         step = np.zeros(space.dimensions)
         if len(latest) > back:
-            # as in proposals: 0 where nothing is searched
+            # avoids a division by 0 in coordinates that are not searched
             half = np.where(space.half > 0.0, space.half, 1.0)
             step = displacement(space, latest[-back - 1] / half, latest[-back] / half)
         mean = space.proposals(latest[-1])
@@ -359,7 +385,10 @@ class Predictor:
         return space.around(latest[-1], Start(mean, spread, step), anchor)
 
     def _start_at_known_pose(self, space: SearchSpace, angles: Array) -> Start:
-        """Return the start of a first frame whose joint angles are about known; its root need not be."""
+        """Return the start of a first frame with roughly known joint angles (63,).
+
+        The root need not be known.
+        """
         latents = self._prior.transform(np.asarray(angles, dtype=np.float64)[None])[0]
         first = space.dimensions - len(latents)
         root = space.centre[:first].copy()
@@ -373,10 +402,10 @@ class Predictor:
 
 @dataclass(frozen=True, eq=False)
 class SynthesisTracker:
-    """Follows a person by a search a frame, started around a prediction. SAPSO section 4.
+    """Follows a person by one search per frame, around a prediction. SAPSO section 4.
 
-    `make` builds an optimiser from a space, a generator and the evaluations of its search; `next_frame` says what
-    becomes of it in the next frame.
+    `make` builds an optimiser from a space, a generator and the evaluations of its
+    search. `next_frame` tells what becomes of it in the next frame.
     """
 
     task: Task
@@ -384,13 +413,13 @@ class SynthesisTracker:
     make: OptimiserMaker
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
-    # of the prior and the training, where it was learned before
+    # the tilt, if it was learned from the prior and the training before
     tilt: Tilt | None = field(default=None, repr=False)
 
     def track(
         self, observations: Iterable[Observation], rng: np.random.Generator
     ) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
+        """Yield a `Frame` for each observation; only a few are in memory at a time."""
         task = self.task
         predictor = Predictor(self.task, self.prior, self.prediction, self.tilt)
         optimiser: Optimiser | None = None
@@ -402,7 +431,8 @@ class SynthesisTracker:
                 yield latest
                 continue
             budget = task.evaluations - predictor.guess_evaluations
-            # of a single picture, which nothing that follows can correct: a track goes on from one swarm as well
+            # Only for a single picture, because later frames cannot correct it. A track
+            # recovers from the wrong mode with one swarm as well.
             alone = self.next_frame == "start" and len(task.modes) > 1
             if alone and space.start is not None and space.start.others:
                 searches = self._raced(space, observation, budget, rng)
@@ -431,7 +461,7 @@ class SynthesisTracker:
     def _revived(
         self, space: SearchSpace, rng: np.random.Generator
     ) -> Optimiser | None:
-        """Return the filter that the frames before this track held; None if they held none."""
+        """Return the filter held by the frames before this track, or None."""
         for frame in reversed(self.task.before):
             if state := frame.details.get(CARRIED):
                 evaluations = self.task.evaluations
@@ -445,7 +475,7 @@ class SynthesisTracker:
         budget: int,
         rng: np.random.Generator,
     ) -> list[list[Problem]]:
-        """Return the searches from each of the modes that a frame may show, the best first."""
+        """Return the searches from each mode of a frame, the best mode first."""
         assert space.start is not None
 
         def search(start: Start, evaluations: int) -> Problem:
@@ -460,7 +490,10 @@ class SynthesisTracker:
     def _held(
         self, latest: Frame | None, space: SearchSpace, observation: Observation
     ) -> Frame:
-        """Return the latest frame once more, at no evaluation; before the first one, the middle of the box."""
+        """Return the latest frame again, without evaluations.
+
+        Before the first frame it is the middle of the box.
+        """
         poses, places = space.decode(np.zeros((1, space.dimensions)))
         if latest is not None:
             poses = latest.pose[None]
@@ -475,7 +508,7 @@ class SynthesisTracker:
     def problem(
         self, space: SearchSpace, observation: Observation, budget: int
     ) -> Problem:
-        """Return the problem that a frame is: its pose in a space, within a budget."""
+        """Return the problem of a frame: its pose in a space, within a budget."""
         task = self.task
         cost = SilhouetteCost(
             task.body,
@@ -492,17 +525,18 @@ class SynthesisTracker:
 def _frame(
     best: Problem, searches: Sequence[Sequence[Problem]], guess_evaluations: int
 ) -> Frame:
-    """Return the frame of the best of some searches, with the evaluations of all and of the guess before them.
+    """Return the frame of the best search, with the evaluations of all and the guess.
 
-    Several modes of what the frame may show are its posterior.
+    If several modes were searched, they are its posterior.
     """
     poses, translations = best.decode(best.best[None])
-    with uncounted():  # its result drawn again is no evaluation
+    # rasterising the result again is no evaluation
+    with uncounted():
         areas = best.cost_and_areas(poses, translations)[1][:, 0]
     problems = [problem for mode in searches for problem in mode]
     evaluations = guess_evaluations + sum(each.evaluations for each in problems)
     used, costs = best.trace
-    # the course of the best search, behind all that went on beside it
+    # the trace of the best search, as if it came after all others
     trace = np.column_stack([used + (evaluations - best.evaluations), costs])
     return Frame(
         poses[0],
@@ -517,7 +551,7 @@ def _frame(
 
 
 def _posterior(searches: Sequence[Sequence[Problem]]) -> Posterior:
-    """Return what a frame may show, by the poses at which the searches of its modes ended."""
+    """Return the posterior of a frame, from the results of searching its modes."""
     bests = [cheapest(problems) for problems in searches]
     decoded = [best.decode(best.best[None]) for best in bests]
     poses = np.concatenate([poses for poses, _ in decoded])

@@ -1,4 +1,7 @@
-"""What plugins return in a run is checked once: a broken rule ends it, with one line that names plugin and call."""
+"""Checks of the answers of plugins in a run.
+
+A broken rule ends the run, with one line that names the plugin and the call.
+"""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -18,21 +21,28 @@ from posefit.fitting.problem import BudgetError
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton
 from posefit.silhouette.drawn import PoseCount
 
-FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
+FEASIBILITY_SAMPLES = 1000  # a prior must find at least one of these poses feasible
 JOINT_ANGLES = 63
-FIXED_TOLERANCE = 1e-9  # radians, as an .amc file is written
-POSEFIT = Path(__file__).parents[1]  # whose lines are not a plugin's
+FIXED_TOLERANCE = 1e-9  # radians, the precision of an .amc file
+POSEFIT = Path(__file__).parents[1]  # files in this folder are not a plugin's
 
 
 class BrokenRuleError(InputError):
-    """A plugin broke one of the rules that its kind has to keep; it is shown in one line, as a user's mistake."""
+    """A plugin broke a rule of its kind. It is shown in one line, as a user mistake."""
 
 
 class Checked:
-    """An optimiser or a prior of a plugin, in a run: a call that fails, or an answer that breaks a rule, names both.
+    """An optimiser or a prior of a plugin, with checked calls.
 
-    Of an optimiser, `space` is what it searches, and `evaluations` the budget of a search, which has to hold the first
-    population. All other rules of plugins stand in `posefit.testing`.
+    The error of a call that fails, or of an answer that breaks a rule, names the plugin
+    and the call. All other rules of plugins are in `posefit.testing`.
+
+    Args:
+        plugin: The optimiser or the fitted prior.
+        name: Its name.
+        space: The space that an optimiser searches, or None for a prior.
+        evaluations: The budget of a search. It must hold the first population.
+
     """
 
     def __init__(
@@ -94,7 +104,8 @@ class Checked:
         # not `plugin_errors`, which takes as long as a few poses
         try:
             answer = self._drawn.during(getattr(self.plugin, what), *arguments)
-        except BrokenRuleError:  # it names another plugin, which this one called
+        except BrokenRuleError:
+            # it names another plugin, which this one called
             raise
         except (Exception, SystemExit) as error:
             raise _broken_by(self.name, what, error) from error
@@ -119,7 +130,7 @@ class Checked:
 
 
 def check_population(proposals: Any, space: Space, name: str) -> None:
-    """Raise BrokenRuleError, which begins with `name`, where proposals are not (n, d) in the box."""
+    """Raise BrokenRuleError, beginning with `name`, unless proposals are in the box."""
     # neither a matrix nor a masked array, which calculate otherwise
     plain = type(proposals) is np.ndarray
     rule = ""
@@ -140,9 +151,15 @@ def check_population(proposals: Any, space: Space, name: str) -> None:
 def plugin_errors(
     name: str, what: str, passed: tuple[type[BaseException], ...] = ()
 ) -> Iterator[None]:
-    """Raise BrokenRuleError, naming the plugin, for whatever the body raises, SystemExit too, but for what is `passed`.
+    """Turn exceptions of the body, SystemExit too, into a BrokenRuleError.
 
     A BrokenRuleError stays as it is: it names another plugin, which this one called.
+
+    Args:
+        name: The name of the plugin.
+        what: The call.
+        passed: Exceptions that are passed on. A ValueError becomes an InputError.
+
     """
     try:
         yield
@@ -183,9 +200,11 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
 
 
 class FreeAxes:
-    """The axes about which the joints of a skeleton turn. Angles about the others are 0, and cannot be written.
+    """The axes about which the joints of a skeleton turn.
 
-    In training angles, (T, 63) each, of another skeleton they may be others; then as far off 0 is allowed.
+    Angles about all other axes are 0, and cannot be written to a file. Training angles,
+    (T, 63) each, of a skeleton with other free axes may differ from 0; the same
+    difference is then allowed.
     """
 
     def __init__(self, skeleton: Skeleton, training: Iterable[Array]) -> None:
@@ -194,7 +213,7 @@ class FreeAxes:
 
     @cached_property
     def _reach(self) -> Array:
-        """How far off 0 the angles may be (n,), which takes long to learn from a large library."""
+        """The largest allowed angles (n,), slow to learn from a large library."""
         reach = np.zeros(len(self._fixed))
         for angles in self._training:
             off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
@@ -209,13 +228,19 @@ class FreeAxes:
         worst = int((off - self._reach).argmax())
         joint, axis = divmod(int(self._fixed[worst]), 3)
         place = f"the {'xyz'[axis]} axis of {JOINTS[INNER[joint]]}"
-        return f"turn joints about their free axes only, got {off[worst]:.3g} rad about {place}"
+        came = f"{off[worst]:.3g} rad about {place}"
+        return f"turn joints about their free axes only, got {came}"
 
 
 def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) -> None:
-    """Raise BrokenRuleError, which begins with `name`, where a prior's range or answers are wrong.
+    """Raise BrokenRuleError if the range or the answers of a prior are wrong.
 
-    `training` (T, 63) are the joint angles that it has learned from, of a person with this skeleton.
+    Args:
+        prior: The fitted prior.
+        training: (T, 63) the joint angles that it has learned from.
+        skeleton: The skeleton of their person.
+        name: The name of the prior. Messages begin with it.
+
     """
 
     def broken(rule: str) -> BrokenRuleError:
@@ -229,7 +254,8 @@ def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) 
         or not (np.isfinite(low).all() and np.isfinite(high).all())
     ):
         raise broken(
-            f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}"
+            "low and high must be finite and of shape (m,),"
+            f" got {low.shape}, {high.shape}"
         )
     for k in np.flatnonzero(low > high):
         raise broken(
@@ -264,5 +290,8 @@ def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) 
             np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn)
         )
     ):
-        came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
+        came = (
+            f"none of {len(sample)} training poses"
+            f" and {FEASIBILITY_SAMPLES} of the range"
+        )
         raise broken(f"feasible must allow some poses, got {came}")

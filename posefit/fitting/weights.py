@@ -1,4 +1,4 @@
-"""Weights of costs, how many samples they are worth, resampling by them, and probabilities of odds."""
+"""Weights of costs, their effective sample size, resampling, and probabilities."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ MAX_LOG_ODDS = 30.0  # ours: beyond it a probability would be 0 or 1
 def weigh(costs: Array, sharpness: float) -> Array:
     """Return the weights (n,), exp(-sharpness cost), which sum to 1.
 
-    A cost that is nan or infinite weighs nothing; where no cost is known, all weigh the same.
+    A cost that is nan or infinite weighs nothing. If all are, all weigh the same.
     """
     known = np.isfinite(costs)
     if not known.any():
@@ -25,14 +25,18 @@ def weigh(costs: Array, sharpness: float) -> Array:
 
 
 def effective_sample_size(weights: Array) -> float:
-    """Return how many equal weights are worth as much as these (n,): 1 over the sum of squares, where they sum to 1."""
+    """Return the number of equal weights that are worth as much as these (n,).
+
+    It is 1 over the sum of their squares, if they sum to 1.
+    """
     return float(weights.sum() ** 2 / (weights**2).sum())
 
 
 def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
-    """Return `count` rows, each as often as its weight times `count`, rounded up or down: systematic resampling.
+    """Return `count` rows, drawn by their weights with systematic resampling.
 
-    `u` in [0, 1) is the offset of the evenly spaced points.
+    A row is drawn as often as its weight times `count`, rounded up or down. `u` in
+    [0, 1) is the offset of the evenly spaced points.
     """
     rows = weights.cumsum().searchsorted((np.arange(count) + u) / count, side="right")
     return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))

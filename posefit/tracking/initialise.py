@@ -1,4 +1,4 @@
-"""What is estimated before the first frame: its pose, by several restarts, and the person's build."""
+"""Estimates before the first frame: its pose, by restarts, and the person's build."""
 
 import math
 from collections.abc import Sequence
@@ -33,19 +33,18 @@ from posefit.tracking.smoothing.path import Visibility
 from posefit.uncertainty.modes import Posterior
 
 MIN_BODY_FRAMES = 5
-# ours: within which a walker hardly turns farther than a search reaches, 45 degrees
+# Our choice: a walker hardly turns farther in this time than a search reaches, which is
+# 45 degrees.
 NEAR_SECONDS = 0.5
 
 
 def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
-    """Return the task of tracking a scene, as far as it is known before anything is searched."""
+    """Return the task of tracking a scene, with what is known before any search."""
     assert options.evaluations is not None
     assert options.translation is not None
-    first_pose = (
-        None
-        if scene.truth is None or options.first_pose == "searched"
-        else scene.truth.poses[0, 3:]
-    )
+    first_pose = None
+    if scene.truth is not None and options.first_pose != "searched":
+        first_pose = scene.truth.poses[0, 3:]
     return Task(
         scene.body,
         scene.cameras,
@@ -61,11 +60,11 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
 
 
 class Initialised(NamedTuple):
-    """What is known before the first frame."""
+    """The task and the build before the first frame."""
 
     task: Task  # with the first pose, if it was searched
-    shape: Shape | None  # the person's build, if it was fitted
-    # (2,) see `posefit.fitting.driving.clocks`, when what draws was compiled
+    shape: Shape | None  # the person's build, or None if it was not fitted
+    # (2,) see `posefit.fitting.driving.clocks`, after the rasteriser was compiled
     start: Array
     effort: dict[str, int]  # evaluations of each stage
 
@@ -73,14 +72,24 @@ class Initialised(NamedTuple):
 def initialise(
     scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress
 ) -> Initialised:
-    """Return a task with its first pose, where it is searched, and the person's build, where it is fitted."""
+    """Search the first pose and fit the person's build, as far as the options ask.
+
+    Args:
+        scene: The scene.
+        method: The method that tracks it.
+        task: The task, from `task_of`.
+        options: The options of the track.
+        progress: Gets messages.
+
+    """
     if task.yaw is None:
         task = replace(task, start=method.start)
     compile_for(scene, task)
     start = clocks()
     shape = None
     effort = dict[str, int]()
-    if scene.count == 1:  # it is one search, by the tracker itself
+    # a single picture is one search, by the tracker itself
+    if scene.count == 1:
         if method.prior is not None and task.start is not None:
             shown = next(iter(scene.observations))
             modes, used = guessed(task, shown)
@@ -120,7 +129,7 @@ def initialise(
 def guessed(
     task: Task, observation: Observation
 ) -> tuple[Sequence[tuple[float, Posterior]], int]:
-    """Return modes of what one picture may show, and the evaluations that these took."""
+    """Return modes of the poses that one picture may show, and their evaluations."""
     drawn = PoseCount()
     with drawn.counting():
         modes = guessed_modes(task, observation)
@@ -138,20 +147,34 @@ def fitted_build(
     beta: float = BETA,
     restarts: int = 0,
 ) -> tuple[Shape, Sequence[Camera]]:
-    """Return the person's build, from the first usable frames, every third, where there are so many; and the cameras.
+    """Return the person's build, fitted to some usable frames, and the cameras.
 
-    Several calibrated ones are turned a little so that their masks agree.
+    Several calibrated cameras are turned a little so that their masks agree.
 
-    It begins with the first frame that shows most: a person who comes in is cut, and visible to few cameras. By then
-    they may have turned from the pose that the task begins with. Where that is longer ago than `NEAR_SECONDS`, the pose
-    is searched again, with so many `restarts`, or by the tracker itself.
+    The frames start from the one that shows most: a person who enters the picture is
+    cut, and visible to few cameras. By then they may have turned away from the first
+    pose of the task. If that frame is later than `NEAR_SECONDS`, the pose is searched
+    again.
+
+    Args:
+        task: The task, with the first pose.
+        scene: The scene.
+        follow: The tracker.
+        frames: How many frames: every third, or successive ones if there are too few.
+        height: The person's height in metres, or None if it is fitted.
+        seed: The seed of the random numbers.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
+        restarts: The restarts of a new search. 0: the tracker itself searches.
+
+    Returns:
+        The build, and the cameras.
+
     """
     observations = scene.observations
     stride = TRIAL_STRIDE
     whole = first_shown_whole(scene.observations)
-    first = next(
-        (k for k, observation in enumerate(observations) if observation.usable), 0
-    )
+    usable = (k for k, observation in enumerate(observations) if observation.usable)
+    first = next(usable, 0)
     chosen = usable_observations(observations, frames, stride, whole)
     if len(chosen) < frames:
         chosen = usable_observations(observations, frames)
@@ -167,9 +190,9 @@ def fitted_build(
     task = replace(task, fps=task.fps / stride)
 
     def frames_of(body: Body) -> list[Frame]:
-        return list(
-            follow(replace(task, body=body), chosen, np.random.default_rng(seed))
-        )
+        """Return the chosen frames, tracked with a body."""
+        rng = np.random.default_rng(seed)
+        return list(follow(replace(task, body=body), chosen, rng))
 
     if scene.cameras_turn:
         filmed = replace(
@@ -201,7 +224,7 @@ def fitted_build(
 
 
 def compile_for(scene: Scene, task: Task) -> None:
-    """Compute the cost of one pose, so that what draws is compiled before the clocks start."""
+    """Compute one cost, which compiles the rasteriser before the clocks start."""
     observation = next(iter(scene.observations))
     with uncounted():
         pose_costs(

@@ -31,7 +31,7 @@ from posefit.tracking.pipeline import track_hypothesis, with_notes
 from posefit.tracking.restarts import SEARCHED, TRIAL_FRAMES, TRIAL_STRIDE
 from posefit.tracking.trajectory import Hypothesis
 
-# the default: `exemplars` takes longer than a frame lasts, and looks ahead
+# The default method. `exemplars` takes longer than a frame lasts, and looks ahead.
 LIVE_METHOD = "sapso@pca"
 FRAMES_FILE = "frames.jsonl"
 POSES_FILE = "poses.npz"
@@ -49,7 +49,7 @@ class LiveFrame:
 
     @property
     def row(self) -> dict[str, Any]:
-        """The frame as frames.jsonl has it."""
+        """The line of the frame in frames.jsonl."""
         return {
             "frame": self.number,
             "seconds": round(self.seconds, 4),
@@ -65,18 +65,29 @@ class LiveFrame:
 def track_live(
     source: str = "-", *, progress: Progress = QUIET, **options: Any
 ) -> Iterator[LiveFrame]:
-    """Yield the tracked frames of a stream; of those that come while one is tracked all but the newest are skipped.
+    """Yield the tracked frames of a stream.
 
-    `source` is as for `posefit.footage.live.Stream`; options are those of `posefit.track`, and the method is
-    `sapso@pca` by default. The first second is buffered, to search the first pose. Raises InputError where an option
-    does not fit or needs all frames, and where the stream breaks off.
+    If several frames arrive while one is tracked, all but the newest are skipped. The
+    first second is buffered, to search the first pose.
+
+    Args:
+        source: The stream, as for `posefit.footage.live.Stream`.
+        progress: Gets messages and warnings.
+        **options: The options of `posefit.track`. The default method is `sapso@pca`.
+
+    Yields:
+        Each tracked frame, as soon as it is tracked.
+
+    Raises:
+        InputError: If an option is invalid or needs all frames, or the stream breaks
+            off.
+
     """
     chosen = TrackOptions(**options)
     for each in fields(chosen):
-        if not declared(each).live and getattr(chosen, each.name) != each.default:
-            raise InputError(
-                f"{each.name} must be left out with live, got {getattr(chosen, each.name)}"
-            )
+        value = getattr(chosen, each.name)
+        if not declared(each).live and value != each.default:
+            raise InputError(f"{each.name} must be left out with live, got {value}")
     if chosen.method is None or isinstance(chosen.method, str):
         chosen = chosen.changed(method=str(method_names(chosen.method or LIVE_METHOD)))
     chosen = completed(chosen.changed(body_frames=0, smooth=False), None)
@@ -121,7 +132,7 @@ def track_live(
 def _scene_of(
     first: Sequence[View], name: str, fps: float | None, options: TrackOptions
 ) -> tuple[Scene, Callable[[View], Observation]]:
-    """Return the scene of the first frames, and the function that makes an observation of a later one."""
+    """Return the scene of the first frames, and a function that observes later ones."""
     masks = not first or first[0].pictures is None
     check_used("masks" if masks else "pictures", options.view)
     if not any(view.usable[0] for view in first):
@@ -130,16 +141,16 @@ def _scene_of(
         )
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
-    body, notes, of_height = body_of(
-        options.asf, options.height, None if known else options.unit
-    )
+    unit = None if known else options.unit
+    body, notes, of_height = body_of(options.asf, options.height, unit)
     view = replace(joined(first), warnings=notes)
     scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
     scene = replace(scene, guesses=[*scene.guesses, *of_height])
     _, how, _ = straightening(known[0], view.size) if known else (None, None, None)
 
     def observed(live: View) -> Observation:
-        return Observations([live if how is None else how.of(live)])[0]  # type: ignore[no-any-return]
+        straight = live if how is None else how.of(live)
+        return Observations([straight])[0]  # type: ignore[no-any-return]
 
     return scene, observed
 
@@ -149,11 +160,21 @@ def write_live(
     out: str | Path | None = None,
     on_frame: Callable[[LiveFrame], None] | None = None,
 ) -> dict[str, Any]:
-    """Return a summary of a live track, followed until its stream ends or Ctrl-C.
+    """Follow a live track until its stream ends or Ctrl-C, and return a summary.
 
-    With `out`, a new folder gets frames.jsonl, a line a frame as it comes, and at the end poses.npz, also where the
-    stream breaks off. Raises InputError then, after both are written; where it breaks off before the first pose, there
-    is no folder.
+    Args:
+        frames: The frames of the track.
+        out: A new folder. It gets frames.jsonl, one line per frame as it comes, and at
+            the end poses.npz. If the stream breaks off both are still written; before
+            the first pose, the folder is removed again. None: nothing is written.
+        on_frame: Called with each frame.
+
+    Returns:
+        The numbers of tracked and skipped frames, and quantiles of the latency.
+
+    Raises:
+        InputError: If the folder exists, or the stream breaks off.
+
     """
     folder = None if out is None else Path(out)
     latencies = list[float]()
@@ -161,10 +182,9 @@ def write_live(
     check_free(folder)
     if folder is not None:
         folder.mkdir()
+    path = Path(os.devnull) if folder is None else folder / FRAMES_FILE
     try:
-        with (Path(os.devnull) if folder is None else folder / FRAMES_FILE).open(
-            "w", encoding="utf-8"
-        ) as lines:
+        with path.open("w", encoding="utf-8") as lines:
             for live in frames:
                 latencies.append(live.latency)
                 last = live.number
@@ -175,30 +195,30 @@ def write_live(
         pass
     except BaseException:
         if folder is not None and not latencies:
-            # a start that failed leaves nothing, so that the command can be given again
+            # nothing stays after a failed start, so that the same command can be
+            # repeated
             (folder / FRAMES_FILE).unlink(missing_ok=True)
             folder.rmdir()
             folder = None
         raise
     finally:
         if folder is not None:
-            rows = [
-                json.loads(line)
-                for line in (folder / FRAMES_FILE).read_text("utf-8").splitlines()
-            ]
+            text = (folder / FRAMES_FILE).read_text("utf-8")
+            rows = [json.loads(line) for line in text.splitlines()]
+            poses = np.radians([row["pose_degrees"] for row in rows])
+            translations = np.array([row["translation_m"] for row in rows])
+            # reshaped, because without rows both have a single axis
             np.savez_compressed(
                 folder / POSES_FILE,
                 frames=np.array([row["frame"] for row in rows], dtype=np.int64),
                 seconds=np.array([row["seconds"] for row in rows]),
-                poses=np.radians([row["pose_degrees"] for row in rows]).reshape(-1, 66),
-                translations=np.array([row["translation_m"] for row in rows]).reshape(
-                    -1, 3
-                ),
+                poses=poses.reshape(-1, 66),
+                translations=translations.reshape(-1, 3),
                 usable=np.array([row["usable"] for row in rows], dtype=bool),
             )
-    median, slow = (
-        np.quantile(latencies, (0.5, 0.99)).tolist() if latencies else (np.nan, np.nan)
-    )
+    median = slow = np.nan
+    if latencies:
+        median, slow = np.quantile(latencies, (0.5, 0.99)).tolist()
     return {
         "frames": len(latencies),
         "skipped": last + 1 - len(latencies),

@@ -1,13 +1,14 @@
-"""What happens to a scene: `posefit.track`, `posefit fit` and every cell of a sweep are this pipeline.
+"""The pipeline of `posefit.track`, `posefit fit` and every cell of a sweep.
 
 | step | what it returns | file |
 |---|---|---|
 | `initialise` | the first pose and the person's build | initialise.py |
-| `track_hypotheses`, `track_hypothesis` | the frames of each, and of one, by the method's tracker | this one |
-| `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
-| `smooth` | of footage: a smooth path, planted feet, poses fitted to the contours | smoothing/ |
-| `with_cheapest_legs` | of footage by one camera: the same with legs exchanged in some frames | smoothing/legs.py |
-| `tracked_again` | of footage by several cameras: back, then onward, from what is smooth | restarts.py |
+| `track_hypotheses` | the frames of each hypothesis, by the tracker | this one |
+| `cheapest` | the frames of the cheapest hypothesis | trajectory.py |
+| `retrack_spins` | frames tracked again if the body spins | restarts.py |
+| `smooth` | footage: a smooth path, planted feet, fitted contours | smoothing/ |
+| `with_cheapest_legs` | one camera: some frames' legs exchanged | smoothing/legs.py |
+| `tracked_again` | several cameras: back, then onward | restarts.py |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
 """
 
@@ -64,32 +65,30 @@ from posefit.tracking.trajectory import (
     with_total_effort,
 )
 
-# of a film by several cameras, at most, and of a frame in each, at least
-PASSES = 3
-PASS_EVALUATIONS = 2440
-SHORTEST = 3  # frames that are more than single pictures
-MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
+PASSES = 3  # passes over a film by several cameras, at most
+PASS_EVALUATIONS = 2440  # evaluations per frame in each pass, at least
+SHORTEST = 3  # frames of a film, at least
+MAX_NOTES = 3  # notes on training files that are shown: there may be thousands
 
 
 def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
-    """Return a scene whose warnings say, too, what was guessed where the files to learn from were read."""
-    notes = list(
-        dict.fromkeys(
-            note
-            for motion in training
-            for note in motion.notes
-            if note not in scene.warnings
-        )
-    )
+    """Return a scene with warnings about guesses made in reading training files."""
+    notes = list[str]()
+    for motion in training:
+        for note in motion.notes:
+            if note not in scene.warnings and note not in notes:
+                notes.append(note)
     if len(notes) > MAX_NOTES:
-        notes[MAX_NOTES:] = [
-            f"and {len(notes) - MAX_NOTES} more of files to learn from"
-        ]
+        more = len(notes) - MAX_NOTES
+        notes[MAX_NOTES:] = [f"and {more} more of files to learn from"]
     return replace(scene, warnings=[*scene.warnings, *notes])
 
 
 def with_turns(scene: Scene, calibrated: Sequence[Camera]) -> Scene:
-    """Return a scene whose guesses say by how much its cameras were turned from calibrated ones, where they were."""
+    """Return a scene with a guess that says how far its cameras were turned, if at all.
+
+    `calibrated` are the cameras before they were turned.
+    """
     cameras = list(zip(scene.cameras, calibrated, strict=True))
     if all(camera is other for camera, other in cameras):
         return scene
@@ -98,13 +97,8 @@ def with_turns(scene: Scene, calibrated: Sequence[Camera]) -> Scene:
         for camera, other in cameras
     ]
     said = ", ".join(f"{each:.2f}" for each in degrees)
-    return replace(
-        scene,
-        guesses=[
-            *scene.guesses,
-            f"cameras turned by {said} degrees, so that their masks agree",
-        ],
-    )
+    guess = f"cameras turned by {said} degrees, so that their masks agree"
+    return replace(scene, guesses=[*scene.guesses, guess])
 
 
 def track_scene(
@@ -115,18 +109,27 @@ def track_scene(
     recorder: Recorder | None = None,
     progress: Progress = QUIET,
 ) -> Track:
-    """Return a scene's motion tracked by a method that learns from `training`, with its errors or signs of trust.
+    """Track the person in a scene, and evaluate the track.
 
-    The options are those that `posefit.tracking.defaults.completed` returns. `recorder` gets every frame as it comes.
+    Args:
+        scene: The scene.
+        training: The motions that the method learns from.
+        options: The options, completed by `posefit.tracking.defaults.completed`.
+        recorder: Gets every frame as it comes.
+        progress: Gets messages and warnings.
+
+    Returns:
+        The track, with errors against the truth or signs of trust.
+
     """
     scene = given = with_notes(on_device(scene, options.device), training)
     for warning in scene.warnings:
         progress.warn(warning)
     task = task_of(scene, options, training)
     if options.smooth:
-        # it brings a BLAS of its own, and only one that is loaded can be limited
+        # SciPy has a BLAS too, and only a loaded BLAS can be limited
         import scipy.linalg  # noqa: F401
-    # an optimiser's matrices are small: BLAS is slower with more threads
+    # the matrices of optimisers are small, and BLAS is slower with more threads
     with threadpool_limits(1):
         method = prepare(options, task)
         passes = _passes(scene, method, task.evaluations, bool(options.smooth))
@@ -139,7 +142,8 @@ def track_scene(
                 scene, method, task, options, progress
             )
             scene = replace(scene, body=task.body, cameras=task.cameras)
-        method.audit.clear()  # what was tried before the first frame is in no row
+        # the search before the first frame is in no row of the audit
+        method.audit.clear()
         with progress.phase("track"):
             hypotheses = track_hypotheses(
                 scene, task, method, options, recorder or Recorder(), progress
@@ -185,7 +189,8 @@ def track_scene(
                     )
                     if exchanged.any():
                         progress.log(
-                            f"legs exchanged in {exchanged.sum()} frames, where smooth ones then fit better"
+                            f"legs exchanged in {exchanged.sum()} frames,"
+                            " where smooth ones then fit better"
                         )
         if passes > 1:
             again = passes, options.seed, progress
@@ -200,7 +205,7 @@ def track_scene(
         scene = with_turns(scene, given.cameras)
         for guess in scene.guesses[len(given.guesses) :]:
             progress.log(guess)
-        # what a track is compared with is no effort of the method
+        # evaluating a track is no effort of the method
         with progress.phase("evaluate"), uncounted():
             taken = clocks() - start_clocks + scene.reading_seconds
             seconds, cpu_seconds = taken.tolist()
@@ -227,7 +232,19 @@ def track_hypotheses(
     recorder: Recorder,
     progress: Progress,
 ) -> list[Hypothesis]:
-    """Return each hypothesis with all its frames. Each is recorded as it comes; recorded ones are not tracked again."""
+    """Return each hypothesis with all its frames.
+
+    Each frame is recorded as it comes. Recorded frames are not tracked again.
+
+    Args:
+        scene: The scene.
+        first: The task of the first hypothesis.
+        method: The method that tracks it.
+        options: The options of the track.
+        recorder: Has the frames of an interrupted track, and gets the others.
+        progress: Gets messages and warnings.
+
+    """
     recorded, state = recorder.earlier()
     gap = method.relocalise_gap if scene.truth is None else 0
     count = scene.count
@@ -244,24 +261,21 @@ def track_hypotheses(
             frames = list(hypothesis.frames)
             of_several = f" of {which}, {hypothesis.guess}" if total > 1 else ""
             progress.log(f"going on from frame {done} of {count}{of_several}")
-            if _starts_anew(method, frames):
+            if _starts_over(method, frames):
                 progress.warn(
-                    f"{method.name} starts anew at frame {done}: the frames from there on may be "
-                    "others than those of a track that was not interrupted"
+                    f"{method.name} starts over at frame {done}: the frames from there"
+                    " on may differ from an uninterrupted track"
                 )
         elif not done and total > 1:
             progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
             rng = stream(options.seed, "back", number)
-            behind = (
-                _tracked_back(scene, hypothesis, method, pivot, rng, progress)
-                if pivot and not done
-                else []
-            )
+            behind = list[Frame]()
+            if pivot and not done:
+                behind = _tracked_back(scene, hypothesis, method, pivot, rng, progress)
             ahead = (scene.observations[k] for k in range(done or pivot, count))
-            for frame in progress.steps(
-                track_hypothesis(hypothesis, method, ahead, gap, behind), count - done
-            ):
+            steps = track_hypothesis(hypothesis, method, ahead, gap, behind)
+            for frame in progress.steps(steps, count - done):
                 recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
                 frames.append(with_carried(frame, None))
         tracked.append(replace(hypothesis, frames=frames))
@@ -275,11 +289,19 @@ def track_hypothesis(
     gap: int,
     behind: Sequence[Frame] = (),
 ) -> Iterator[Frame]:
-    """Yield the frames of one hypothesis in the order of time, one for each observation that is `ahead`.
+    """Yield the frames of one hypothesis in the order of time.
 
-    After a `gap` of so many frames without the person they are searched again. Frames `behind` were tracked back in
-    time from the first observation ahead, the pivot, and are yielded before it. The pivot is searched twice, on the way
-    back and again from there; its frame has the effort of both.
+    The pivot is the first observation ahead. It is searched twice if there are frames
+    behind: on the way back, and again on the way ahead. Its frame has the effort of
+    both.
+
+    Args:
+        hypothesis: The hypothesis.
+        method: The method that tracks it.
+        ahead: The observations from the pivot on.
+        gap: After this many frames without the person, all yaws are searched again.
+        behind: The frames from the pivot back in time. They are yielded first.
+
     """
     task = after(hypothesis.task, behind[0]) if behind else hypothesis.task
     task = replace(task, resumable=True)
@@ -301,7 +323,10 @@ def _cheapest_pass(
     seed: int,
     progress: Progress,
 ) -> tuple[Tracked, Smoothed]:
-    """Return the cheapest of so many passes of a film, and what is smoothed of it, with the effort of all."""
+    """Return the cheapest of several passes over a film, with the effort of all.
+
+    With the track comes its smoothed version.
+    """
     scene, frames, shape = smoothed
     usable = np.array([observation.usable for observation in scene.observations])
 
@@ -311,9 +336,8 @@ def _cheapest_pass(
         return progress.steps(method.follow(task, observations, rng), scene.count)
 
     for number in range(1, passes):
-        progress.log(
-            f"tracking the {scene.count} frames again, {'back in time' if number % 2 else 'onward'}"
-        )
+        direction = "back in time" if number % 2 else "onward"
+        progress.log(f"tracking the {scene.count} frames again, {direction}")
         with progress.phase("track"):
             latest = replace(task, body=scene.body, cameras=scene.cameras)
             again = tracked_again(
@@ -331,14 +355,16 @@ def _cheapest_pass(
 
 
 def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> int:
-    """Return how often a film is tracked: several cameras show which of two poses is right, once it is tried."""
+    """Return how often a film is tracked.
+
+    Several passes pay with several cameras: these show which of two poses is right, but
+    only once both are tried.
+    """
     if len(scene.cameras) == 1 or scene.count < SHORTEST or scene.truth is not None:
         return 1
-    return (
-        max(min(PASSES, evaluations // PASS_EVALUATIONS), 1)
-        if method.looks_ahead and smoothed
-        else 1
-    )
+    if not method.looks_ahead or not smoothed:
+        return 1
+    return max(min(PASSES, evaluations // PASS_EVALUATIONS), 1)
 
 
 def _evaluations(frames: Sequence[Frame]) -> int:
@@ -348,7 +374,7 @@ def _evaluations(frames: Sequence[Frame]) -> int:
 def _polish_evaluations(
     scene: Scene, method: Method, evaluations: int, options: TrackOptions
 ) -> int:
-    """Return how many of the evaluations of one picture are for polishing what a search by an optimiser leaves open."""
+    """Return how many evaluations of one picture polish the result of the search."""
     alone = scene.count == 1 and scene.truth is None and options.smooth
     if not alone or method.prior is None or not next(iter(scene.observations)).usable:
         return 0
@@ -358,8 +384,8 @@ def _polish_evaluations(
 def _pivot(scene: Scene, task: Task, method: Method) -> int:
     """Return the frame that is tracked first.
 
-    In footage, a tracker that looks ahead begins with the first frame that shows the whole person; unless more is known
-    of the very first one than its masks show.
+    In footage, a tracker that looks ahead begins with the first frame that shows the
+    whole person, unless more is known about the very first frame than its masks.
     """
     if scene.truth is not None or not method.looks_ahead:
         return 0
@@ -380,11 +406,8 @@ def _tracked_back(
 ) -> list[Frame]:
     """Return the frames from the pivot back to the first of the scene."""
     back = (scene.observations[k] for k in range(pivot, -1, -1))
-    return list(
-        progress.steps(
-            method.follow(reversed_task(hypothesis.task), back, rng), pivot + 1
-        )
-    )
+    frames = method.follow(reversed_task(hypothesis.task), back, rng)
+    return list(progress.steps(frames, pivot + 1))
 
 
 def _hypothesis(
@@ -395,7 +418,10 @@ def _hypothesis(
     tracked: Sequence[Hypothesis],
     pivot: int,
 ) -> Hypothesis:
-    """Return a hypothesis before its first frame; unless it is the first, its guess varies a frame of the first one."""
+    """Return a hypothesis before its first frame.
+
+    The guess of each hypothesis after the first one varies a frame of the first one.
+    """
     if not tracked:
         return Hypothesis(SEARCHED, first, np.random.default_rng(options.seed))
     usable = (k for k in range(pivot, scene.count) if scene.observations[k].usable)
@@ -406,8 +432,11 @@ def _hypothesis(
     return Hypothesis(guess, task, stream(options.seed, "hypothesis", number))
 
 
-def _starts_anew(method: Method, recorded: Sequence[Frame]) -> bool:
-    """Return whether what a method knew after recorded frames is lost: it is a tracker, or a filter of other values."""
+def _starts_over(method: Method, recorded: Sequence[Frame]) -> bool:
+    """Return whether the method's state after recorded frames is lost.
+
+    It is lost for a tracker, and for a filter with a state that cannot be recorded.
+    """
     kept = [frame.details[CARRIED] for frame in recorded if CARRIED in frame.details]
     return method.prior is None or (bool(kept) and not kept[-1])
 
@@ -415,9 +444,15 @@ def _starts_anew(method: Method, recorded: Sequence[Frame]) -> bool:
 def _resumed(
     hypothesis: Hypothesis, recorded: Sequence[Frame], state: dict[str, Any]
 ) -> Hypothesis:
-    """Return a hypothesis that goes on from recorded frames, after which the random generator had some state.
+    """Return a hypothesis that continues after recorded frames.
 
-    What follows has other trajectories than the earlier frames.
+    Later frames have other sampled trajectories than the recorded ones.
+
+    Args:
+        hypothesis: The hypothesis before its first frame.
+        recorded: The recorded frames.
+        state: The state of the random generator after them.
+
     """
     hypothesis.rng.bit_generator.state = state
     posteriors = [

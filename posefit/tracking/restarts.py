@@ -1,12 +1,12 @@
-"""The one policy of restarts: where a track begins, and when it is begun again from somewhere else.
+"""The one policy of restarts: where a track begins, and when it begins again.
 
 | when | what is tried | what is kept |
 |---|---|---|
-| before the first frame | `best_restart`: searches around what it may show, followed for a second | the cheapest |
-| after a gap, or while costs are high | `relocalised`: such restarts beside the track as it is | the cheapest |
-| with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
-| where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
-| footage by several cameras | `tracked_again`: back, then onward, from what the pass before found | the cheapest |
+| before the first frame | `best_restart`: searches and short trials | the cheapest |
+| after a gap, at high costs | `relocalised`: restarts, or none | the cheapest |
+| several hypotheses | `initial_guess`: poses with the same silhouette | the cheapest |
+| the body spins | `retrack_spins`: all but the longest run without | if as cheap |
+| several cameras | `tracked_again`: back, then onward | the cheapest |
 """
 
 import math
@@ -48,30 +48,34 @@ from posefit.tracking.trajectory import (
 )
 from posefit.uncertainty.modes import Posterior
 
-# part of the seed of what is tracked again
+# Part of the seed of each kind of repeated tracking.
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902, "pass": 1965}
 RESTARTS = 8  # searches of the first frame, at most
-MIN_WEIGHT = 0.05  # of a mode of the first frame that is tried
-TRIAL_FRAMES = 10  # by which a restart is judged
-TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
-TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
-WALKED = 0.3  # metres; a person who goes so far in the trial goes where they face
-BACKWARDS_PENALTY = 1.1  # on the cost of a restart that walks backwards
-COST_RISE = 1.5  # times the typical cost of the track: costs above it are high
-TYPICAL_COST_SECONDS = 1.0  # of frames that show the typical cost
-HIGH_COST_SECONDS = 0.5  # for which costs are high before a track relocalises
-# in the details of a frame where it did: whether a restart was better
+MIN_WEIGHT = 0.05  # modes of the first frame with less weight are not tried
+TRIAL_FRAMES = 10  # frames that judge a restart
+# Every third frame, so that the trial lasts long enough to show which way the person
+# walks.
+TRIAL_STRIDE = 3
+TRIAL_ROWS = 240  # pictures that compare restarts have at least this many rows
+WALKED = 0.3  # metres; a person who moves this far in the trial walks
+BACKWARDS_PENALTY = 1.1  # factor on the cost of a restart that walks backwards
+COST_RISE = 1.5  # a cost is high above this many times the typical cost of the track
+TYPICAL_COST_SECONDS = 1.0  # at least, of frames that give the typical cost
+HIGH_COST_SECONDS = 0.5  # a track relocalises after high costs for this long
+# Key in the details of a frame that relocalised: whether a restart was better.
 RELOCALISED = "relocalised"
-# a track without spins that costs more is wrong: the person does turn so fast
+# If the track without spins costs more than this factor, it is wrong: the person really
+# turns that fast.
 SPIN_TOLERANCE = 1.5
-# a second: the fastest that a person turns on the spot
+# Radians a second: the fastest turn of a person on the spot.
 MAX_TURN_RATE = np.radians(450.0)
 SPIN_SECONDS = 0.1
-# within that time: more is no turn of a person, even in a smoothed track
+# A turn by more than this within SPIN_SECONDS is a spin, even in a smoothed track.
 SPIN_ANGLE = np.radians(60.0)
-END_SECONDS = 0.5  # from the ends of what is without spins, where it goes on from
+END_SECONDS = 0.5  # the run without spins is cut at most this far from its ends
 VOTES_PER_SECOND = 30.0
-EXCESS_TURN_VOTES = 30.0  # that a radian costs which is turned faster than a person can
+# Votes that each radian costs by which a turn is faster than a person's.
+EXCESS_TURN_VOTES = 30.0
 SEARCHED = "searched"
 SEARCHED_AGAIN = "searched again"
 
@@ -79,12 +83,15 @@ SEARCHED_AGAIN = "searched again"
 def stream(
     seed: int, kind: Literal["hypothesis", "spin", "back", "pass"], number: int
 ) -> np.random.Generator:
-    """Return the random generator of something that is tracked again; that of the first track is of the seed alone."""
+    """Return the random generator of a repeated track.
+
+    The first track's generator depends on the seed alone.
+    """
     return np.random.default_rng([seed, RNG_STREAMS[kind], number])
 
 
 def independent(rng: np.random.Generator) -> np.random.Generator:
-    """Return a generator that is seeded by what another one would draw next, which stays as it is."""
+    """Return a generator seeded by the next draw of another, which stays unchanged."""
     return np.random.default_rng(deepcopy(rng).integers(0, 2**63, 4))
 
 
@@ -94,17 +101,20 @@ def independent(rng: np.random.Generator) -> np.random.Generator:
 def usable_observations(
     observations: Sequence[Observation], count: int, stride: int = 1, start: int = 0
 ) -> list[Observation]:
-    """Return the first `count` observations from `start` on, of every `stride`th, that show enough of the person."""
+    """Return the first `count` usable observations of every `stride`th from `start`.
+
+    A usable observation shows enough of the person.
+    """
     each = (observations[k] for k in range(start, len(observations), stride))
-    return list(
-        islice((observation for observation in each if observation.usable), count)
-    )
+    usable = (observation for observation in each if observation.usable)
+    return list(islice(usable, count))
 
 
 def first_shown_whole(observations: Sequence[Observation]) -> int:
-    """Return the first frame of those in which most cameras show all of the person, nothing cut by the picture's edge.
+    """Return the first frame in which the most cameras show the whole person.
 
-    Where none does, it is the first that is usable.
+    In such a picture its edge cuts nothing off. If no camera ever shows the whole
+    person, return the first usable frame.
     """
     best = 0
     most = 0.0
@@ -132,61 +142,69 @@ def best_restart(
     continuation: Task | None = None,
     log: Callable[[str], None] = lambda _message: None,
 ) -> tuple[Task, list[Frame]]:
-    """Return the task with the best of several restarts as the frame before the first, and all frames of the trial.
+    """Return the task that starts from the best of several restarts.
 
-    Each searches the first usable frame around a mode of what it may show, as many as are likely; or, where nothing is
-    guessed, anywhere, at all yaws where none is known. It then follows the person through a few more frames. The least
-    mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution, and the first
-    frame is then searched once more in the whole one, around the best. The `continuation` of a track is followed beside
-    the restarts, and returned where none of them is better. The evaluations of the guess are those of the first search.
-    `log` gets a line that says where they search.
+    Each restart searches the first usable frame around one of the likely modes of what
+    it may show. If nothing is guessed, it searches anywhere, at all yaws if none is
+    known. It then follows the person through a few more frames. The least mean cost
+    wins; walking backwards is penalised.
+
+    Large pictures are compared at a lower resolution. The first frame is then searched
+    once more at full resolution, around the best restart. The evaluations of the guess
+    are added to the first search.
+
+    Args:
+        task: The task, before its first frame.
+        observations: The frames from the first one on.
+        follow: The tracker.
+        restarts: How many restarts, at most.
+        seed: The seed of the random numbers.
+        continuation: The task that continues an earlier track. It competes with the
+            restarts, and is returned if none of them is better.
+        log: Gets a line that says where the restarts search.
+
+    Returns:
+        The task with the best restart as the frame before the first, and all frames of
+        the trial.
+
     """
-    chosen = usable_observations(
-        observations, TRIAL_FRAMES, TRIAL_STRIDE
-    ) or usable_observations(observations, 1)
+    chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE)
+    if not chosen:
+        chosen = usable_observations(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
-    # for models of motion
+    # models of motion need the rate of the frames that are compared
     trial = replace(task, fps=task.fps / TRIAL_STRIDE)
     compared = chosen
     if factor > 1:
-        trial = replace(
-            trial, cameras=[coarser_camera(camera, factor) for camera in task.cameras]
-        )
-        masks = [
-            [
+        cameras = [coarser_camera(camera, factor) for camera in task.cameras]
+        trial = replace(trial, cameras=cameras)
+        compared = []
+        for observation in chosen:
+            small = [
                 coarser_silhouette(silhouette, factor)
                 for silhouette in observation.silhouettes
             ]
-            for observation in chosen
-        ]
-        compared = [
-            replace(observation, silhouettes=small)
-            for observation, small in zip(chosen, masks, strict=True)
-        ]
+            compared.append(replace(observation, silhouettes=small))
     prefix = [seed] if isinstance(seed, int) else [*seed]
     best = continuation or task
     least = np.inf
     tried = list[Frame]()
     if continuation is not None:
         compared_task = replace(continuation, fps=trial.fps, cameras=trial.cameras)
-        tried += follow(
-            compared_task, compared, np.random.default_rng([*prefix, restarts + 1])
-        )
+        rng = np.random.default_rng([*prefix, restarts + 1])
+        tried += follow(compared_task, compared, rng)
         least = _trial_cost(tried)
     drawn = PoseCount()
     with drawn.counting():
         guessed = guessed_modes(task, chosen[0])[:restarts]
     guess_evaluations = math.ceil(drawn.poses / len(task.cameras))
     modes = [mode for weight, mode in guessed if weight >= MIN_WEIGHT]
-    where = (
-        f"around {counted(len(modes), 'pose')} with such a silhouette"
-        if modes
-        else "anywhere"
-    )
+    where = "anywhere"
+    if modes:
+        where = f"around {counted(len(modes), 'pose')} with such a silhouette"
     log(f"looking for the first pose {where}")
-    for k, start in enumerate(
-        [around(trial, mode) for mode in modes] or [trial] * restarts
-    ):
+    starts = [around(trial, mode) for mode in modes] or [trial] * restarts
+    for k, start in enumerate(starts):
         frames = list(follow(start, compared, np.random.default_rng([*prefix, k])))
         if not k and guess_evaluations:
             used = frames[0].evaluations + guess_evaluations
@@ -196,23 +214,21 @@ def best_restart(
             best = after(task, frames[0])
             least = cost
     if factor > 1 and best is not (continuation or task):
-        tried.append(
-            next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts])))
-        )
+        rng = np.random.default_rng([*prefix, restarts])
+        tried.append(next(follow(best, chosen[:1], rng)))
         best = after(task, tried[-1])
     return best, tried
 
 
 def _trial_cost(frames: Sequence[Frame]) -> float:
-    """Return the mean cost of frames, penalised where the person walks backwards in them."""
+    """Return the mean cost of frames, penalised if the person walks backwards."""
     path = frames[-1].translation - frames[0].translation
     yaws = np.array([frame.pose[0] for frame in frames])
     ahead = np.array([np.sin(yaws).mean(), 0.0, np.cos(yaws).mean()])
     path[1] = 0.0
     backwards = np.linalg.norm(path) > WALKED and path @ ahead < 0.0
-    return float(np.mean([frame.cost for frame in frames])) * (
-        BACKWARDS_PENALTY if backwards else 1.0
-    )
+    penalty = BACKWARDS_PENALTY if backwards else 1.0
+    return float(np.mean([frame.cost for frame in frames])) * penalty
 
 
 def around(task: Task, mode: Posterior) -> Task:
@@ -225,7 +241,7 @@ def around(task: Task, mode: Posterior) -> Task:
 
 
 def after(task: Task, frame: Frame) -> Task:
-    """Return the task that goes on from a frame."""
+    """Return the task that continues from a frame."""
     first = replace(
         task,
         yaw=float(frame.pose[0]),
@@ -233,11 +249,11 @@ def after(task: Task, frame: Frame) -> Task:
         first_pose=frame.pose[3:],
         modes=(),
     )
-    # the filter that goes on from it is a new one
+    # without the state of the filter: a new one continues from the frame
     return replace(first, before=(with_carried(frame, None),))
 
 
-# While a track goes on.
+# During a track.
 
 
 def relocalised(
@@ -247,12 +263,21 @@ def relocalised(
     rng: np.random.Generator,
     gap: int,
 ) -> Iterator[Frame]:
-    """Yield the frames that `follow` gives, searched at all yaws again where the person may have turned unseen.
+    """Yield the frames of `follow`, and search all yaws again if the track may be lost.
 
-    That is in the first frame that shows the person after a `gap` of frames that do not, none for 0, and where for half
-    a second every cost is half as high again as is typical since the last relocalisation. Restarts are compared
-    with the track as it is, over about a second of the observations to come; the cheapest goes on. The frame has the
-    evaluations and the time of all of them.
+    This happens in the first frame that shows the person after a gap: they may have
+    turned unseen. It also happens if all costs of half a second are half as high again
+    as is typical since the last relocalisation. The restarts and the track as it is are
+    compared over about a second of the coming observations, and the cheapest one
+    continues. The frame gets the evaluations and the time of them all.
+
+    Args:
+        task: The task.
+        follow: The tracker.
+        observations: The frames, in order.
+        rng: The random numbers.
+        gap: The length of a gap: frames without the person. 0: never search again.
+
     """
     if not gap:
         yield from follow(task, observations, rng)
@@ -261,7 +286,8 @@ def relocalised(
     watch = _Watch(task, gap)
     frames = follow(task, coming, rng)
     while shown := coming.ahead(1):
-        (observation,), trials = shown, list[Frame]()
+        (observation,) = shown
+        trials = list[Frame]()
         if observation.usable and (latest := watch.due()) is not None:
             window = coming.ahead(1 + (TRIAL_FRAMES - 1) * TRIAL_STRIDE)
             seeds = independent(rng).integers(0, 2**32, 2).tolist()
@@ -283,25 +309,26 @@ def relocalised(
             return
         if trials:
             frame = with_effort_of(frame, [frame, *trials])
-            frame = replace(
-                frame, details={**frame.details, RELOCALISED: best is not continuation}
-            )
+            details = {**frame.details, RELOCALISED: best is not continuation}
+            frame = replace(frame, details=details)
         watch.add(frame, observation.usable)
         yield frame
-    yield from frames  # none: the tracker gets to its end
+    # no frames are left, but the tracker must run to its end
+    yield from frames
 
 
 class _Coming(Iterator[Observation]):
     """Observations that a tracker takes one by one, and that can be read ahead."""
 
     def __init__(self, observations: Iterable[Observation]) -> None:
-        self._observations, self._waiting = iter(observations), deque[Observation]()
+        self._observations = iter(observations)
+        self._waiting = deque[Observation]()
 
     def __next__(self) -> Observation:
         return self._waiting.popleft() if self._waiting else next(self._observations)
 
     def ahead(self, count: int) -> list[Observation]:
-        """Return the next observations, up to `count` of them, which stay to be taken."""
+        """Return up to `count` of the next observations without taking them."""
         self._waiting.extend(
             islice(self._observations, max(count - len(self._waiting), 0))
         )
@@ -309,16 +336,17 @@ class _Coming(Iterator[Observation]):
 
 
 class _Watch:
-    """Watches a track for what makes it relocalise: a gap, or costs that stay high."""
+    """Watches a track for the reasons to relocalise: a gap, or costs that stay high."""
 
     def __init__(self, task: Task, gap: int) -> None:
         self._gap = gap
         self._typical_frames = max(round(TYPICAL_COST_SECONDS * task.fps), 1)
         self._high_frames = max(round(HIGH_COST_SECONDS * task.fps), 1)
-        self._latest: Frame | None = None  # that showed the person
+        self._latest: Frame | None = None  # the latest frame that showed the person
         self._missing = 0  # frames since then
         self._costs = list[float]()  # since the last relocalisation
-        if len(task.before) > 1:  # a single one is what the track starts from
+        # a single earlier frame is the start of the track, not part of it
+        if len(task.before) > 1:
             for frame in task.before:
                 self.add(frame, frame.evaluations > 0)
 
@@ -333,18 +361,22 @@ class _Watch:
             self._costs.append(frame.cost)
 
     def due(self) -> Frame | None:
-        """Return the latest frame that showed the person where it is time to relocalise, else None."""
+        """Return the latest frame that showed the person if it is time to relocalise.
+
+        None if it is not.
+        """
         typical = self._costs[: -self._high_frames]
         high = self._costs[-self._high_frames :]
-        costly = len(typical) >= self._typical_frames and min(high) > COST_RISE * float(
-            np.median(typical)
-        )
+        costly = False
+        if len(typical) >= self._typical_frames:
+            costly = min(high) > COST_RISE * float(np.median(typical))
         return self._latest if costly or self._missing >= self._gap else None
 
 
 # Several hypotheses.
 
-# The initial guesses of the hypotheses after the first, in turn: those first that are mistaken most often.
+# The initial guesses of the hypotheses after the first one, in turn. The ones that are
+# mistaken for the right pose most often come first.
 GUESSES = (
     "mirrored",
     "reflected",
@@ -359,10 +391,18 @@ GUESSES = (
 def initial_guess(
     number: int, task: Task, yaw: float | None, pose_known: bool, first: Frame
 ) -> tuple[str, Task]:
-    """Return the name and the task of a hypothesis after the first; `first` is a frame that the first one estimated.
+    """Return the name and the task of a hypothesis after the first one.
 
-    It starts around a pose whose silhouette is like that of the frame, or searches as the first one did. Poses that
-    face elsewhere than the known `yaw` are left out; where the first pose is known, only seeds differ.
+    It starts around a pose with a silhouette similar to that of a frame, or searches
+    again as the first hypothesis did.
+
+    Args:
+        number: Number of the hypothesis, from 1.
+        task: The task of the first hypothesis.
+        yaw: The known yaw in radians, or None. Poses that face elsewhere are left out.
+        pose_known: Whether the first pose is known. Then only the seeds differ.
+        first: The frame, as the first hypothesis estimated it.
+
     """
     camera_yaw = facing(task.cameras[0], first.translation)
     skeleton = task.body.skeleton
@@ -392,8 +432,9 @@ def initial_guess(
     return name, replace(after(task, replace(first, pose=poses[name])), before=())
 
 
-# After the last frame. A silhouette hardly distinguishes a body that faces the camera from its reflection, which faces
-# away. A track that takes one for the other and back spins; each of its frames then votes for one of the two.
+# After the last frame. A silhouette hardly distinguishes a body that faces the camera
+# from its reflection, which faces away. A track that takes one for the other and back
+# spins. Each of its frames then votes for one of the two.
 
 
 def retrack_spins(
@@ -403,43 +444,53 @@ def retrack_spins(
     follow: Follow,
     seed: int,
 ) -> Tracked:
-    """Return a track without spins, whose `stay` is the first and last frame of those that stay; None where all do.
+    """Return a track without spins.
 
-    Those are of the longest run that faces as most frames do, see `facing_consensus`, between its best ends. The
-    person is followed onward from the last, and backwards from the first by training motions in reverse. The old track
-    is kept where the new one spins as often, or costs half as much again. Frames that are tracked again have the effort
-    of both tracks.
+    Only the longest run of frames that face as most frames do stays, between its best
+    ends; see `facing_consensus`. The person is followed onward from its last frame, and
+    backwards from its first frame with reversed training motions. The old track is kept
+    if the new one spins as often, or costs half as much again. Frames that are tracked
+    again get the effort of both tracks.
+
+    Args:
+        task: The task of the track.
+        observations: All frames.
+        tracked: The track.
+        follow: The tracker.
+        seed: The seed of the random numbers.
+
+    Returns:
+        The track. Its `stay` has the first and the last frame that stayed, or None if
+        all did.
+
     """
     frames = tracked.frames
     usable = np.array([observation.usable for observation in observations])
 
     def spins(track: Sequence[Frame]) -> int:
-        return int(
-            spin_mask(
-                np.array([frame.pose[0] for frame in track]), usable, task.fps
-            ).sum()
-        )
+        """Return in how many frames a track spins."""
+        yaws = np.array([frame.pose[0] for frame in track])
+        return int(spin_mask(yaws, usable, task.fps).sum())
 
     before = spins(frames)
-    every = (
-        runs(facing_consensus(frames, task.cameras, usable, task.fps)) if before else []
-    )
+    if not before:
+        return tracked
+    every = runs(facing_consensus(frames, task.cameras, usable, task.fps))
     if not every:
         return tracked
-    first, last = stay = best_ends(
-        frames, *max(every, key=lambda run: run[1] - run[0]), task.fps
-    )
+    longest = max(every, key=lambda run: run[1] - run[0])
+    stay = best_ends(frames, *longest, task.fps)
+    first, last = stay
     steady = replace(task, fastest_turn=MAX_TURN_RATE)
 
     def followed_from(number: int, steady: Task, rows: range) -> list[Frame]:
-        """Return the frames of some rows but the first, followed from that one."""
+        """Return the frames of all rows but the first, followed from the first."""
         if len(rows) == 1:
             return []
         start = replace(after(steady, frames[rows[0]]), before=())
-        tracked_again = list(
-            follow(start, (observations[k] for k in rows), stream(seed, "spin", number))
-        )
-        return joined(task.body.skeleton, tracked_again, frames[rows[0]])[1:]
+        shown = (observations[k] for k in rows)
+        again = list(follow(start, shown, stream(seed, "spin", number)))
+        return joined(task.body.skeleton, again, frames[rows[0]])[1:]
 
     ahead = followed_from(0, steady, range(last, len(frames)))
     behind = followed_from(1, reversed_task(steady), range(first, -1, -1))
@@ -459,9 +510,18 @@ def tracked_again(
     number: int,
     seed: int,
 ) -> list[Frame]:
-    """Return a track's frames tracked once more, with each of them among the poses that are tried.
+    """Return the frames of a track, tracked once more with their poses as candidates.
 
-    Odd passes go back in time, so that what a late frame shows is known in the early ones.
+    Odd passes run back in time, so that early frames profit from what late ones show.
+
+    Args:
+        task: The task of the track.
+        observations: All frames.
+        frames: The track so far.
+        follow: The tracker.
+        number: Number of the pass, from 1.
+        seed: The seed of the random numbers.
+
     """
     order = range(len(frames))[:: -1 if number % 2 else 1]
     start = replace(after(task, frames[order[0]]), before=())
@@ -469,27 +529,28 @@ def tracked_again(
         replace(observations[k], estimate=(frames[k].pose, frames[k].translation))
         for k in order
     )
-    again = list(
-        follow(
-            reversed_task(start) if number % 2 else start,
-            shown,
-            stream(seed, "pass", number),
-        )
-    )
+    if number % 2:
+        start = reversed_task(start)
+    again = list(follow(start, shown, stream(seed, "pass", number)))
     return again[:: order.step]
 
 
 def reversed_task(task: Task) -> Task:
-    """Return a task whose observations go back in time."""
-    return replace(
-        task, training=[motion.reversed() for motion in task.training], backwards=True
-    )
+    """Return a task with observations that run back in time."""
+    training = [motion.reversed() for motion in task.training]
+    return replace(task, training=training, backwards=True)
 
 
 def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:
-    """Return frames whose posterior trajectories go on as those of the frame from which both ways were followed.
+    """Return frames with the sampled trajectories of the frame where two tracks meet.
 
-    Each of its trajectories goes on as the nearest one there.
+    Each trajectory of that frame continues as the nearest one of the other track.
+
+    Args:
+        skeleton: The person's skeleton.
+        behind: The frames of the track from the meeting frame backwards.
+        ahead: The meeting frame, as the other track has it.
+
     """
     here = ahead.posterior
     there = behind[0].posterior
@@ -515,7 +576,14 @@ def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Fr
 
 
 def spin_mask(yaws: Array, usable: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
-    """Return in which frames (T,) a body spins, by its yaws (T,) in radians, where it is visible."""
+    """Return whether a body spins in each frame (T,).
+
+    Args:
+        yaws: (T,) radians.
+        usable: (T,) whether a frame shows enough of the person.
+        fps: Frames a second.
+
+    """
     spins = np.zeros(len(yaws), dtype=bool)
     reach = max(round(SPIN_SECONDS * fps), 1)
     turned = np.abs(wrapped(yaws[reach:] - yaws[:-reach]))
@@ -530,14 +598,22 @@ def facing_consensus(
     usable: NDArray[np.bool_],
     fps: float,
 ) -> NDArray[np.bool_]:
-    """Return which frames (T,) face where the whole track does, by the likeliest sequence of yaws without spins.
+    """Return which frames (T,) agree with the likeliest sequence of yaws without spins.
 
-    A frame may face where it was estimated, or where its reflection does; the latter goes against its votes, one for
-    each camera that sees the person. Frames that spin have no votes, nor those that show too little.
+    Each frame faces either where it was estimated to face or where its reflection
+    faces. A reflection costs the votes of the frame, one for each camera that sees the
+    person. Frames that spin or show too little have no votes.
+
+    Args:
+        frames: The T frames of a track.
+        cameras: The cameras.
+        usable: (T,) whether a frame shows enough of the person.
+        fps: Frames a second.
+
     """
     yaws = np.array([frame.pose[0] for frame in frames])
     steady = ~spin_mask(yaws, usable, fps)
-    # no turn has time during a spin
+    # the clock stops during spins, so that they give no time to turn
     rows = np.flatnonzero(usable & steady)
     clock = steady.cumsum()
     agrees = np.zeros(len(frames), dtype=bool)
@@ -549,12 +625,10 @@ def facing_consensus(
         facing(cameras[int(seeing.argmax())], frame.translation)
         for frame, seeing in zip(voters, views, strict=True)
     ]
-    both = np.column_stack(
-        [yaws[rows], 2.0 * np.array(camera_yaws) + np.pi - yaws[rows]]
-    )
-    against = np.column_stack(
-        [np.zeros(len(rows)), views.sum(axis=1) * VOTES_PER_SECOND / fps]
-    )
+    reflected = 2.0 * np.array(camera_yaws) + np.pi - yaws[rows]
+    both = np.column_stack([yaws[rows], reflected])  # (n, 2)
+    votes = views.sum(axis=1) * VOTES_PER_SECOND / fps
+    against = np.column_stack([np.zeros(len(rows)), votes])  # (n, 2)
     turned = np.abs(wrapped(both[1:, None] - both[:-1, :, None]))
     seconds = (clock[rows[1:]] - clock[rows[:-1]]) / fps
     excess = np.maximum(turned - MAX_TURN_RATE * seconds[:, None, None], 0.0)
@@ -565,19 +639,21 @@ def facing_consensus(
 def best_ends(
     frames: Sequence[Frame], start: int, stop: int, fps: float
 ) -> tuple[int, int]:
-    """Return a frame near the beginning of a run, and one near its end: the best that most cameras see.
+    """Return a good frame near the beginning of a run, and one near its end.
 
-    The first and the last of all frames need not be good, as nothing goes on from there.
+    These are the frames that most cameras see, and of them the cheapest. At either end
+    of the whole track the run's own end is returned, because nothing continues there.
     """
     near = min(max(round(END_SECONDS * fps), 1), (stop - start + 1) // 2)
 
-    def best(rows: range) -> int:
-        return min(
-            rows,
-            key=lambda k: (-int(frames[k].areas.any(axis=1).sum()), frames[k].cost),
-        )
+    def rank(k: int) -> tuple[int, float]:
+        """Return the rank of a frame: more cameras first, then lower costs."""
+        return -int(frames[k].areas.any(axis=1).sum()), frames[k].cost
 
-    first = best(range(start, start + near)) if start else 0
-    return first, best(range(stop - 1, stop - 1 - near, -1)) if stop < len(
-        frames
-    ) else stop - 1
+    first = 0
+    if start:
+        first = min(range(start, start + near), key=rank)
+    last = stop - 1
+    if stop < len(frames):
+        last = min(range(stop - 1, stop - 1 - near, -1), key=rank)
+    return first, last

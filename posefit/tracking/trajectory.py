@@ -1,7 +1,8 @@
-"""What a whole trajectory costs, which of two is kept, and the effort of several together.
+"""The cost of a whole trajectory, the choice between several, and their total effort.
 
-A frame does not distinguish a stride from its mirror image, but a clip does: a wrong initial guess fits a little worse
-in most frames, or has to jump. So a trajectory that is judged as a whole is right more often than each of its frames.
+A frame does not distinguish a stride from its mirror image, but a clip does: a wrong
+initial guess fits a little worse in most frames, or has to jump. So a trajectory judged
+as a whole is right more often than each of its frames.
 """
 
 from collections.abc import Sequence
@@ -18,43 +19,42 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton, root_centred
 from posefit.motion.motion import Motion
 
-# how often velocities are compared, so that the jitter of a search counts the same at
-# any rate
+# Comparisons of velocities a second. It does not depend on the frame rate, so that the
+# jitter of a search counts the same at any rate.
 VELOCITY_RATE = 30.0
-# metres a second, of the joints about the root: the typical speed where nothing is
-# learned from
+# Metres a second, of joints about the root: the typical speed without training motions.
 WALKING_SPEED = 1.0
 MIN_TYPICAL_SPEED = 0.25  # metres a second
-# typical speeds, which a joint's velocity changes by when it turns around on the spot
+# Change of velocity of a joint that turns around on the spot, in typical speeds.
 TURN_AROUND_SPEED = 2.0
-# typical speeds: where the velocities of all joints change by more, the body is
-# somewhere else
+# Larger changes of the velocities of all joints are jumps, in typical speeds.
 JUMP_SPEED = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A track from one initial guess: what that is called, what is known at the start, and the frames so far."""
+    """A track from one initial guess."""
 
-    guess: str
-    task: Task
+    guess: str  # its name
+    task: Task  # what is known at the start
     rng: np.random.Generator
-    frames: Sequence[Frame] = ()
+    frames: Sequence[Frame] = ()  # the frames so far
 
 
 class Tracked(NamedTuple):
     """The track that is kept of several, with the effort of all."""
 
     frames: list[Frame]
-    # of each of several: its initial guess, cost and motion term, and whether kept
+    # a row for each of several hypotheses: guess, cost, motion term, whether it is kept
     hypotheses: list[dict[str, Any]]
-    # the first and last frame that stayed where the others were tracked again because the body spun
+    # the first and last frame that stayed when a spin was tracked again, see
+    # `retrack_spins`
     stay: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
 class TrajectoryCost:
-    """What a whole trajectory costs."""
+    """The cost of a whole trajectory."""
 
     # mean silhouette mismatch of the frames that show enough, 0 to 100. SAPSO (4)
     cost: float
@@ -63,12 +63,18 @@ class TrajectoryCost:
 
     @property
     def total(self) -> float:
-        """By which trajectories are compared: lower is better."""
+        """The measure that compares trajectories: lower is better."""
         return self.cost + self.motion
 
 
 def cheapest_sequence(costs: Array, steps: Array) -> NDArray[np.int64]:
-    """Return the cheapest sequence (n,) of states, by their costs (n, S) and those of steps (n - 1, S, S). Viterbi."""
+    """Return the cheapest sequence (n,) of states, by the Viterbi algorithm.
+
+    Args:
+        costs: (n, S) the costs of the states.
+        steps: (n - 1, S, S) the costs of the steps between them.
+
+    """
     totals = costs[0]
     parents = []
     for cost, step in zip(costs[1:], steps, strict=True):
@@ -82,7 +88,7 @@ def cheapest_sequence(costs: Array, steps: Array) -> NDArray[np.int64]:
 
 
 def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
-    """Return the mean cost of the frames that show enough of the person; of all frames where none does."""
+    """Return the mean cost of the usable frames, or of all frames if none is usable."""
     costs = np.array([frame.cost for frame in frames])
     return float(costs[usable].mean() if usable.any() else costs.mean())
 
@@ -90,7 +96,8 @@ def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
 def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
     """Return a frame with the evaluations and the time of several together.
 
-    The course of its search is given as if all went on abreast: its evaluations are stretched to those of all.
+    The evaluations in the trace of its search are stretched to the total, as if all
+    searches ran in parallel.
     """
     seconds, cpu_seconds = (
         sum(getattr(each, name) for each in together)
@@ -101,7 +108,7 @@ def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
 
 
 def with_total_effort(tracks: Sequence[Sequence[Frame]], best: int) -> list[Frame]:
-    """Return the frames of the track that is kept, with the evaluations and the time of all tracks."""
+    """Return the frames of the best track, with the effort of all tracks."""
     return [
         with_effort_of(together[best], together)
         for together in zip(*tracks, strict=True)
@@ -135,17 +142,15 @@ def cheapest(
 
 
 def typical_speed(training: Sequence[Motion]) -> float:
-    """Return the root mean square speed of joints about the root in some motions, in metres a second."""
+    """Return the root mean square speed of joints about the root, metres a second."""
     squares = [
         _mean_squares(_velocities(motion.skeleton.joints(motion.poses), motion.fps))
         for motion in training
     ]
     each = np.concatenate(squares) if squares else np.empty(0)
-    return (
-        max(float(np.sqrt(each.mean())), MIN_TYPICAL_SPEED)
-        if len(each)
-        else WALKING_SPEED
-    )
+    if not len(each):
+        return WALKING_SPEED
+    return max(float(np.sqrt(each.mean())), MIN_TYPICAL_SPEED)
 
 
 def trajectory_cost(
@@ -155,38 +160,44 @@ def trajectory_cost(
     fps: float,
     speed: float,
 ) -> TrajectoryCost:
-    """Return what a whole trajectory costs; held frames count for nothing, unless all are held.
+    """Return the cost of a whole trajectory.
 
-    The motion term is half the squared change of a joint's velocity about the root, from one thirtieth of a second to
-    the next, over the square of twice the typical `speed`: a joint that turns around on the spot at that speed costs a
-    half. It is the mean over joints and frames, and is added to the mean silhouette cost as it is. A frame counts for
-    five typical speeds at most: a body that jumped has jumped, however far.
+    The motion term is half the squared change of a joint's velocity about the root,
+    from one thirtieth of a second to the next, over the square of twice the typical
+    speed. A joint that turns around on the spot at the typical speed costs a half. The
+    term is the mean over joints and frames, and is added to the mean silhouette cost as
+    it is. The change in a frame counts as five typical speeds at most: a jump is a
+    jump, however far.
+
+    Args:
+        frames: The frames of the trajectory.
+        usable: Whether each shows enough of the person. The others are held and count
+            for nothing, unless all are.
+        skeleton: The person's skeleton.
+        fps: Frames a second.
+        speed: The typical speed, metres a second.
+
     """
     shown = np.asarray(usable, dtype=bool)
-    velocities = _velocities(
-        skeleton.joints(np.array([frame.pose for frame in frames])), fps
-    )
+    joints = skeleton.joints(np.array([frame.pose for frame in frames]))
+    velocities = _velocities(joints, fps)
     step = _step(fps)
     changes = _mean_squares(velocities[step:] - velocities[:-step])
-    # of each change, its three frames
+    # a change counts if all of its three frames do
     counted = shown[: -2 * step] & shown[step:-step] & shown[2 * step :]
-    terms = (
-        0.5
-        * np.minimum(changes[counted], (JUMP_SPEED * speed) ** 2)
-        / (TURN_AROUND_SPEED * speed) ** 2
-    )
-    return TrajectoryCost(
-        mean_cost(frames, shown), float(terms.mean()) if len(terms) else 0.0
-    )
+    squares = np.minimum(changes[counted], (JUMP_SPEED * speed) ** 2)
+    terms = 0.5 * squares / (TURN_AROUND_SPEED * speed) ** 2
+    motion = float(terms.mean()) if len(terms) else 0.0
+    return TrajectoryCost(mean_cost(frames, shown), motion)
 
 
 def _step(fps: float) -> int:
-    """Return how many frames a thirtieth of a second is, one at least."""
+    """Return the number of frames in a thirtieth of a second, at least one."""
     return max(round(fps / VELOCITY_RATE), 1)
 
 
 def _velocities(joints: Array, fps: float) -> Array:
-    """Return the velocities (T - step, 27, 3) of joints (T, 27, 3) about the root, in metres a second."""
+    """Return velocities (T - step, 27, 3) of joints (T, 27, 3) about the root, m/s."""
     step = _step(fps)
     rooted = root_centred(joints)
     return np.asarray((rooted[step:] - rooted[:-step]) * (fps / step))

@@ -112,11 +112,11 @@ class Lists(Annealed):
 
 
 @each("method", [Holds, (Lists, "pca")])
-def test_a_method_that_starts_anew_says_so_when_it_goes_on(
+def test_a_method_that_starts_over_says_so_when_it_resumes(
     method: Any, tmp_path: Path
 ) -> None:
     log: list[str] = []
     how = {"progress": Progress(log.append)}
     resumed(method, (2,), tmp_path / "out", **how)
-    (line,) = [line for line in log if "starts anew" in line]
-    assert re.search("(Holds|Lists@pca) starts anew at frame 2: the frames from", line)
+    (line,) = [line for line in log if "starts over" in line]
+    assert re.search("(Holds|Lists@pca) starts over at frame 2: the frames from", line)

@@ -1,4 +1,4 @@
-"""A track of footage as a body would walk it: no shaking, planted feet, contours as in the masks.
+"""Smoothing of a track: no shaking, planted feet, contours that match the masks.
 
 | looking for | file |
 |---|---|

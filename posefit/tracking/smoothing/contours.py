@@ -1,8 +1,9 @@
-"""Poses, path and build whose contours are those of the masks, by least squares over all frames at once.
+"""Poses, path and build fitted to the contours of masks, over all frames at once.
 
-A tracker's estimate is one of the poses that it knows, and a search in each frame makes it shake. Here every angle
-gives way a little, and smoothly, to the contours of the masks; so do the build and the turns of several cameras,
-which are the same in all frames.
+A tracker's estimate is one of the poses that it knows, and a search in each frame makes
+it shake. Here least squares adjust every angle a little, and smoothly, to the contours
+of the masks. The build, and small turns of several cameras, are fitted too. They are
+the same in all frames.
 """
 
 from collections.abc import Sequence
@@ -45,25 +46,37 @@ from posefit.tracking.smoothing.path import (
     windows_over,
 )
 
-FACTOR_DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
-# that an angle may be off the estimate: standard deviation, as all that follow
+# Step of a difference quotient by the logarithm of a factor.
+FACTOR_DIFFERENCE = 1e-4
+# Standard deviations. An angle from its estimate, and the acceleration of this
+# difference, radians a second squared.
 ANGLE_DEVIATION = np.radians(8.0)
-ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
-# metres that the root may be off the estimate, across the line of sight
+ANGLE_ACCELERATION = np.radians(450.0)
+# The root from its estimate, across the line of sight, metres.
 CONTOUR_ROOT_DEVIATION = 0.03
-MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor, or of a camera's turn
-# that a calibrated camera may be turned: standard deviation about each axis; ours
+# The turn of a calibrated camera about each axis. Our choice.
 CAMERA_DEVIATION = np.radians(0.03)
-# that weigh as much as what is known of people: errors of successive contours are
-# correlated
+# The largest change in a step: of the logarithm of a factor, or of a camera's turn.
+MAX_FACTOR_STEP = 0.2
+# This many frames weigh as much as what is known about people. It is more than one
+# because the errors of successive contours are correlated.
 BUILD_FRAMES = 2.0
-# frames that are solved for at once, and those that two windows share
-CONTOUR_WINDOW = 300
-CONTOUR_OVERLAP = 30
+CONTOUR_WINDOW = 300  # frames that are solved together
+CONTOUR_OVERLAP = 30  # frames that two neighbouring windows share
 
 
 def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Array]:
-    """Return how joints (T, 17, 27, 3) and radii (17, 26, 2), metres, change with the logarithms of factors."""
+    """Return how joints and radii change with the logarithms of the factors of a build.
+
+    Args:
+        body: The body.
+        height: Its height in metres, or None if it may change.
+        motion: The motion of the body, T frames.
+
+    Returns:
+        The derivatives of joints (T, 17, 27, 3) and of radii (17, 26, 2), metres.
+
+    """
     bodies = [
         shaped(body, np.exp(FACTOR_DIFFERENCE * row), height)
         for row in np.eye(len(NAMES))
@@ -74,25 +87,24 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
         for grown in bodies
     ]
     radii = [grown.radii - body.radii for grown in bodies]
-    return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(
-        radii
-    ) / FACTOR_DIFFERENCE
+    joint_changes = np.stack(joints, axis=1) / FACTOR_DIFFERENCE
+    radius_changes = np.stack(radii) / FACTOR_DIFFERENCE
+    return joint_changes, radius_changes
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
+    """The frames of a window, with what is fitted in them."""
+
     estimate: Motion  # before it is fitted
     fitted: Motion
     body: Body
-    # (17,) logarithms of what the body was fitted by before; (0,) where the build is
-    # known
-    factors: Array
+    factors: Array  # (17,) logarithms of the factors so far; (0,) if the build is known
     height: float | None
     visibility: Visibility
     spread: Array  # (17,) standard deviations of these logarithms
     cameras: Sequence[Camera]
-    # (V, 3) radians that each camera's world was turned by; (0, 3) where calibrations
-    # are held
+    # (V, 3) radians, the turn of the world in each camera; (0, 3) if cameras stay
     turns: Array
 
 
@@ -104,12 +116,24 @@ def fit_contours(
     beta: float = BETA,
     scales: Sequence[float] = ROBUST_SCALES,
 ) -> tuple[Scene, Motion, Shape | None]:
-    """Return a steady motion fitted to the borders of a scene's masks, with the scene's cameras and the build.
+    """Return a steady motion fitted to the borders of a scene's masks.
 
-    The build stays as it is where it was not fitted before (`shape` is None): it is then known. Several cameras are
-    turned a little from their calibrations. Both are fitted in the window of a long track with most usable frames.
-    `scales` has the reach of each step in metres. A result that costs more than its start is discarded. A motion of
-    fewer than 3 frames is returned as it is.
+    Several cameras are turned a little from their calibrations. In a long track, the
+    build and the cameras are fitted in the window with most usable frames. A result
+    that costs more than its start is discarded. A motion of fewer than 3 frames is
+    returned as it is.
+
+    Args:
+        scene: The scene.
+        motion: The motion, steadied.
+        visibility: The visibility of its frames.
+        shape: The build if it was fitted, or None if it is known; it is then held.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
+        scales: The reach of each step, metres.
+
+    Returns:
+        The scene with the fitted body and cameras, the motion, and the build.
+
     """
     if len(motion) < 3 or not visibility.usable.any():
         return scene, motion, shape
@@ -133,15 +157,11 @@ def fit_contours(
         part = fitted.get(k) or _fitted(
             scene, motion, visibility, rows, None, beta, scales
         )
-        poses[rows[inner]], places[rows[inner]] = (
-            part.fitted.poses[inner],
-            part.fitted.translations[inner],
-        )
-    return (
-        scene,
-        replace(motion, skeleton=scene.body.skeleton, poses=poses, translations=places),
-        shape,
-    )
+        poses[rows[inner]] = part.fitted.poses[inner]
+        places[rows[inner]] = part.fitted.translations[inner]
+    skeleton = scene.body.skeleton
+    fitted_motion = replace(motion, skeleton=skeleton, poses=poses, translations=places)
+    return scene, fitted_motion, shape
 
 
 def _fitted(
@@ -154,7 +174,10 @@ def _fitted(
     scales: Sequence[float],
     turned: bool = False,
 ) -> _Part:
-    """Return some frames of a motion as the best step fits them, with the build where there is a shape to fit."""
+    """Return some frames of a motion after the best step.
+
+    The build is fitted too unless `shape` is None, and the cameras if `turned`.
+    """
     body = scene.body
     cameras = scene.cameras
     estimate = replace(
@@ -169,9 +192,8 @@ def _fitted(
         MaskContours.of(camera, view, observations, places)
         for view, camera in enumerate(cameras)
     ]
-    factors, height = (
-        (np.empty(0), None) if shape is None else (np.log(shape.factors), shape.height)
-    )
+    factors = np.empty(0) if shape is None else np.log(shape.factors)
+    height = None if shape is None else shape.height
     turns = np.zeros((len(cameras) if turned and scene.cameras_turn else 0, 3))
     spread = np.zeros(len(factors))
     part = _Part(
@@ -197,7 +219,7 @@ def _fitted(
 
 
 def _mean_cost(part: _Part, usable: ObservedFrames, beta: float) -> float:
-    """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
+    """Return the mean cost of the usable frames, or infinity if no frame is usable."""
     rows = part.visibility.usable
     if not rows.any():
         return np.inf
@@ -269,7 +291,10 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
 def _frame_squares(
     part: _Part, hessians: Array, gradients: Array, angles: Sequence[int]
 ) -> Squares:
-    """Return those of the borders, and of what is known of each frame's root, of its angles and of standing feet."""
+    """Return the squares of a step: the borders, and what is known without them.
+
+    Known are the root and the angles of each frame, and that standing feet do not move.
+    """
     fitted = part.fitted
     estimate = part.estimate
     visibility = part.visibility
@@ -298,7 +323,7 @@ def _frame_squares(
 
 
 def _changes(part: _Part) -> list[tuple[Array, Array]]:
-    """Return how joints and radii change in each view with the factors of the build and the turns of the cameras."""
+    """Return how joints and radii change in each view with build and camera turns."""
     joints = part.fitted.joints
     turns = part.turns.size
     wider = np.empty((len(joints), 0, *joints.shape[1:]))
@@ -309,7 +334,8 @@ def _changes(part: _Part) -> list[tuple[Array, Array]]:
     changes = []
     for view, camera in enumerate(part.cameras):
         turned = np.zeros((len(joints), turns, *joints.shape[1:]))
-        if turns:  # in this view the world turns about its optical centre
+        # a turned camera sees the world turned about its optical centre
+        if turns:
             away = (joints - camera.position)[:, None]
             turned[:, 3 * view : 3 * view + 3] = np.cross(np.eye(3)[:, None], away)
         changes.append((np.concatenate([wider, turned], axis=1), larger))
@@ -317,6 +343,9 @@ def _changes(part: _Part) -> list[tuple[Array, Array]]:
 
 
 def turned_camera(camera: Camera, turn: Array) -> Camera:
-    """Return a camera that sees the world turned about its optical centre, by a rotation vector (3,)."""
+    """Return a camera that sees the world turned about its optical centre.
+
+    `turn` (3,) is a rotation vector, radians.
+    """
     rotation = camera.rotation @ cv2.Rodrigues(turn)[0]
     return replace(camera, rotation=rotation, translation=-rotation @ camera.position)

@@ -1,10 +1,12 @@
 """Which leg is the left one, over a whole film by one camera.
 
-From the side, two legs that pass each other look like two that meet and go back, and a track takes the one for the
-other. But a body whose legs go back, or are exchanged in the middle of a stride, does not stay on the masks once its
-motion is smooth. So legs are exchanged, for a trial, from each doubtful frame on. The costs of these trials, and of
-each stretch between them as it is and exchanged, give the cheapest sequence of exchanges. Most films need no trial:
-exchanged legs cost more everywhere than all that could be saved.
+Seen from the side, two legs that pass each other look like two legs that meet and go
+back, and a track may take one for the other. But if legs go back, or are exchanged in
+the middle of a stride, the body leaves the masks once its motion is smooth. So trials
+exchange the legs from each doubtful frame on. The costs of these trials, and of each
+stretch between them as it is and exchanged, give the cheapest sequence of exchanges.
+Most films need no trial, because exchanged legs cost more everywhere than an exchange
+could save.
 """
 
 from collections.abc import Sequence
@@ -26,21 +28,22 @@ from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
 
-ROUNDS = 3  # at most: what is exchanged in one shows the next what else is doubtful
-TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
-# the same, of frames that a wrong exchange makes cost more
+ROUNDS = 3  # at most; the exchanges of a round show what else is doubtful
+TRIAL_SECONDS = 0.3  # length of a trial before and after its frame
+# A wrong exchange raises the costs of frames for this time before and after it.
 DOUBT_SECONDS = 0.1
-# metres, rms: exchanged legs that are so near to those of the frame before may be
-# theirs
+# Metres, rms. Legs may have to be exchanged if, exchanged, they are this near to the
+# legs of the frame before.
 PASSING = 0.16
-# the same, where a smoothed frame costs so many times the median, the most around
+# The same if a smoothed frame costs more than all around it, and more than HIGH_COST
+# times the median.
 JUMPING = 0.33
 HIGH_COST = 1.3
-AROUND_SECONDS = 0.08  # in which one frame stands for all
-# of landmarks: of the logarithm of the odds that legs are as they are, as errors last
-# for frames
+AROUND_SECONDS = 0.08  # at most one frame is doubtful within this time
+# Factor on the logarithm of the landmarks' odds that legs are right. It is below 1
+# because the errors of landmarks last for several frames.
 ODDS_COST = 0.5
-# metres: the steps of a first look, fewer than `ROBUST_SCALES`
+# Metres: the reach of each step of a first look, which has fewer than `ROBUST_SCALES`.
 QUICK_SCALES = (0.065, 0.045, 0.033, 0.033)
 LEG_JOINTS = [
     JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]
@@ -50,10 +53,19 @@ LEG_JOINTS = [
 def with_cheapest_legs(
     tracked: Sequence[Frame], smoothed: Smoothed, beta: float
 ) -> tuple[Smoothed, NDArray[np.bool_]]:
-    """Return tracked frames smoothed with their legs exchanged where that is cheaper, and in which (T,) they are.
+    """Return smoothed frames with legs exchanged wherever that is cheaper.
 
-    Where a fifth are, it stays open which of two sequences is right, this one or that with left and right exchanged:
-    posteriors have both.
+    If legs are exchanged in a fifth of the frames, it stays open whether this sequence
+    is right or the one with left and right exchanged. The posteriors then have both.
+
+    Args:
+        tracked: The tracked frames.
+        smoothed: The same, smoothed.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
+
+    Returns:
+        The smoothed frames, and whether legs are exchanged in each of them (T,).
+
     """
     scene = smoothed.scene
     shape = smoothed.shape
@@ -75,21 +87,20 @@ def with_cheapest_legs(
         smoothed = again
         changed = changed ^ exchanged
     share = min(float(changed.mean()), 0.5)
-    return smoothed._replace(
-        frames=[_with_both(scene, frame, share) for frame in smoothed.frames]
-    ), changed
+    frames = [_with_both(scene, frame, share) for frame in smoothed.frames]
+    return smoothed._replace(frames=frames), changed
 
 
 def legs_exchanged(
     smoothed: Smoothed, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float
 ) -> NDArray[np.bool_]:
-    """Return in which frames (T,) legs should be exchanged, as that is cheaper.
+    """Return in which frames (T,) exchanged legs are cheaper.
 
     Args:
-        smoothed: the frames once they are smoothed.
-        frames: as they were tracked.
-        usable: (T,) which of them show enough.
-        beta: that of the cost.
+        smoothed: The smoothed frames.
+        frames: The tracked frames.
+        usable: (T,) whether a frame shows enough of the person.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
 
     """
     scene = smoothed.scene
@@ -99,7 +110,7 @@ def legs_exchanged(
     edges = doubtful(here, there, costs, usable)
     odds = _odds(scene, here)
     reach = max(round(TRIAL_SECONDS * scene.fps), 2)
-    # a few steps are enough to see where nothing is in doubt
+    # a few steps are enough to see which stretches are beyond doubt
     quick = _smoothed_costs(scene, there, beta, QUICK_SCALES)
     near = max(round(DOUBT_SECONDS * scene.fps), 1)
     edges, anything = in_doubt(edges, near, costs, quick - costs + odds, usable)
@@ -108,7 +119,8 @@ def legs_exchanged(
     added = _smoothed_costs(scene, there, beta) - _smoothed_costs(scene, here, beta)
     exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
-    for edge in edges:  # in the order of time: two that are near each other may be one
+    # in the order of time, because two edges near each other may be one exchange
+    for edge in edges:
         rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
         later = np.arange(len(frames)) >= edge
         window = replace(scene, observations=[scene.observations[k] for k in rows])
@@ -120,18 +132,16 @@ def legs_exchanged(
             _smoothed_costs(window, window.motion(trial), beta).sum()
             for trial in trials
         )
-        switch = (
-            other - same - np.where(exchanged, -added, added)[edge : rows.stop].sum()
-        )
+        later_costs = np.where(exchanged, -added, added)[edge : rows.stop]
+        switch = other - same - later_costs.sum()
         switches.append(abs(switch))
         exchanged ^= later & (switch < 0.0)
     starts = [0, *edges]
     stops = [*edges, len(frames)]
     stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + odds), starts)
     steps = np.reshape(switches, (-1, 1, 1)) * (1.0 - np.eye(2))
-    others = cheapest_sequence(
-        np.column_stack([np.zeros(len(starts)), stretches]), steps
-    )
+    both_costs = np.column_stack([np.zeros(len(starts)), stretches])
+    others = cheapest_sequence(both_costs, steps)
     others = np.repeat(others, np.subtract(stops, starts))
     return np.asarray(exchanged != others)
 
@@ -143,11 +153,21 @@ def in_doubt(
     added: Array,
     usable: NDArray[np.bool_],
 ) -> tuple[list[int], bool]:
-    """Return the edges of the stretches that may be better with exchanged legs, and whether any stretch may be.
+    """Return the edges of stretches that may be better with exchanged legs.
 
-    To exchange the legs between two edges adds `added` (T,) to the cost of each frame there. All that it can save is
-    what frames near these edges, closer than `reach`, cost more than others, where they do clearly: `costs` (T,) are
-    those of smoothed frames.
+    An exchange between two edges changes the cost of each frame there by `added`. It
+    saves at most the excess cost of frames near the two edges.
+
+    Args:
+        edges: The frames from which legs may be exchanged.
+        reach: Frames closer to an edge than this are near it.
+        costs: (T,) the costs of smoothed frames. Only clearly high ones are in excess.
+        added: (T,) what an exchange adds to the costs.
+        usable: (T,) whether a frame shows enough of the person.
+
+    Returns:
+        The edges, and whether any stretch may be better.
+
     """
     typical = np.median(costs[usable])
     excess = np.where(usable & (costs > HIGH_COST * typical), costs - typical, 0.0)
@@ -169,38 +189,40 @@ def in_doubt(
 def doubtful(
     here: Motion, there: Motion, costs: Array, usable: NDArray[np.bool_]
 ) -> list[int]:
-    """Return the frames from which legs may have to be exchanged: those of `there` are near to those of the one before.
+    """Return the frames from which legs may have to be exchanged.
 
-    They need not be as near where the smoothed frame costs more than others. Frames that are not `usable` are left out.
+    Their exchanged legs are near to the legs of the frame before. They need not be as
+    near if the smoothed frame costs more than others.
+
+    Args:
+        here: The motion.
+        there: The motion with exchanged legs.
+        costs: (T,) the costs of smoothed frames.
+        usable: (T,) whether a frame shows enough of the person; others are left out.
+
     """
     legs, exchanged = (
         root_centred(motion.skeleton.joints(motion.poses))[:, LEG_JOINTS]
         for motion in (here, there)
     )
-    off = np.append(
-        np.inf, np.sqrt(((exchanged[1:] - legs[:-1]) ** 2).sum(axis=2).mean(axis=1))
-    )
+    squares = ((exchanged[1:] - legs[:-1]) ** 2).sum(axis=2)  # (T - 1, joints)
+    off = np.append(np.inf, np.sqrt(squares.mean(axis=1)))  # (T,)
     around = max(round(AROUND_SECONDS * here.fps), 1)
 
     def least(values: Array) -> NDArray[np.bool_]:
-        """Return where values (T,) are the least around."""
+        """Return whether each of values (T,) is the least of those around it."""
         padded = np.pad(values, around, constant_values=np.inf)
-        return np.asarray(
-            values
-            <= np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1).min(
-                axis=1
-            )
-        )
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1)
+        return np.asarray(values <= windows.min(axis=1))
 
     passing = (off < PASSING) & least(off)
-    jumping = (
-        (off < JUMPING) & least(-costs) & (costs > HIGH_COST * np.median(costs[usable]))
-    )
+    costly = costs > HIGH_COST * np.median(costs[usable])
+    jumping = (off < JUMPING) & least(-costs) & costly
     return [int(frame) for frame in np.flatnonzero((passing | jumping) & usable)]
 
 
 def _exchanged(scene: Scene, frame: Frame) -> Frame:
-    """Return a frame with exchanged legs; so are those of its posterior."""
+    """Return a frame with exchanged legs, also in its posterior."""
     skeleton = scene.body.skeleton
     posterior = frame.posterior
     if posterior is not None:
@@ -215,7 +237,7 @@ def _exchanged(scene: Scene, frame: Frame) -> Frame:
 
 
 def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
-    """Return a frame whose posterior has a share of poses with left and right exchanged, where that is not small."""
+    """Return a frame with a share of its posterior mirrored, unless that is small."""
     posterior = frame.posterior
     if posterior is None or share < SECOND_SIDE:
         return frame
@@ -242,7 +264,7 @@ def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
 def _smoothed_costs(
     scene: Scene, motion: Motion, beta: float, scales: Sequence[float] = ROBUST_SCALES
 ) -> Array:
-    """Return the costs (T,) of a motion's frames once it is smoothed; 0 for those that show too little."""
+    """Return the costs (T,) of a motion once smoothed, 0 for unusable frames."""
     scene, motion, _ = smoothed_motion(scene, motion, None, beta, scales)
     usable = np.array([observation.usable for observation in scene.observations])
     costs = np.zeros(len(motion))
@@ -259,7 +281,7 @@ def _smoothed_costs(
 
 
 def _odds(scene: Scene, motion: Motion) -> Array:
-    """Return what landmarks add (T,) to the cost of frames with exchanged legs."""
+    """Return the costs (T,) that landmarks add to frames with exchanged legs."""
     costs = np.zeros(len(motion))
     for k, observation in enumerate(scene.observations):
         if observation.landmarks is not None:

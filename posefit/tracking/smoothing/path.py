@@ -1,7 +1,8 @@
 """The likeliest path of a root and two legs, by least squares over all frames at once.
 
-Each frame pulls the root to its estimate, weighted by how well that is known; accelerations cost; and standing feet
-should not move, for which the legs give way a little.
+Each frame pulls the root to its estimate, weighted by how well that is known.
+Accelerations have a cost, and so do the steps of standing feet; the legs give way a
+little to keep these still.
 """
 
 from collections.abc import Sequence
@@ -18,12 +19,12 @@ from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, low, runs
 from posefit.silhouette.cost import only_camera
 
-BAND_REACH = 2  # frames to either side that a frame has terms with
+BAND_REACH = 2  # a frame has terms with this many frames to either side
 SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
 
 
 class Squares:
-    """Half the Hessian and half the gradient of a sum of squares, in T frames of n numbers each."""
+    """Half the Hessian and gradient of a sum of squares, in T frames of n numbers."""
 
     def __init__(self, frames: int, numbers: int) -> None:
         # a frame with itself, with the next one, and with the one after that
@@ -31,12 +32,26 @@ class Squares:
         self.gradients = np.zeros((frames, numbers))
 
     def add(self, which: slice, precise: Array, gradients: Array) -> None:
-        """Add squares of some numbers of each frame: their precision (m, m) or (T, m, m), and its product (T, m)."""
+        """Add squares of some numbers of each frame.
+
+        Args:
+            which: The numbers.
+            precise: (m, m) or (T, m, m) their precision.
+            gradients: (T, m) the product of the precision and their values.
+
+        """
         self.hessians[0, :, which, which] += precise
         self.gradients[:, which] += gradients
 
     def add_bends(self, which: slice, series: Array, weight: float) -> None:
-        """Add the squares of `weight` times the second differences of some numbers, which are now `series` (T, m)."""
+        """Add the squares of weighted second differences of some numbers.
+
+        Args:
+            which: The numbers.
+            series: (T, m) their values now.
+            weight: The factor on the differences.
+
+        """
         bends = weight**2 * np.diff(series, 2, axis=0)
         count = len(series)
         diagonal = np.arange(which.start, which.stop)
@@ -56,9 +71,14 @@ class Squares:
         derivatives: Array,
         weight: float,
     ) -> None:
-        """Add the squares of `weight` times the changes of `series` (T, m) from some frames to the next ones.
+        """Add the squares of weighted changes of a series from frames to the next ones.
 
-        `derivatives` (T, m, n) are those of the series by the numbers of the same frame.
+        Args:
+            frames: The frames from which the changes count.
+            series: (T, m) the values now.
+            derivatives: (T, m, n) of the values by the numbers of the same frame.
+            weight: The factor on the changes.
+
         """
         steps = weight**2 * (series[frames + 1] - series[frames])
         here = derivatives[frames]
@@ -72,7 +92,7 @@ class Squares:
         self.hessians[1, frames] -= weight**2 * np.einsum("kmi,kmj->kij", here, there)
 
     def least(self) -> Array:
-        """Return the step (T, n) to subtract from the numbers, so that the sum is least."""
+        """Return the step (T, n) to subtract from the numbers for the least sum."""
         return self.steps_for(self.gradients[..., None])[..., 0]
 
     def steps_for(self, gradients: Array) -> Array:
@@ -99,20 +119,29 @@ class Squares:
         return np.asarray(steps).reshape(gradients.shape)
 
 
-STANDING_SPEED = 0.25  # metres a second that a standing foot may seem to move
-# of the root's speed, which it may seem to move where that is more
+# A standing foot may seem to move at this speed, metres a second, or at this share of
+# the speed of the root, if that is more.
+STANDING_SPEED = 0.25
 STANDING_SPEED_SHARE = 0.45
-STANDING_HEIGHT = 0.07  # metres above the lowest place of either foot within a stride
+# Metres above the lowest place of either foot within a stride, at most.
+STANDING_HEIGHT = 0.07
 STRIDE_SECONDS = 1.2
 MIN_STANCE_SECONDS = 0.12
-MAX_STANCE_GAP_SECONDS = 0.07  # in which a foot seems not to stand
+MAX_STANCE_GAP_SECONDS = 0.07  # shorter gaps in a stance are closed
 
 
 def standing_feet(joints: Array, fps: float, viewpoints: Array) -> NDArray[np.bool_]:
-    """Return whether the left and the right foot stand (T, 2), of joints (T, 27, 3) whose root moves smoothly.
+    """Return whether the left and the right foot stand (T, 2).
 
-    A foot that stands is low, and slow compared with the root, which a walk moves on. y is up. A single camera, at
-    `viewpoints` (T, 3), shows how slow it is only across the line of sight; these are NaN where several show it.
+    A standing foot is low, and slow compared with the root, which a walk moves ahead.
+
+    Args:
+        joints: (T, 27, 3) metres, y up. The root must move smoothly.
+        fps: Frames a second.
+        viewpoints: (T, 3) metres, the position of the single camera that shows a frame,
+            NaN if several show it. A single camera shows speeds only across the line of
+            sight.
+
     """
     feet = joints[:, BALLS]
     sights = (joints[:, 0] - viewpoints)[:, [0, 2]]
@@ -126,9 +155,9 @@ def standing_feet(joints: Array, fps: float, viewpoints: Array) -> NDArray[np.bo
 
 
 def _speeds(places: Array, sights: Array, fps: float) -> Array:
-    """Return how fast places (T, n, 3) move along the ground (T, n), except along the lines of sight (T, 2).
+    """Return the speeds (T, n) of places (T, n, 3) along the ground.
 
-    A line of NaN excludes nothing.
+    The part along the lines of sight (T, 2) is left out, unless the line is NaN.
     """
     velocities = np.gradient(places[..., [0, 2]], 1.0 / fps, axis=0)
     sights = np.nan_to_num(
@@ -142,7 +171,7 @@ def _speeds(places: Array, sights: Array, fps: float) -> Array:
 
 
 def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
-    """Return flags (T,) without runs of fewer than `least` frames, except at either end."""
+    """Return flags (T,) without runs shorter than `least`, except at either end."""
     longer = flags.copy()
     for start, stop in runs(flags):
         if stop - start < least and start > 0 and stop < len(flags):
@@ -150,25 +179,25 @@ def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     return longer
 
 
-# metres that a root may be off from its estimate: standard deviation, as all that
-# follow
+# Standard deviations. The root from its estimate, metres.
 PATH_ROOT_DEVIATION = 0.006
-DEPTH_DEVIATION = 0.004  # of the distance, towards or away from a single camera
-UNUSABLE_DEVIATION = 1.0  # metres, in frames that show too little
-ROOT_ACCELERATION = 3.0  # metres a second squared, of the root on each axis
-LEG_DEVIATION = np.radians(3.0)  # that an angle of a leg may be off the estimate
-LEG_ACCELERATION = np.radians(400.0)  # a second squared, of that difference
-# metres that a foot which stands may move in a thirtieth of a second
-STANDING_SLIDE = 0.004
-# standard deviations from the estimate beyond which a place is weighted down
+# The same along the line of sight of a single camera, as a share of the distance.
+DEPTH_DEVIATION = 0.004
+UNUSABLE_DEVIATION = 1.0  # the same in unusable frames, metres
+ROOT_ACCELERATION = 3.0  # the root on each axis, metres a second squared
+# An angle of a leg from its estimate, and the acceleration of this difference, radians
+# a second squared.
+LEG_DEVIATION = np.radians(3.0)
+LEG_ACCELERATION = np.radians(400.0)
+STANDING_SLIDE = 0.004  # a standing foot in a thirtieth of a second, metres
+# Places farther from the estimate than this many standard deviations get less weight.
 OUTLIER_DEVIATIONS = 4.0
 GAUSS_NEWTON_STEPS = 4
-ANGLE_DIFFERENCE = 1e-4  # radians: of a difference quotient
-# frames that are solved for at once, and those that two windows share
-PATH_WINDOW = 900
-PATH_OVERLAP = 60
+ANGLE_DIFFERENCE = 1e-4  # radians, the step of a difference quotient
+PATH_WINDOW = 900  # frames that are solved together
+PATH_OVERLAP = 60  # frames that two neighbouring windows share
 
-# places in a pose of the angles of both legs
+# Indices of the angles of both legs in a pose.
 LEGS = tuple(
     angles_of(
         [side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]
@@ -181,7 +210,7 @@ class Visibility:
     """Which frames of a motion are usable, and by which camera."""
 
     usable: NDArray[np.bool_]  # (T,)
-    # (T, 3) metres: of the only camera that shows it; NaN where several do
+    # (T, 3) metres, the position of the only camera that shows it, NaN if several do
     viewpoints: Array = field(repr=False)
 
     @classmethod
@@ -201,15 +230,17 @@ class Visibility:
 
 
 def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
-    """Return a motion whose root moves smoothly and whose feet do not slide where they stand.
+    """Return a motion with a smooth path of the root and planted feet.
 
-    Only the root's path and the angles of the legs change. A motion of fewer than 3 frames is returned as it is.
+    Only the root's path and the angles of the legs change. A motion of fewer than 3
+    frames is returned as it is.
     """
     if len(motion) < 3:
         return motion
     frames = np.arange(len(motion))
     known = np.flatnonzero(visibility.usable)
-    if len(known):  # the root moves straight on where frames show too little
+    # the root moves straight through frames that show too little
+    if len(known):
         lines = [
             np.interp(frames, known, line) for line in motion.translations[known].T
         ]
@@ -222,24 +253,22 @@ def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
         )
         stands = np.zeros((len(part), 2), dtype=bool)
         visible = visibility.at(rows)
-        # of the root alone, which shows which foot stands
+        # first without standing feet: a smooth root shows which foot stands
         smooth = _solved(part, visible, stands)
-        smooth = _solved(
-            part, visible, standing_feet(smooth.joints, smooth.fps, visible.viewpoints)
-        )
-        poses[rows[inner]], places[rows[inner]] = (
-            smooth.poses[inner],
-            smooth.translations[inner],
-        )
+        stands = standing_feet(smooth.joints, smooth.fps, visible.viewpoints)
+        smooth = _solved(part, visible, stands)
+        poses[rows[inner]] = smooth.poses[inner]
+        places[rows[inner]] = smooth.translations[inner]
     return replace(motion, poses=poses, translations=places)
 
 
 def windows_over(
     count: int, size: int, overlap: int
 ) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
-    """Return the frames (n,) of windows over `count` frames, and which of them (n,) are no neighbour's.
+    """Return the frames (n,) of windows over `count` frames, and which are inner (n,).
 
-    Each has `size` such frames, the last one the rest, and up to `overlap` of its neighbours' before and after them.
+    Each window has `size` inner frames, the last one the rest. Around them it has up to
+    `overlap` inner frames of each neighbour.
     """
     parts = []
     for start in range(0, count, size):
@@ -251,7 +280,7 @@ def windows_over(
 def _solved(
     motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]
 ) -> Motion:
-    """Return the motion of the least sum of squares, given which feet stand."""
+    """Return the motion with the least sum of squares, given which feet stand."""
     angles = [angle for angle in LEGS if motion.skeleton.free[angle]]
     root = slice(0, 3)
     legs = slice(3, 3 + len(angles))
@@ -283,10 +312,19 @@ def add_root(
     deviation: float,
     moved: Array,
 ) -> None:
-    """Add the squares of a root `moved` (T, 3) from its places in a motion, and of its accelerations.
+    """Add the squares of the root's distance from its estimate, and its accelerations.
 
-    `deviation` is how many metres it may be off across the line of sight, and in depth where there are several cameras.
-    The root's place is the first three numbers of each frame.
+    The place of the root is the first three numbers of each frame.
+
+    Args:
+        squares: Gets the squares.
+        motion: The estimate.
+        visibility: The visibility of its frames.
+        deviation: Standard deviation of the root from its estimate, metres. Along the
+            line of sight of a single camera it is `DEPTH_DEVIATION` of the distance, if
+            that is more.
+        moved: (T, 3) metres, the root relative to its estimate.
+
     """
     root = slice(0, 3)
     across = np.where(visibility.usable, deviation, UNUSABLE_DEVIATION)

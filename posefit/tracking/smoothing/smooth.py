@@ -19,16 +19,16 @@ from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import mean_cost
 
-# standard deviation of the filter of angles that a single camera sees
+# Standard deviation of the filter of angles in frames that a single camera sees.
 STEADY_SECONDS = 1.0 / 30.0
 
 
 class Smoothed(NamedTuple):
-    """Smoothed frames, and the scene and the build that they fit, where that was fitted before: else it is known."""
+    """Smoothed frames, with the scene and the build that they fit."""
 
     scene: Scene
     frames: list[Frame]
-    shape: Shape | None
+    shape: Shape | None  # None if the build is known, not fitted
 
 
 def smooth(
@@ -36,11 +36,20 @@ def smooth(
 ) -> Smoothed:
     """Return the frames of a scene, smoothed.
 
-    Costs and areas are those of the smoothed frames, and their posteriors move as far as the pose and the root did.
+    Costs and areas are computed again. Posteriors move as far as the pose and the root
+    did.
+
+    Args:
+        scene: The scene.
+        frames: Its tracked frames.
+        shape: The person's build if it was fitted, or None if it is known.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
+
     """
     visibility = Visibility.of(scene)
     scene, motion, shape = smoothed_motion(scene, scene.motion(frames), shape, beta)
-    motion = smooth_path(motion, visibility)  # contours pull at standing feet
+    # once more, because the contours pull at standing feet
+    motion = smooth_path(motion, visibility)
     seen = ObservedFrames.of(scene.observations)
     areas = seen.areas_of(scene.body, scene.cameras, motion.poses, motion.translations)
     costs = seen.costs(areas[:, None], beta)[0].tolist()
@@ -60,9 +69,15 @@ def smoothed_motion(
     beta: float,
     scales: Sequence[float] = ROBUST_SCALES,
 ) -> tuple[Scene, Motion, Shape | None]:
-    """Return a scene's motion, smoothed and fitted to the contours, with the scene and the build that it fits.
+    """Return a motion smoothed and fitted to the contours, with its scene and build.
 
-    `scales` has the reach of each step in metres.
+    Args:
+        scene: The scene.
+        motion: Its tracked motion.
+        shape: The person's build if it was fitted, or None if it is known.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
+        scales: The reach of each step of the fit, metres.
+
     """
     visibility = Visibility.of(scene)
     return fit_contours(
@@ -76,9 +91,10 @@ def smoothed_motion(
 
 
 def steadied(motion: Motion, visibility: Visibility) -> Motion:
-    """Return a motion whose angles are filtered over time, by a Gaussian, in the frames that a single camera sees.
+    """Return a motion with filtered angles in the frames that a single camera sees.
 
-    Its silhouettes leave most open, and angles shake from one frame to the next.
+    The silhouettes of a single camera leave most open, so that angles shake from one
+    frame to the next. The filter is a Gaussian over time.
     """
     from scipy.ndimage import gaussian_filter1d
 
@@ -88,14 +104,12 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
         axis=0,
         mode="nearest",
     )
-    return replace(
-        motion,
-        poses=np.where(np.isfinite(visibility.viewpoints[:, :1]), angles, motion.poses),
-    )
+    alone = np.isfinite(visibility.viewpoints[:, :1])  # (T, 1)
+    return replace(motion, poses=np.where(alone, angles, motion.poses))
 
 
 def _moved(frame: Frame, pose: Array, place: Array, cost: float, areas: Areas) -> Frame:
-    """Return a frame at another pose and place, with what it costs there."""
+    """Return a frame at another pose and place, with its cost and areas there."""
     posterior = frame.posterior
     if posterior is not None:
         poses = posterior.poses + wrapped(pose - frame.pose)
