@@ -166,8 +166,10 @@ class Ledger:
     @property
     def changed(self) -> float:
         """The time of the latest change to any of its files, in seconds since 1970."""
-        parts = [Path(f"{file}{suffix}") for file in self.files for suffix in ("", WAL)]
-        return max(path.stat().st_mtime for path in parts if path.exists())
+        logs = [Path(f"{file}{WAL}") for file in self.files]
+        # a reader makes a log as well, which stays empty
+        written = [log for log in logs if log.exists() and log.stat().st_size]
+        return max(path.stat().st_mtime for path in (*self.files, *written))
 
     @property
     def version(self) -> str:
