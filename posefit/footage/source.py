@@ -62,7 +62,7 @@ from posefit.reading import cut, existing, quoted
 NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf")
 
 
-class Unread(NamedTuple):
+class _Unread(NamedTuple):
     """Suffixes that users may well try, but that posefit does not read."""
 
     suffixes: Sequence[str]
@@ -72,7 +72,7 @@ class Unread(NamedTuple):
 
 # without this table OpenCV would try these files, and call them damaged videos
 UNREAD = (
-    Unread(
+    _Unread(
         suffixes=(
             *(".trc", ".c3d", ".fbx", ".glb", ".gltf", ".mvnx", ".mot", ".sto"),
             *(".osim", ".htr", ".v3d", ".vmd", ".usd", ".usda", ".usdc", ".usdz"),
@@ -81,7 +81,7 @@ UNREAD = (
         what="motions",
         instead=" and ".join(MOTIONS),
     ),
-    Unread(
+    _Unread(
         suffixes=(
             *(".json", ".xml", ".csv", ".txt", ".yaml", ".yml", ".toml", ".zip"),
             *(".mat", ".h5", ".hdf5", ".pkl", ".pickle", ".pt", ".pth"),
@@ -217,8 +217,8 @@ def _kind_of(place: Place) -> Kind:
 def _with_numbers(places: Sequence[Place]) -> list[Place]:
     """Return places whose images are in the order of the numbers in their names.
 
-    Cameras are paired by these numbers if all of them have images. Next to an .npz file,
-    say, each camera's images are numbered alone.
+    Cameras are paired by these numbers if all of them have images. If another camera
+    has an .npz file, say, each camera's images are numbered alone.
     """
     images = [place for place in places if isinstance(place, Images)]
     if len(images) == len(places):
@@ -264,8 +264,8 @@ def _place(source: Footage) -> Place:
         return path
     if path.is_file():
         raise InputError(
-            f"{path}: expected a name that ends in what the file is, such as .mp4, .npz "
-            "or .bvh, got no suffix"
+            f"{path}: expected a name that ends in what the file is, such as .mp4, "
+            ".npz or .bvh, got no suffix"
         )
     return existing(path) if os.sep in str(source) else source
 
@@ -282,8 +282,8 @@ def _images_of_folder(folder: Path) -> Images:
     """Return the images in a folder. Raises InputError if it contains none."""
     if (folder / "poses.npz").is_file() and (folder / "summary.json").is_file():
         raise InputError(
-            f"{folder}: expected a source, got a track's folder: give the source that it "
-            "was made from"
+            f"{folder}: expected a source, got a track's folder: give the source that "
+            "it was made from"
         )
     images = images_in(folder)
     if not images:
@@ -301,7 +301,7 @@ def _name_of(place: Place) -> str:
     return "masks" if isinstance(place, np.ndarray) else str(place)
 
 
-class Use(NamedTuple):
+class _Use(NamedTuple):
     """The sources that an option applies to."""
 
     where: str  # as messages call them
@@ -310,18 +310,18 @@ class Use(NamedTuple):
 
 _FOOTAGE: Sequence[Medium] = ("masks", "video", "pictures")
 _USED_FOR = {
-    "extraction": Use("video", ["video", "pictures"]),
-    "fps": Use("motions, masks and pictures", ["motion", "masks", "pictures"]),
-    "label": Use("masks", ["masks"]),
-    "holes": Use("masks", ["masks"]),
-    "height": Use("footage", _FOOTAGE),
-    "person": Use("footage", _FOOTAGE),
-    "size": Use("motions", ["motion"]),
+    "extraction": _Use("video", ["video", "pictures"]),
+    "fps": _Use("motions, masks and pictures", ["motion", "masks", "pictures"]),
+    "label": _Use("masks", ["masks"]),
+    "holes": _Use("masks", ["masks"]),
+    "height": _Use("footage", _FOOTAGE),
+    "person": _Use("footage", _FOOTAGE),
+    "size": _Use("motions", ["motion"]),
 }
 
 
 def check_used(medium: Medium, view: Mapping[str, Any]) -> None:
-    """Raise InputError if an option is given that does not apply to this kind of source.
+    """Raise InputError if a given option does not apply to this kind of source.
 
     Args:
         medium: The kind of source.
@@ -379,8 +379,21 @@ def scene_of(
     Args:
         source: As for `resolve`, or its result.
         progress: Shows how far reading is.
-        **options: The options of `posefit.track`, see `posefit.tracking.options`;
-            `check_used` refuses those that do not apply to the source.
+        asf: Skeleton file of the person.
+        camera: Cameras, calibrations, or their files; by default one is guessed.
+        view_degrees: Angles of the cameras around a motion, or which way the person
+            faces in footage.
+        size: Width and height of rendered masks.
+        fps: Frames per second; by default what the source states, or else 30.
+        frames: First frame, and the frame after the last.
+        extraction: How the person is segmented in a film.
+        height: Height of the person in metres.
+        up: Which axis of the calibrations or the motion's file points up.
+        unit: Unit of the calibrations or the motion's file.
+        rate: Frames per second of a motion's file that does not state them.
+        label: The person's value in masks with several labels.
+        holes: Share of the person's area up to which holes are filled.
+        person: Which of several people is followed.
 
     Returns:
         The scene, whose guesses are logged.
@@ -441,12 +454,10 @@ def _placed(
     world, metres, guesses = world_of(known, up, unit)
     cameras = list[Camera]()
     for each in known:
-        if isinstance(each, Camera):
-            camera = each
-        else:
-            camera = each.in_metres(metres).camera(each.size or size, world)
+        if isinstance(each, Calibration):
+            each = each.in_metres(metres).camera(each.size or size, world)
         # the rasteriser needs square pixels
-        cameras.append(camera.squared())
+        cameras.append(each.squared())
     return cameras, [*guesses.values()]
 
 
@@ -530,7 +541,7 @@ def _of_films(
     progress: Progress,
     combine: Callable[[Sequence[View]], Scene],
 ) -> Scene:
-    """Return the scene of films. Raises NoPersonError if no segmenter finds a person."""
+    """Return the scene of films. Raises NoPersonError if nobody is found in them."""
     attempts = list[_Attempt]()
     for way in how.ways(len(films)):
         among = how if len(films) == 1 and way is not how else None
@@ -600,10 +611,8 @@ def body_of(
         what both of them are about.
 
     """
-    if asf is None:
-        acclaim = Acclaim(built_in.average_skeleton(), 1.0)
-    else:
-        acclaim = parse_asf(asf, unit)
+    average = Acclaim(built_in.average_skeleton(), 1.0)
+    acclaim = average if asf is None else parse_asf(asf, unit)
     body = Body.of(acclaim.skeleton)
     if height is not None:
         factor = height / body.stature
@@ -660,7 +669,7 @@ def _view(source: Any) -> Footage:
 
 
 def _frames(sources: Sequence[Any]) -> NDArray[Any] | tuple[Path, ...] | None:
-    """Return the frames of one camera; None if they are not all images or masks (H, W)."""
+    """Return the frames of one camera; None if they are not images or masks (H, W)."""
     if all(_is_image(each) for each in sources):
         files = _images(*sources)
         return None if _are_films(files) else files
