@@ -185,7 +185,10 @@ class Video:
             yield from repeat(scaled(image, size), times)
 
     def _decoded(self, numbers: Sequence[int]) -> Iterator[Image]:
-        """Yield these frames of a video file, in rising order, until it ends."""
+        """Yield these frames of the file, in rising order, until it ends."""
+        if self.pictures:
+            yield from (_picture(self.pictures[k]) for k in numbers)
+            return
         capture = cv2.VideoCapture(opencv_name(self.path))
         k = -1
         try:
