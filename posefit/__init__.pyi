@@ -18,6 +18,7 @@ from posefit.fitting.tracker import Observation as Observation
 from posefit.fitting.tracker import SynthesisTracker as SynthesisTracker
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
+from posefit.footage.device import moved_to as moved_to
 from posefit.footage.segmentation import Extraction as Extraction
 from posefit.geometry.body import Body as Body
 from posefit.geometry.camera import Camera as Camera
@@ -41,7 +42,6 @@ from posefit.silhouette.cost import areas as areas
 from posefit.silhouette.cost import mismatch as mismatch
 from posefit.silhouette.cost import pose_costs as pose_costs
 from posefit.silhouette.cost import project as project
-from posefit.silhouette.cuda.device import moved_to as moved_to
 from posefit.silhouette.mask import Silhouette as Silhouette
 from posefit.statistics.means import run_means as run_means
 from posefit.statistics.paired import paired_tests as paired_tests

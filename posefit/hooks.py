@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from posefit.fitting.prior import PriorFactory
     from posefit.fitting.tracker import InitialiserFactory, TrackerFactory
     from posefit.silhouette.foreground import SegmenterFactory
+    from posefit.silhouette.mask import Device
 
 PROJECT = "posefit"
 hookspec = HookspecMarker(PROJECT)
@@ -130,6 +131,19 @@ class RegisterSegmenter(Protocol):
         """
 
 
+class RegisterDevice(Protocol):
+    """Registers a device: its name, its factory, which raises InputError if there is none, and what it needs."""
+
+    def __call__(
+        self,
+        name: str,
+        factory: "Callable[[], Device]",
+        *,
+        needs: Needs | None = None,
+    ) -> None:
+        """Register a device."""
+
+
 RegisterCommand: TypeAlias = Callable[["click.Command"], None]
 
 
@@ -171,6 +185,11 @@ def posefit_register_segmenters(register: RegisterSegmenter) -> Any:
 
     See `posefit.silhouette.foreground`.
     """
+
+
+@hookspec
+def posefit_register_devices(register: RegisterDevice) -> Any:
+    """Call `register(name, factory)` for each device that draws poses; see `posefit.silhouette.mask.Device`."""
 
 
 @hookspec

@@ -35,6 +35,7 @@ from posefit.fitting.weights import effective_sample_size as effective_sample_si
 from posefit.fitting.weights import systematic_rows as systematic_rows
 from posefit.fitting.weights import weigh as weigh
 from posefit.hooks import RegisterCommand as RegisterCommand
+from posefit.hooks import RegisterDevice as RegisterDevice
 from posefit.hooks import RegisterOptimiser as RegisterOptimiser
 from posefit.hooks import RegisterPrior as RegisterPrior
 from posefit.hooks import RegisterSegmenter as RegisterSegmenter
@@ -45,6 +46,8 @@ from posefit.silhouette.cost import mismatch as mismatch
 from posefit.silhouette.cost import project as project
 from posefit.silhouette.foreground import Film as Film
 from posefit.silhouette.foreground import Segmenter as Segmenter
+from posefit.silhouette.mask import Areas as Areas
+from posefit.silhouette.mask import Device as Device
 from posefit.testing import check_optimiser as check_optimiser
 from posefit.testing import check_prior as check_prior
 from posefit.testing import check_segmenter as check_segmenter

@@ -35,8 +35,10 @@ if TYPE_CHECKING:
 
 BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
-Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter"]
+Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter", "device"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+# those that `posefit check` has rules for, and `posefit plugins new` a template
+CHECKED_KINDS = tuple(kind for kind in KINDS if kind != "device")
 # distribution of an optimiser that no plugin but the program itself has registered
 OWN = "this process"
 COMMAND: Literal["command"] = "command"  # what a plugin may register besides KINDS

@@ -1,4 +1,4 @@
-"""The list of settings of every optimiser, prior, tracker and segmenter of posefit.
+"""The list of settings of every optimiser, prior, tracker, start, segmenter and device of posefit.
 
 It is read from the code. Optimisers that only adapt a library are listed by name.
 """

@@ -24,8 +24,8 @@ from posefit.silhouette.rasteriser import (
     View,
     fill_pose,
     outline_poses,
-    scratch,
     set_scene,
+    work_arrays,
 )
 
 
@@ -108,7 +108,7 @@ def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures
     height, width = pictures.shape[1:3]
     flat = poses.reshape(-1, poses.shape[2])
     places = translations.reshape(-1, 3)
-    work = scratch(scenes.observed.shape[2], scenes.observed.shape[3])
+    work = work_arrays(scenes.observed.shape[2], scenes.observed.shape[3])
     block = np.empty(LANES, np.int64)
     drawn = np.empty(LANES, np.int64)
     for v in range(views):
@@ -133,11 +133,11 @@ def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures
                         work, lane, lane + 1, scenes.offsets[i], scenes.radii[i], view
                     )
                     drawn[lane] = i
-            outline_poses(chain, flat, places, block, width, height, work)
+            stride = outline_poses(chain, flat, places, block, width, height, work)
             for lane in range(min(LANES, total - first)):
                 i = block[lane] // many
                 k = block[lane] % many
-                image, box = fill_pose(lane, work)
+                image, box = fill_pose(lane, stride, work)
                 if pictures.size:
                     paint_bits(image, box, value, pictures[i, :, :, v])
                 body, overlap = count(

@@ -8,8 +8,8 @@ from posefit.fitting.cost import align
 from posefit.fitting.landmarks import GROUPS, landmark_likelihoods, side_odds
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
-from posefit.silhouette.cost import Areas, known_views, pose_costs
-from posefit.silhouette.mask import coarser_camera, coarser_silhouette
+from posefit.silhouette.cost import known_views, pose_costs
+from posefit.silhouette.mask import Areas, coarser_camera, coarser_silhouette
 
 MIN_SMALL_SIDE = 40  # pixels: no side of a small picture is shorter
 SMALL_FACTORS = (4, 2, 1)

@@ -1,4 +1,4 @@
-"""Groups of models, which switch between each other, and the most probable one. VSMM steps 4 and 5."""
+"""Groups of motion models, and the most probable group. VSMM steps 4 and 5."""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
@@ -9,27 +9,26 @@ from posefit.arrays import Array
 
 
 class Topology(NamedTuple):
-    """Groups of models (model sets), in the order in which they are numbered, and a digraph of models' neighbours."""
+    """Groups of models (model sets), and a digraph of the models' neighbours."""
 
-    groups: Mapping[str, tuple[str, ...]]
-    neighbours: Mapping[str, tuple[str, ...]]  # which models each changes into
+    groups: Mapping[str, tuple[str, ...]]  # in the order of their numbers
+    neighbours: Mapping[str, tuple[str, ...]]  # the models that each switches into
     activities: Mapping[str, tuple[str, ...]]  # the labels of frames, and their models
-    # how probable it is that a model goes on; the rest is shared among its neighbours
+    # the probability that a model stays; its neighbours share the rest
     stay: float
 
     def transition(self, models: Sequence[str]) -> Array:
-        """Return how probable each of some models (r, r) is after each: `stay`, the rest among its neighbours there.
+        """Return the transition matrix (r, r) over some of the models.
 
-        A model without a neighbour there may change into any, as a group of its own can only be left that way.
+        A model stays with probability `stay`; its neighbours among `models` share the
+        rest equally. A model with no neighbour there may switch into any of the others;
+        otherwise it could never be left.
         """
         matrix = np.zeros((len(models), len(models)))
         for i, name in enumerate(models):
-            others = [
-                j
-                for j, other in enumerate(models)
-                if other in self.neighbours[name] and j != i
-            ]
-            others = others or [j for j in range(len(models)) if j != i]
+            every = [j for j in range(len(models)) if j != i]
+            near = [j for j in every if models[j] in self.neighbours[name]]
+            others = near or every
             matrix[i, others] = (1.0 - self.stay) / max(1, len(others))
             matrix[i, i] = self.stay if others else 1.0
         return matrix
@@ -43,14 +42,14 @@ class Topology(NamedTuple):
 def most_probable(
     sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array
 ) -> str:
-    """Return the name of the set, a group or an activity, whose models are the most probable together."""
+    """Return the name of the group or activity with the highest total probability."""
     known = dict(zip(models, probabilities, strict=True))
     return max(
         sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name])
     )
 
 
-# Interpretation V1. The rules of step 7 speak of the first, the second and the third group.
+# Interpretation V1. The rules of step 7 name the first, second and third group.
 TOPOLOGY = Topology(
     groups={  # VSMM 4
         "G1": ("stiff-walk", "walk", "arms-out"),

@@ -1,6 +1,7 @@
-"""Where the 17 points are in a silhouette, by rules, and where hidden ones are by prediction. VSMM step 2.
+"""Detection of 17 points in a silhouette; prediction of hidden ones. VSMM step 2.
 
-Errors and gates are in legs (hip to ankle, projected at the person's depth), whatever the sizes of image and person.
+Errors and gates are in leg lengths (hip to ankle, projected at the person's depth), so
+they do not depend on the sizes of the image and the person.
 """
 
 import json
@@ -33,36 +34,37 @@ _TIPS = np.array(
     ]
 )
 _RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
-# pixels: what is nearer together is one crossing of the skeleton line
+# pixels: points of the skeleton line closer than this are one crossing
 ONE_CROSSING = 2.0
-# legs: the limits of a point's gate, and a gate that is none
+# leg lengths: the limits of a point's gate; NO_GATE accepts everything
 GATE = (0.35, 1.2)
 NO_GATE = (1e3, 1e3)
 
 Indices = NDArray[np.intp]
-# rows and columns, by distances (n, m)
+# from distances (n, m) to the rows and columns of the pairs
 Pairs = Callable[[Array], tuple[Indices, Indices]]
-# of two knees, by distances (2, n) and places along the line (n,)
+# from distances (2, n) to two knees, and positions along the line (n,), to a crossing
+# for each knee
 Crossings = Callable[[Array, Array], Indices]
 
 
 class Rules(NamedTuple):
-    """How points are detected, and how far a detection is trusted. Interpretations V8 and V15."""
+    """How points are detected and trusted. Interpretations V8 and V15."""
 
-    bias: Array  # (17, 2) legs, detected less true
-    deviation: Array  # (17, 2) legs, around the bias
-    pairs: Pairs  # of limbs and end points
-    crossings: Crossings
-    gate: tuple[float, float]  # legs: a point's gate is between these
-    # squared standard deviations in the image: a detection farther off is rejected
+    bias: Array  # (17, 2) leg lengths, detected minus true
+    deviation: Array  # (17, 2) leg lengths, around the bias
+    pairs: Pairs  # assigns end points to limbs
+    crossings: Crossings  # chooses the knees
+    gate: tuple[float, float]  # leg lengths: the limits of a point's gate
+    # squared standard deviations in the image: farther detections are rejected
     max_distance: float
-    # a lower one counts as this one where variances are divided by it
+    # variances are divided by the confidence, but at least by this
     min_confidence: float
 
 
 @cache
 def default_rules() -> Rules:
-    """Return the default rules, with the errors that make_joint_errors.py measured."""
+    """Return the default rules; make_joint_errors.py measured their errors."""
     stored = json.loads(
         (files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8")
     )
@@ -74,7 +76,11 @@ def default_rules() -> Rules:
 
 
 def patent_rules() -> Rules:
-    """Return those to the patent's letter: unbiased, the torso as the root, and neither gate nor confidence counts."""
+    """Return the rules of the patent's letter.
+
+    They have no bias, no gates and no weights by confidence, and give the torso the
+    deviation of the root.
+    """
     bias = np.zeros((len(POINTS), 2))
     deviation = default_rules().deviation.copy()
     deviation[_TORSO] = deviation[AT["root"]]
@@ -84,24 +90,34 @@ def patent_rules() -> Rules:
 def detect(
     lines: Lines, expected: Array, gates: Array, leg: float, head: float, rules: Rules
 ) -> tuple[Array, Array, int]:
-    """Return the points (17, 2) of a silhouette, the confidence (17,), 0 to 1, and how many end points are unassigned.
+    """Detect the points of a silhouette near where they are expected.
 
-    They are pixels near where they are expected (17, 2); one that is not detected is there, with a confidence of 0.
-    What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
-    and of the head's radius in pixels.
+    Args:
+        lines: the silhouette.
+        expected: (17, 2) pixels, where each point is expected.
+        gates: (17,) pixels, how far from there each point is accepted.
+        leg: the length of a leg in pixels.
+        head: the radius of the head in pixels.
+        rules: how points are detected.
+
+    Returns:
+        The points (17, 2) in pixels; their confidence (17,), 0 to 1; and how many
+        end points are not assigned to a limb. A point that is not detected is at
+        its expected position, with a confidence of 0.
+
     """
     points = expected.copy()
     confidence = np.zeros(len(POINTS))
 
     def place(name: str, point: Array) -> None:
-        distance = float(np.linalg.norm(point - expected[AT[name]]) / gates[AT[name]])
-        points[AT[name]], confidence[AT[name]] = (
-            point,
-            max(0.0, 1.0 - distance * distance),
-        )
+        row = AT[name]
+        distance = float(np.linalg.norm(point - expected[row]) / gates[row])
+        points[row] = point
+        confidence[row] = max(0.0, 1.0 - distance * distance)
 
     # VSMM 2.2
-    points[AT["root"]], confidence[AT["root"]] = lines.pixels.mean(axis=0), 1.0
+    points[AT["root"]] = lines.pixels.mean(axis=0)
+    confidence[AT["root"]] = 1.0
     centre = _head(lines, expected[AT["head"]], head, gates[AT["head"]])
     if centre is not None:
         points[AT["head"]], confidence[AT["head"]] = centre
@@ -113,15 +129,14 @@ def detect(
     # VSMM 2.3
     points[_TORSO] = expected[_TORSO] + points[AT["root"]] - expected[AT["root"]]
     confidence[_TORSO] = 1.0
-    elbows = {
-        f"{side} elbow": _elbow(lines, points, confidence, expected, side, gates)
-        for side in ("left", "right")
-    }
-    knees = _knees(lines, points, confidence, expected, gates, rules.crossings)
-    for name, point in {**elbows, **knees}.items():
-        if point is not None:
-            place(name, point)
-            points[AT[name]] -= bias[AT[name]]
+    found = _knees(lines, points, confidence, expected, gates, rules.crossings)
+    for side in ("left", "right"):
+        elbow = _elbow(lines, points, confidence, expected, side, gates)
+        if elbow is not None:
+            found[f"{side} elbow"] = elbow
+    for name, point in found.items():
+        place(name, point)
+        points[AT[name]] -= bias[AT[name]]
     return points, confidence, unassigned
 
 
@@ -133,17 +148,19 @@ def _distances(first: Array, second: Array) -> Array:
 def _head(
     lines: Lines, expected: Array, radius: float, gate: float
 ) -> tuple[Array, float] | None:
-    """Return the centre of the head and its confidence: how much of the ring around it is contour."""
+    """Return the head's centre and its confidence, or None if it is not found.
+
+    The confidence is the share of a ring around the centre that lies on the contour.
+    """
     centres = lines.skeleton[np.linalg.norm(lines.skeleton - expected, axis=1) < gate]
     contour = lines.contour[
         np.linalg.norm(lines.contour - expected, axis=1) < gate + 1.5 * radius
     ]
     if not len(centres) or not len(contour):
         return None
-    on_ring = (
-        np.abs(_distances(centres, contour)[..., None] - _RINGS * radius)
-        < 0.1 * radius + 0.5
-    )
+    distances = _distances(centres, contour)  # (n, m)
+    off_ring = np.abs(distances[..., None] - _RINGS * radius)  # (n, m, 3)
+    on_ring = off_ring < 0.1 * radius + 0.5
     counts = on_ring.sum(axis=1).max(axis=1)  # VSMM 2.1
     best = centres[counts == counts.max()]
     centre = best[np.linalg.norm(best - expected, axis=1).argmin()]
@@ -155,24 +172,27 @@ def _tips(
 ) -> tuple[dict[str, Array], int]:
     """Return which end points (n, 2) are hands and feet, and how many are unassigned.
 
-    The head takes part, since the skeleton line ends in it too.
+    The head is assigned an end point too, since the skeleton line also ends there.
     """
     if not len(ends):
         return {}, 0
     distances = _distances(expected, ends) / gates[:, None]
-    pairs = [
-        pair for pair in zip(*pairs_of(distances), strict=True) if distances[pair] < 1.0
-    ]
-    tips = {
-        POINTS[_TIPS[row]]: ends[column]
-        for row, column in pairs
-        if _TIPS[row] != AT["head"]
-    }
-    return tips, len(ends) - len(pairs)
+    tips = {}
+    assigned = 0
+    for row, column in zip(*pairs_of(distances), strict=True):
+        if distances[row, column] >= 1.0:
+            continue
+        assigned += 1
+        if _TIPS[row] != AT["head"]:
+            tips[POINTS[_TIPS[row]]] = ends[column]
+    return tips, len(ends) - assigned
 
 
 def optimal_pairs(distances: Array) -> tuple[Indices, Indices]:
-    """Return rows and columns of pairs by distances (n, m), so that the sum is smallest; above 1 all are as far."""
+    """Return the rows and columns of the pairs with the least sum of distances (n, m).
+
+    Distances above 1 count as 1.
+    """
     from scipy.optimize import linear_sum_assignment  # half a second to import
 
     rows, columns = linear_sum_assignment(np.minimum(distances, 1.0))
@@ -180,7 +200,10 @@ def optimal_pairs(distances: Array) -> tuple[Indices, Indices]:
 
 
 def nearest_pairs(distances: Array) -> tuple[Indices, Indices]:
-    """Return rows and columns of pairs by distances (n, m), the nearest first, none of them twice."""
+    """Return rows and columns of pairs by distance (n, m), the nearest pair first.
+
+    Each row and each column is used at most once.
+    """
     pairs: list[tuple[int, int]] = []
     for place in distances.argsort(axis=None, kind="stable"):
         row, column = divmod(int(place), distances.shape[1])
@@ -198,10 +221,10 @@ def _elbow(
     side: str,
     gates: Array,
 ) -> Array | None:
-    """Return the point of the skeleton line that is as far from the hand as from the shoulder; None where none is."""
-    hand, elbow, shoulder = (
-        AT[f"{side} {name}"] for name in ("hand", "elbow", "shoulder")
-    )
+    """Return the point of the skeleton line as far from hand as shoulder, or None."""
+    hand = AT[f"{side} hand"]
+    elbow = AT[f"{side} elbow"]
+    shoulder = AT[f"{side} shoulder"]
     if not confidence[hand]:
         return None
     to_hand, to_shoulder, to_elbow = _distances(
@@ -209,11 +232,10 @@ def _elbow(
     )
     even = np.abs(to_hand - to_shoulder) < 1.5  # VSMM 2.6
     candidates = np.flatnonzero(even & (to_elbow < gates[elbow]))
-    return (
-        lines.skeleton[candidates[to_elbow[candidates].argmin()]]
-        if len(candidates)
-        else None
-    )
+    if not len(candidates):
+        return None
+    nearest = candidates[to_elbow[candidates].argmin()]
+    return np.asarray(lines.skeleton[nearest])
 
 
 def _knees(
@@ -224,45 +246,51 @@ def _knees(
     gates: Array,
     crossings_of: Crossings,
 ) -> dict[str, Array]:
-    """Return where the parallel to the line between the feet, through the middle of the legs, crosses the skeleton."""
+    """Return the knees that are found, by name.
+
+    They are where the skeleton line crosses a parallel to the line between the feet,
+    through the middle of the legs.
+    """
     left = AT["left foot"]
     right = AT["right foot"]
     along = points[right] - points[left]
     length = float(np.linalg.norm(along))
+    if not (confidence[left] and confidence[right]) or length < 1.0:
+        return {}
     legs = lines.pixels[lines.pixels[:, 1] > points[AT["root"], 1]]
-    if not (confidence[left] and confidence[right] and len(legs)) or length < 1.0:
+    if not len(legs):
         return {}
     across = np.array([-along[1], along[0]]) / length
     # VSMM 2.5
-    crossings = lines.skeleton[
-        np.abs((lines.skeleton - legs.mean(axis=0)) @ across) < 1.0
-    ]
+    off_parallel = np.abs((lines.skeleton - legs.mean(axis=0)) @ across)
+    crossings = lines.skeleton[off_parallel < 1.0]
     if not len(crossings):
         return {}
     names = ("left knee", "right knee")
     distances = _distances(expected[[AT[name] for name in names]], crossings)
     chosen = crossings_of(distances, crossings @ along / length)
-    reached = distances[[0, 1], chosen] < gates[[AT[name] for name in names]]
-    knees = {
-        name: crossings[k]
-        for name, k, near in zip(names, chosen, reached, strict=True)
-        if near
-    }
-    if (
-        len(knees) == 2
-        and np.linalg.norm(knees["left knee"] - knees["right knee"]) < ONE_CROSSING
-    ):
-        return {}  # one crossing is not two knees
+    knees = {}
+    for row, name in enumerate(names):
+        if distances[row, chosen[row]] < gates[AT[name]]:
+            knees[name] = crossings[chosen[row]]
+    if len(knees) == 2:
+        apart = np.linalg.norm(knees["left knee"] - knees["right knee"])
+        # a single crossing does not show which knee it is
+        if apart < ONE_CROSSING:
+            return {}
     return knees
 
 
 def nearest_crossings(distances: Array, _places: Array) -> Indices:
-    """Return the crossing that is nearest to each knee (2,)."""
+    """Return the nearest crossing for each knee (2,)."""
     return np.asarray(distances.argmin(axis=1))
 
 
 def two_crossings(distances: Array, places: Array) -> Indices:
-    """Return two different crossings (2,) that are nearest together, also where both knees are expected near one."""
+    """Return two different crossings (2,) with the least sum of distances to the knees.
+
+    They differ even if both knees are expected near the same crossing.
+    """
     together = distances[0][:, None] + distances[1]
     order = places.argsort()
     groups = np.empty(len(order))
@@ -271,13 +299,14 @@ def two_crossings(distances: Array, places: Array) -> Indices:
     return np.array(np.unravel_index(together.argmin(), together.shape))
 
 
-ACCELERATION = 2.0  # pixels a frame squared: the deviation of a joint's acceleration
+# pixels per frame squared: the standard deviation of a joint's acceleration
+ACCELERATION = 2.0
 _STEP = np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
 _NOISE = ACCELERATION**2 * np.kron([[0.25, 0.5], [0.5, 1.0]], np.eye(2))
 
 
 class JointFilter:
-    """Kalman filters of the place and velocity of the 17 points in one image."""
+    """Kalman filters of the position and velocity of the 17 points in one image."""
 
     def __init__(self, points: Array) -> None:
         self._states = np.column_stack([points, np.zeros_like(points)])
@@ -286,7 +315,17 @@ class JointFilter:
         )
 
     def follow(self, points: Array, confidence: Array, variances: Array) -> Array:
-        """Return the points (17, 2) one frame later, `variances` (17, 2) being those of what was detected."""
+        """Predict and update the points by those detected in the next frame.
+
+        Args:
+            points: (17, 2) pixels.
+            confidence: (17,); points with 0 are only predicted.
+            variances: (17, 2) square pixels, of the detected points.
+
+        Returns:
+            The filtered points (17, 2) in pixels.
+
+        """
         # VSMM 2.7
         states = self._states @ _STEP.T
         covariances = _STEP @ self._covariances @ _STEP.T + _NOISE

@@ -1,6 +1,7 @@
-"""What cameras measure of a state: the rules' joints, against the projected points of the state. VSMM 6.1.
+"""The measurement: detected joints against the projected points of a state. VSMM 6.1.
 
-A validation gate on the squared Mahalanobis distance decides which detections are accepted.
+A validation gate on the squared Mahalanobis distance decides which detections are
+accepted.
 """
 
 from collections.abc import Sequence
@@ -20,10 +21,10 @@ from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import Lines
 from posefit_vsmm.state import ENDS, ERROR, DependentJoints, decode, differentiate
 
-MIN_DEPTH = 0.05  # metres: a smaller distance to the camera counts as this one
-# the gate around where a point is expected, in standard deviations
+MIN_DEPTH = 0.05  # metres: points nearer to the camera are projected at this depth
+# radius of the gate around a point's expected position, in standard deviations
 GATE_DEVIATIONS = 3.0
-KNOWN_VARIANCE = 0.002**2  # square metres: of a translation that is known
+KNOWN_VARIANCE = 0.002**2  # square metres: variance of a known translation
 
 
 def head_radius(body: Body) -> float:
@@ -32,15 +33,15 @@ def head_radius(body: Body) -> float:
 
 
 class JointMeasurement(NamedTuple):
-    """What one camera measured."""
+    """The joints that one camera measured."""
 
     points: Array  # (17, 2) pixels
-    confidence: Array  # (17,); 0 is hidden
+    confidence: Array  # (17,); 0 if hidden
     variances: Array  # (17, 2) square pixels
-    unassigned: int  # end points of the skeleton line that belong to none of them
+    unassigned: int  # end points of the skeleton line without a joint
 
     def imputed(self, points: Array) -> "JointMeasurement":
-        """Return the same with other points (17, 2) where none are detected, as if they were. Interpretation V9."""
+        """Replace the hidden points by others, as if detected. Interpretation V9."""
         visible = self.confidence > 0.0
         return self._replace(
             points=np.where(visible[:, None], self.points, points),
@@ -49,12 +50,21 @@ class JointMeasurement(NamedTuple):
 
 
 def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
-    """Return where landmarks (27, 3) have the points (17, 2), and their confidence (17,), 0 where they have none.
+    """Return the points (17, 2) from landmarks, and their confidence (17,).
 
-    Sides that a detector exchanged are those that are nearer to where the points are expected (17, 2).
+    A detector may exchange left and right. So each group of landmarks is exchanged if
+    that brings it nearer to the expected points.
+
+    Args:
+        landmarks: (27, 3) column, row and confidence of the joints.
+        expected: (17, 2) pixels.
+
+    Returns:
+        The points in pixels, and their confidence: 0 for points without a landmark.
+
     """
     joints = ENDS[:, 0]
-    single = joints == ENDS[:, 1]  # points that are a joint, not the middle of two
+    single = joints == ENDS[:, 1]  # points that are joints, not the middle of two
     placed = landmarks[joints]
     for group in GROUPS:
         rows = np.flatnonzero(single & np.isin(joints, group) & (placed[:, 2] > 0.0))
@@ -68,7 +78,7 @@ def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class JointCameras:
-    """A body, as its states move it, before cameras."""
+    """Detects and measures the joints of a body in the images of cameras."""
 
     body: Body
     cameras: Sequence[Camera]
@@ -77,12 +87,14 @@ class JointCameras:
     joint_noise: float = 1.0
 
     def project(self, camera: Camera, states: Array) -> tuple[Array, Array]:
-        """Return the projected points (r, 17, 2) of states (r, 43), in pixels, and their Jacobians (r, 17, 2, 33)."""
+        """Return the points (r, 17, 2) of states (r, 43) in pixels, and Jacobians.
+
+        The Jacobians (r, 17, 2, 33) are by the states' errors.
+        """
 
         def pixels(states: Array) -> Array:
-            points = self.body.skeleton.joints(*decode(states, self.dependent))[
-                ..., ENDS, :
-            ].mean(axis=-2)
+            joints = self.body.skeleton.joints(*decode(states, self.dependent))
+            points = joints[..., ENDS, :].mean(axis=-2)  # (r, n, 17, 3)
             inside = points @ camera.rotation.T + camera.translation
             slopes = inside[..., :2] / np.maximum(inside[..., 2:], MIN_DEPTH)
             return np.asarray(slopes * camera.focal + camera.centre)
@@ -96,20 +108,24 @@ class JointCameras:
         spread: Array,
         landmarks: Array | None = None,
     ) -> list[JointMeasurement]:
-        """Return the joints that each camera shows, where a state (43,) is expected with a covariance (33, 33).
+        """Detect the joints in each camera's image.
 
-        `landmarks` (V, 27, 3) are those of an `Observation`; a joint is where they and the rules have it on average.
+        Args:
+            views: the silhouette in each camera; None for a camera without one.
+            expected: (43,) the expected state.
+            spread: (33, 33) the covariance of its error.
+            landmarks: (V, 27, 3) of an `Observation`. A joint is the mean of the
+                landmark and the rules' point, weighted by inverse variances.
+
+        Returns:
+            One measurement per camera.
+
         """
-        each = zip(
-            self.cameras,
-            views,
-            [None] * len(views) if landmarks is None else landmarks,
-            strict=True,
-        )
-        return [
-            self._detect(camera, lines, expected, spread, view)
-            for camera, lines, view in each
-        ]
+        each = [None] * len(views) if landmarks is None else landmarks
+        measured = []
+        for camera, lines, view in zip(self.cameras, views, each, strict=True):
+            measured.append(self._detect(camera, lines, expected, spread, view))
+        return measured
 
     def _detect(
         self,
@@ -121,17 +137,15 @@ class JointCameras:
     ) -> JointMeasurement:
         pixels, jacobian = (part[0] for part in self.project(camera, expected[None]))
         if lines is None:
-            return JointMeasurement(
-                pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0
-            )
+            hidden = np.zeros(len(pixels))
+            return JointMeasurement(pixels, hidden, np.ones_like(pixels), 0)
         depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
-        # in pixels, at the root's depth
+        # pixels per metre at the root's depth
         metre = float(camera.focal.mean()) / max(depth, MIN_DEPTH)
         leg = leg_of(self.body.skeleton) * metre
         covariances = jacobian @ spread @ jacobian.swapaxes(1, 2)
-        gates = GATE_DEVIATIONS * np.sqrt(
-            np.diagonal(covariances, axis1=1, axis2=2).max(axis=1)
-        )
+        largest = np.diagonal(covariances, axis1=1, axis2=2).max(axis=1)  # (17,)
+        gates = GATE_DEVIATIONS * np.sqrt(largest)
         low, high = self.rules.gate
         gates = np.clip(gates, low * leg, high * leg)
         head = head_radius(self.body) * metre
@@ -140,59 +154,52 @@ class JointCameras:
         )
         variances = self.joint_noise * (self.rules.deviation * leg) ** 2
         # Interpretation V8
-        variances = (
-            variances / np.maximum(confidence, self.rules.min_confidence)[:, None]
-        )
+        trusted = np.maximum(confidence, self.rules.min_confidence)
+        variances = variances / trusted[:, None]
         if landmarks is not None and landmarks.any():
             placed, trust = with_sides(landmarks, pixels)
+            # weights are inverse variances
             rules = (confidence > 0.0)[:, None] / variances
-            total = rules + np.maximum(trust, 1e-12)[:, None] / (DEVIATION * metre) ** 2
+            landmark_variance = (DEVIATION * metre) ** 2
+            total = rules + np.maximum(trust, 1e-12)[:, None] / landmark_variance
             placed = np.where(trust[:, None] > 0.0, placed, points)
             points = placed + rules / total * (points - placed)
             variances = 1.0 / total
             confidence = np.maximum(confidence, trust)
         residuals = points - pixels
         innovations = covariances + variances[:, :, None] * np.eye(2)
-        distances = (
-            residuals * np.linalg.solve(innovations, residuals[..., None])[..., 0]
-        ).sum(axis=1)
+        solved = np.linalg.solve(innovations, residuals[..., None])[..., 0]  # (17, 2)
+        distances = (residuals * solved).sum(axis=1)
         rejected = (distances >= self.rules.max_distance) & (confidence > 0.0)
         confidence = np.where(rejected, 0.0, confidence)
-        return JointMeasurement(
-            points, confidence, variances, unassigned + int(np.count_nonzero(rejected))
-        )
+        unassigned += int(np.count_nonzero(rejected))
+        return JointMeasurement(points, confidence, variances, unassigned)
 
     def measure(
         self, states: Array, measured: Sequence[JointMeasurement], known: Array | None
     ) -> Measurement:
-        """Return the residuals of detected joints, and of a known translation (3,), for states (r, 43). V9."""
+        """Return the measurement of states (r, 43).
+
+        It has the residuals of the detected joints and of a known translation (3,). V9.
+        """
         count = len(states)
-        parts = []
+        residuals = []
+        jacobians = []
+        variances = []
         for camera, joints in zip(self.cameras, measured, strict=True):
             visible = joints.confidence > 0.0
             # VSMM 6.1
-            pixels, jacobians = (
-                part[:, visible] for part in self.project(camera, states)
-            )
-            parts.append(
-                (joints.points[visible] - pixels, jacobians, joints.variances[visible])
-            )
+            pixels, changes = self.project(camera, states)
+            apart = joints.points[visible] - pixels[:, visible]
+            residuals.append(apart.reshape(count, -1))
+            jacobians.append(changes[:, visible].reshape(count, -1, ERROR))
+            variances.append(joints.variances[visible].ravel())
         if known is not None:
-            parts.append(
-                (
-                    known - states[:, :3],
-                    np.tile(np.eye(3, ERROR), (count, 1, 1)),
-                    np.full(3, KNOWN_VARIANCE),
-                )
-            )
-        residuals = np.concatenate(
-            [residual.reshape(count, -1) for residual, _, _ in parts], axis=1
-        )
-        jacobians = np.concatenate(
-            [jacobian.reshape(count, -1, ERROR) for _, jacobian, _ in parts], axis=1
-        )
+            residuals.append(known - states[:, :3])
+            jacobians.append(np.tile(np.eye(3, ERROR), (count, 1, 1)))
+            variances.append(np.full(3, KNOWN_VARIANCE))
         return Measurement(
-            residuals,
-            jacobians,
-            np.diag(np.concatenate([noise.ravel() for *_, noise in parts])),
+            np.concatenate(residuals, axis=1),
+            np.concatenate(jacobians, axis=1),
+            np.diag(np.concatenate(variances)),
         )

@@ -1,8 +1,9 @@
-"""The motion models: how a body that walks, squats or jumps goes on to its next pose. VSMM step 3.
+"""The motion models, which predict the next pose of a person. VSMM step 3.
 
-A model is X_{k+1} = F X_k + W_k in a frame that turns with the body: its vertical axis is the world's, its heading the
-body's, its origin the root, so that places and directions do not matter. Lengths are counted in legs. `ridge` fits
-them; the models that the package carries are fitted to CMU clips by docs/studies/make_models.py.
+A model is X_{k+1} = F X_k + W_k in coordinates that turn with the body: the vertical
+axis is the world's, the heading the body's and the origin the root, so that positions
+and directions do not matter. Lengths are in leg lengths. `ridge` fits a model;
+docs/studies/make_models.py fitted the models of the package to CMU clips.
 """
 
 import json
@@ -35,22 +36,23 @@ from posefit_vsmm.state import (
 FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
 CLIP_FPS = 120.0  # the rate of the clips that they were fitted to
 LAMBDA = 0.15
-# of the deviation of an axis that a joint may turn about: that of one that it may not
+# The standard deviation about an axis that a joint cannot turn about, as a share of the
+# deviation about the others.
 STIFF = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class MotionModels:
-    """Models (r,) side by side, for a body and a frame rate. Each has a state of its own."""
+    """Motion models, one per row (r), for a body and a frame rate."""
 
     names: tuple[str, ...]
-    # (r, 43, 40) F less the identity, of the quaternions
+    # (r, 43, 40) F minus the identity, applied to the quaternions
     matrices: Array = field(repr=False)
     offsets: Array = field(repr=False)  # (r, 43)
     noises: Array = field(repr=False)  # (r, 33, 33) covariance of W
     # (r, n, 40) quaternions of typical poses, heading along +z
     poses: Array = field(repr=False)
-    # (r, n, 40) those of poses that a model was fitted to
+    # (r, n, 40) quaternions of poses that the model was fitted to
     captured: Array = field(repr=False)
     leg: float = 1.0  # metres
     share: float = 1.0  # of the step at 30 frames a second
@@ -67,7 +69,10 @@ class MotionModels:
     def fitted_to(
         self, skeleton: Skeleton, fps: float, process_noise: float = 1.0
     ) -> "MotionModels":
-        """Return the models for a body's legs and another frame rate, of which a step is a share of a step at 30."""
+        """Return the models for a body's leg length and for another frame rate.
+
+        A step at `fps` frames a second is 30 / `fps` of a step at 30.
+        """
         leg = leg_of(skeleton)
         share = FPS / fps
         scale = np.maximum(free_errors(skeleton), STIFF)
@@ -77,13 +82,13 @@ class MotionModels:
         return replace(self, noises=noises, leg=leg, share=share)
 
     def predict(self, states: Array, covariances: Array) -> tuple[Array, Array]:
-        """Return the states (r, 43) one frame later, and the covariances (r, 33, 33) of their errors."""
+        """Return the states (r, 43) one frame later, and their errors' covariances."""
         moved, changes = differentiate(self.step, states)
         jacobians = inverse_tangents(moved) @ changes
         return moved, jacobians @ covariances @ jacobians.swapaxes(1, 2) + self.noises
 
     def predict_numbers(self, states: Array, covariances: Array) -> tuple[Array, Array]:
-        """Return the same for covariances (r, 43, 43) of the states' numbers. Interpretation V4."""
+        """Predict with covariances (r, 43, 43) of the numbers. Interpretation V4."""
         before = unit(states)
         changes = inverse_tangents(before)
         moved, after = self.predict(
@@ -92,9 +97,12 @@ class MotionModels:
         return moved, lifted(moved, after)
 
     def step(self, states: Array) -> Array:
-        """Return the states (r, n, 43) one frame later, n of each model: moved by F without their headings."""
+        """Return the states (r, n, 43) one frame later, n for each model.
+
+        F is applied to the states without their headings.
+        """
         headings, before = without_heading(states)
-        # F is that of quaternions with w above 0
+        # F was fitted to quaternions with w above 0
         signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)
         inputs = (signs * before).reshape(*states.shape[:-1], -1)
         change = self.share * (
@@ -114,11 +122,9 @@ class MotionModels:
         return joined_state(states[..., :3] + way, after)
 
     def typical_states(self, yaws: Array, place: Array) -> Array:
-        """Return the states (n, 43) of all typical poses at a place (3,), turned by each of some yaws."""
-        headings = (
-            np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1)
-            @ np.eye(4)[[0, 2]]
-        )
+        """Return the states (n, 43) of all typical poses at a place (3,), all yaws."""
+        halves = np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1)
+        headings = halves @ np.eye(4)[[0, 2]]  # quaternions about the vertical
         turns = np.tile(self.poses.reshape(-1, TURNS, 4), (len(yaws), 1, 1, 1))
         turns[:, :, 0] = product(headings[:, None], turns[:, :, 0])
         return joined_state(
@@ -127,20 +133,28 @@ class MotionModels:
         )
 
     def captured_nearest(self, name: str, state: Array) -> Array:
-        """Return a state (43,) with its place and heading, in the captured pose of a model nearest to it."""
+        """Return a state (43,) in the nearest captured pose of a model.
+
+        Its position and heading stay.
+        """
         poses = self.captured[self.names.index(name)].reshape(-1, TURNS, 4)
         heading, turns = without_heading(state)
         similarity = np.abs(np.einsum("nij,ij->ni", poses, turns))
-        pose = poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
+        distances = np.arccos(np.minimum(similarity, 1.0)).sum(axis=1)  # (n,)
+        pose = poses[distances.argmin()].copy()
         pose[0] = product(heading, pose[0])
-        signs = np.where(
-            (pose * quaternions_of(state)).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0
-        )
+        cosines = (pose * quaternions_of(state)).sum(axis=1, keepdims=True)
+        signs = np.where(cosines < 0.0, -1.0, 1.0)
         return unit(joined_state(state[:3], signs * pose))
 
 
 def without_heading(states: Array) -> tuple[Array, Array]:
-    """Return the headings (..., 4), twists about the vertical, of states (..., 43), and their quaternions without."""
+    """Split the headings (..., 4), twists about the vertical, off states (..., 43).
+
+    Returns:
+        The headings, and the states' quaternions (..., 10, 4) without them.
+
+    """
     turns = quaternions_of(states).copy()
     headings = turns[..., 0, :] * [1.0, 0.0, 1.0, 0.0]
     sizes = lengths(headings)
@@ -152,15 +166,18 @@ def without_heading(states: Array) -> tuple[Array, Array]:
 
 
 def lifted(states: Array, covariances: Array) -> Array:
-    """Return the covariances (r, 43, 43) of the numbers of states (r, 43), of those of their errors (r, 33, 33)."""
+    """Return the covariances (r, 43, 43) of the numbers of states (r, 43).
+
+    They are made from the covariances (r, 33, 33) of the states' errors.
+    """
     changes = tangents(states)
-    return np.asarray(
-        changes @ covariances @ changes.swapaxes(1, 2) + 1e-9 * np.eye(STATE)
-    )
+    numbers = changes @ covariances @ changes.swapaxes(1, 2)
+    # without this they would be singular: the numbers have ten more dimensions
+    return np.asarray(numbers + 1e-9 * np.eye(STATE))
 
 
 class Library(NamedTuple):
-    """All models, and how the joints that a state does not hold follow it."""
+    """All models, and the joints that depend on a state."""
 
     models: MotionModels
     dependent: DependentJoints
@@ -168,9 +185,9 @@ class Library(NamedTuple):
 
 @lru_cache(maxsize=2)
 def library(shrunk_to: Literal["identity", "zero"] = "identity") -> Library:
-    """Return the models of the package's file, which docs/studies/make_models.py wrote.
+    """Return the models in the package, which docs/studies/make_models.py wrote.
 
-    The patent's are those that were shrunk to zero. Interpretation V5.
+    The patent's models were shrunk to zero. Interpretation V5.
     """
     stored = json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8"))
     models: dict[str, Any] = stored["models"]
@@ -194,15 +211,15 @@ def library(shrunk_to: Literal["identity", "zero"] = "identity") -> Library:
 
 
 def ridge(inputs: Array, outputs: Array, weight: float = LAMBDA) -> Array:
-    """Return F (m, k): the one of least |F x - y|^2 + weight |F|^2 over inputs x (n, k) and outputs y (n, m)."""
+    """Return the F (m, k) that minimises |F x - y|^2 + weight |F|^2.
+
+    The first term is summed over inputs x (n, k) and outputs y (n, m).
+    """
     normal = inputs.T @ inputs + weight * np.eye(inputs.shape[1])  # VSMM 3
     return np.asarray(np.linalg.solve(normal, inputs.T @ outputs).T)
 
 
 def leg_of(skeleton: Skeleton) -> float:
-    """Return how long a leg is, in metres, from hip to ankle."""
-    return float(
-        skeleton.lengths[
-            [SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]
-        ].sum()
-    )
+    """Return the length of a leg from hip to ankle, in metres."""
+    rows = [SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]
+    return float(skeleton.lengths[rows].sum())

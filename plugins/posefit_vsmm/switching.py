@@ -1,13 +1,16 @@
-"""Which models are in force, cycle by cycle: the variable structure. VSMM steps 7 to 9.
+"""The variable structure: which models are active in each cycle. VSMM steps 7 to 9.
 
-The field calls it model-set adaptation. A group comes into force beside the present one where the limbs change their
-speed, and a test of both ends one of them.
+The field's term is model-set adaptation. When the limbs change their speed, a second
+group is activated next to the present one; a test then ends one of the two. Only
+`Switching` changes which models are active. There are two forms, the default and the
+patent's letter. They differ in how the filter starts a new group's models: they take a
+`Union` of both groups and return a `Belief` over it.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, final
+from typing import ClassVar, Literal, NamedTuple, final
 
 import numpy as np
 
@@ -18,41 +21,45 @@ from posefit_vsmm.imm import IMM, QUATERNIONS, Belief, Measure, Measurement, sta
 from posefit_vsmm.motion import FPS, MotionModels, lifted
 from posefit_vsmm.state import AT, inverse_tangents, unit
 
-# where thighs and shanks begin and end
+# the upper and lower ends of thighs and shanks
 _UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right knee")]
 _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
 Structure = Literal["variable", "all"]
-MOST = 3  # of the four lower limbs. Interpretation V15
-FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
-# by default: within ten cycles the filter has not converged yet. Interpretation V19
+MIN_LIMBS = 3  # most of the four thighs and shanks. Interpretation V15
+FIRST_CYCLES = 10  # the patent's cycles over all models before a group is chosen
+# the default's: ten cycles are too few for the filter to converge. Interpretation V19
 FIRST_SECONDS = 1.0
-ENDED = 0.9  # the ratio, new to old, below which a new group ends
+MIN_RATIO = 0.9  # of the new group to the old one; below it the new one ends
 
 
 def requested_group(points: Sequence[Array]) -> int | None:
-    """Return which group, 0 to 2, the points (17, 2) of the latest three frames ask for; None where it is no other.
+    """Return which group, 0 to 2, the latest three frames ask for; None if none.
 
-    Group 3 goes before 2 and 1 (Interpretation V10). The hips of rule a are both of them, and a hip's angle is that of
-    its thigh to the vertical (Interpretation V15). No change at all is not doubled by another.
+    `points` are (17, 2) for each frame. The third group comes before the second and the
+    first (Interpretation V10). Rule a needs both hips; a hip's angle is between its
+    thigh and the vertical (Interpretation V15). A change from zero does not count as
+    doubling.
     """
     if len(points) < 3:
         return None
-    before, now = np.abs(
-        wrapped(np.diff([limb_angles(frame) for frame in points[-3:]], axis=0))
-    )
+    angles = [limb_angles(frame) for frame in points[-3:]]
+    before, now = np.abs(wrapped(np.diff(angles, axis=0)))
     doubled = (now >= 2.0 * before) & (now > 0.0)
     halved = (now <= 0.5 * before) & (before > 0.0)
     if doubled[:2].all():  # VSMM 7a
         return 2
-    if doubled.sum() >= MOST:  # VSMM 7b
+    if doubled.sum() >= MIN_LIMBS:  # VSMM 7b
         return 1
-    if halved.sum() >= MOST:  # VSMM 7c
+    if halved.sum() >= MIN_LIMBS:  # VSMM 7c
         return 0
     return None
 
 
 def limb_angles(points: Array) -> Array:
-    """Return the angles (4,) to the vertical, in the image, of thighs and shanks, left and right."""
+    """Return the angles (4,) of thighs and shanks to the vertical in the image.
+
+    The order is left thigh, right thigh, left shank, right shank.
+    """
     limbs = points[_LOWER] - points[_UPPER]
     return np.asarray(np.arctan2(limbs[:, 0], limbs[:, 1]))
 
@@ -63,34 +70,60 @@ def regrouped(
     models: Sequence[str],
     new: Mapping[str, tuple[Array, Array, float]],
 ) -> Belief:
-    """Return a belief over other models: `new` has state, covariance and log-probability of those not in `old`."""
-    known = dict(
-        zip(
-            old,
-            zip(
-                belief.states, belief.covariances, belief.log_probabilities, strict=True
-            ),
-            strict=True,
+    """Return a belief over other models.
+
+    Args:
+        belief: the belief over the models `old`.
+        old: names of models.
+        models: names of the models of the result.
+        new: state, covariance and log-probability of each model that is not in `old`.
+
+    Returns:
+        The belief, with likelihoods of 1.
+
+    """
+    every = dict(new)
+    for row, name in enumerate(old):
+        every[name] = (
+            belief.states[row],
+            belief.covariances[row],
+            belief.log_probabilities[row],
         )
+    chosen = [every[name] for name in models]
+    return Belief(
+        np.array([state for state, _, _ in chosen]),
+        np.array([covariance for _, covariance, _ in chosen]),
+        np.array([probability for _, _, probability in chosen]),
+        np.zeros(len(models)),
     )
-    parts = zip(*({**new, **known}[name] for name in models), strict=True)
-    states, covariances, probabilities = (np.array(part) for part in parts)
-    return Belief(states, covariances, probabilities, np.zeros(len(models)))
 
 
 def normalised(belief: Belief) -> Belief:
-    """Return a belief whose probabilities sum to 1, all the same where none is above 0."""
+    """Return a belief with probabilities that sum to 1, equal if all were 0."""
     probabilities = np.maximum(belief.log_probabilities, -1e9)
     return replace(
         belief, log_probabilities=probabilities - np.logaddexp.reduce(probabilities)
     )
 
 
+class Union(NamedTuple):
+    """The present group and a new one, together."""
+
+    old_names: tuple[str, ...]  # the models of the present group
+    old_filter: IMM  # over the present group
+    names: tuple[str, ...]  # the models of both groups. VSMM 8.4
+    filter: IMM  # over both groups
+    models: MotionModels  # of both groups
+
+
 class DefaultForm:
-    """The default: the filter holds covariances (33, 33) of errors. Interpretations V4 and V11."""
+    """The default: covariances (33, 33) of errors. Interpretations V4 and V11."""
+
+    # in its first cycle a new group has only the probability that transitions gave it
+    judges_first_cycle: ClassVar[bool] = False
 
     def first_cycles(self, models: MotionModels) -> int:
-        """Return after how many cycles over all models a group is chosen."""
+        """Return the number of cycles over all models before a group is chosen."""
         return max(FIRST_CYCLES, round(FIRST_SECONDS * FPS / models.share))
 
     def imm(self, models: MotionModels, transition: Array) -> IMM:
@@ -98,39 +131,38 @@ class DefaultForm:
         return IMM(models.predict, transition, QUATERNIONS)
 
     def covariances(self, states: Array, covariance: Array) -> Array:
-        """Return the covariances of states (r, 43), each (33, 33) of its error, as the filter holds them."""
+        """Return the filter's covariances of states (r, 43).
+
+        `covariance` (33, 33) is that of each state's error.
+        """
         return np.tile(covariance, (len(states), 1, 1))
 
     def fused(self, state: Array, covariance: Array) -> tuple[Array, Array]:
-        """Return the filter's state as a state (43,) with the covariance (33, 33) of its error."""
+        """Return the filter's state (43,) and the covariance (33, 33) of its error."""
         return state, covariance
 
     def measure(self, measure: Measure) -> Measure:
-        """Return a measurement whose Jacobians are by what the filter's covariances are of."""
+        """Return a measurement with Jacobians by errors, as the covariances are."""
         return measure
 
-    def cycle_over_both(
-        self,
-        switching: "Switching",
-        before: Belief,
-        candidate_group: str,
-        measure: Measure,
-    ) -> Belief:
-        """Return the belief after the cycle, run again over both groups; new models had a probability of 0."""
-        old = switching.active
-        fused = switching.imm.fused(before)
-        switching.bring_in(candidate_group)
-        new = dict.fromkeys(switching.active, (*fused, -np.inf))
-        return switching.imm.cycle(
-            regrouped(before, old, switching.active, new), measure
-        )
+    def cycle_over_both(self, union: Union, before: Belief, measure: Measure) -> Belief:
+        """Return the belief after a cycle over both groups.
+
+        The new models start with a probability of 0.
+        """
+        state, covariance = union.old_filter.fused(before)
+        new = dict.fromkeys(union.names, (state, covariance, -np.inf))
+        both = regrouped(before, union.old_names, union.names, new)
+        return union.filter.cycle(both, measure)
 
 
 class PatentForm:
-    """To the patent's letter: the filter holds covariances (43, 43) of numbers, and starts new models by step 8."""
+    """The patent's letter: covariances (43, 43) of numbers, new models by step 8."""
+
+    judges_first_cycle: ClassVar[bool] = True  # the ratio of likelihoods starts at k0
 
     def first_cycles(self, models: MotionModels) -> int:
-        """Return ten, whatever the models."""
+        """Return ten for any models."""
         return FIRST_CYCLES
 
     def imm(self, models: MotionModels, transition: Array) -> IMM:
@@ -138,11 +170,11 @@ class PatentForm:
         return IMM(models.predict_numbers, transition, at_mixed=True)
 
     def covariances(self, states: Array, covariance: Array) -> Array:
-        """Return those of the numbers (r, 43, 43)."""
+        """Return the covariances (r, 43, 43) of the states' numbers."""
         return lifted(states, covariance)
 
     def fused(self, state: Array, covariance: Array) -> tuple[Array, Array]:
-        """Return the unit state, and what its covariance is of errors."""
+        """Return the state with unit quaternions, and the covariance of its error."""
         change = inverse_tangents(unit(state)[None])[0]
         return unit(state), change @ covariance @ change.T
 
@@ -157,54 +189,33 @@ class PatentForm:
 
         return by_numbers
 
-    def cycle_over_both(
-        self,
-        switching: "Switching",
-        before: Belief,
-        candidate_group: str,
-        measure: Measure,
-    ) -> Belief:
-        """Return the belief after the cycle, run again over both groups and judged."""
-        old = switching.active
-        both = self.joined(switching, before, candidate_group)
-        return switching.decided(self.beside(switching, old).cycle(both, measure))
+    def cycle_over_both(self, union: Union, before: Belief, measure: Measure) -> Belief:
+        """Return the belief after a cycle over both groups, the new one's first."""
+        both = self.joined(union, before)
+        return self.begun(union).cycle(both, measure)
 
-    def joined(
-        self, switching: "Switching", belief: Belief, candidate_group: str
-    ) -> Belief:
-        """Return a belief with another group's models beside those in force. VSMM 8."""
-        old, models, (state, _) = (
-            switching.active,
-            switching.models,
-            switching.fused(belief),
-        )
-        switching.bring_in(candidate_group)
+    def joined(self, union: Union, belief: Belief) -> Belief:
+        """Return a belief over the models of both groups. VSMM 8."""
+        state, _ = self.fused(*union.old_filter.fused(belief))
         top = belief.log_probabilities.max()  # VSMM 8.1
-        noises = dict(zip(models.names, models.noises, strict=True))
-        # VSMM 8.3
-        poses = {
-            name: models.captured_nearest(name, state)
-            for name in switching.active
-            if name not in old
-        }
-        new = {
-            name: (pose, lifted(pose[None], noises[name])[0], top)
-            for name, pose in poses.items()
-        }
-        return normalised(regrouped(belief, old, switching.active, new))
+        new = {}
+        for name, noise in zip(union.names, union.models.noises, strict=True):
+            if name not in union.old_names:
+                pose = union.models.captured_nearest(name, state)  # VSMM 8.3
+                new[name] = pose, lifted(pose[None], noise)[0], top
+        return normalised(regrouped(belief, union.old_names, union.names, new))
 
-    def beside(self, switching: "Switching", old: Sequence[str]) -> IMM:
-        """Return the filter in which the prediction of models that are not `old` has their noise as its covariance."""
-        imm = switching.imm
-        rows = [k for k, name in enumerate(switching.active) if name not in old]
-        noises = switching.models.of(switching.active).noises
+    def begun(self, union: Union) -> IMM:
+        """Return a filter that predicts new models with their noise as covariance."""
+        rows = [k for k, name in enumerate(union.names) if name not in union.old_names]
+        noises = union.models.noises
 
         def predict(states: Array, covariances: Array) -> tuple[Array, Array]:
-            states, covariances = imm.predict(states, covariances)
+            states, covariances = union.filter.predict(states, covariances)
             covariances[rows] = lifted(states[rows], noises[rows])  # VSMM 8.2
             return states, covariances
 
-        return replace(imm, predict=predict)
+        return replace(union.filter, predict=predict)
 
 
 Form = DefaultForm | PatentForm
@@ -212,7 +223,7 @@ Form = DefaultForm | PatentForm
 
 @final
 class Switching:
-    """The models in force; at first all of them."""
+    """The active models; at first all of them."""
 
     def __init__(
         self,
@@ -224,19 +235,17 @@ class Switching:
         self.topology = topology
         self.groups = topology.groups
         self.models = models.of(topology.union(topology.groups))
-        self.form, self._structure, self._filter = (
-            form or DefaultForm(),
-            structure,
-            lru_cache(self._filter_of),
-        )
+        self.form = form or DefaultForm()
+        self._structure = structure
+        self._filter = lru_cache(self._filter_of)
         self.restart()
 
     def restart(self) -> None:
-        """Bring all models into force; a group will be chosen among them."""
+        """Activate all models; a group is chosen after the first cycles."""
         self.active = self.models.names
         self.group: str | None = None
         self.candidate_group: str | None = None
-        # of the likelihoods since the candidate group came into force, new to old
+        # of the likelihoods, new to old group, since the candidate was activated
         self._log_ratio = 0.0
         self._cycles = 0
         self._points: list[Array] = []
@@ -246,91 +255,124 @@ class Switching:
 
     @property
     def imm(self) -> IMM:
-        """The filter over the models in force."""
+        """The filter over the active models."""
         return self._filter(self.active)
 
     def start(self, state: Array, covariance: Array) -> Belief:
         """Return the belief in one state (43,) with a covariance (33, 33)."""
-        return start(
-            state, self.form.covariances(state[None], covariance)[0], len(self.active)
-        )
+        held = self.form.covariances(state[None], covariance)[0]
+        return start(state, held, len(self.active))
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
-        """Return the one state (43,), and the covariance (33, 33) of its error, that stand for all models."""
+        """Return the mean state (43,) of all models and its error's covariance."""
         return self.form.fused(*self.imm.fused(belief))
 
     def predicted(self, belief: Belief) -> tuple[Array, Array]:
-        """Return the state (43,) and covariance (33, 33) a frame later, by the most probable model."""
+        """Predict the state and its error's covariance by the most probable model."""
         state, covariance = self.fused(belief)
         likely = self.models.of([self.active[int(belief.probabilities.argmax())]])
         states, covariances = likely.predict(state[None], covariance[None])
         return states[0], covariances[0]
 
     def widened(self, belief: Belief, variances: Array) -> Belief:
-        """Return a belief whose errors have larger variances, by (33,)."""
+        """Return a belief with `variances` (33,) added to its errors'."""
         extra = self.form.covariances(unit(belief.states), np.diag(variances))
         return replace(belief, covariances=belief.covariances + extra)
 
     def cycle(self, before: Belief, measure: Measure, points: Array) -> Belief:
-        """Return the belief one frame later. Groups come and go by the joints (17, 2) detected in the frame."""
-        self._points, measure = [*self._points, points][-3:], self.form.measure(measure)
-        after = self.imm.cycle(before, measure)
+        """Return the belief one frame later, and switch groups.
+
+        Args:
+            before: the belief.
+            measure: returns the measurement of states.
+            points: (17, 2) the joints detected in the frame, which decide about groups.
+
+        Returns:
+            The belief over the models that are then active.
+
+        """
+        self._points = [*self._points, points][-3:]
         self._cycles += 1
-        likely = most_probable(self.groups, self.active, after.probabilities)  # VSMM 5
+        measure = self.form.measure(measure)
+        after = self.imm.cycle(before, measure)
+        likely = most_probable(self.groups, self.active, after.probabilities)
         if self._structure == "all":
             self.group = likely
             return after
         if self.group is None:
-            return (
-                after
-                if self._cycles < self.form.first_cycles(self.models)
-                else self._only(likely, after)
-            )
+            if self._cycles < self.form.first_cycles(self.models):
+                return after
+            return self.keep_only(likely, after)  # VSMM 5
         if self.candidate_group is not None:
-            return self.decided(after)
+            return self.judged(after)
+        requested = self._requested_group()
+        if requested is None:
+            return after
+        union = self.union_with(requested)
+        after = self.form.cycle_over_both(union, before, measure)
+        self.bring_in(requested)
+        return self.judged(after) if self.form.judges_first_cycle else after
+
+    def _requested_group(self) -> str | None:
+        """Return the group that the latest points ask for. VSMM 7.
+
+        None if they ask for none, or for the present group.
+        """
         number = requested_group(self._points)
         names = tuple(self.groups)
         if number is None or number >= len(names) or names[number] == self.group:
-            return after
-        return self.form.cycle_over_both(self, before, names[number], measure)
+            return None
+        return names[number]
 
-    def bring_in(self, candidate_group: str) -> None:
-        """Bring another group into force beside the present one."""
-        self.candidate_group = candidate_group
-        self._log_ratio = 0.0
-        # VSMM 8.4
-        self.active = self.topology.union(
-            [self.group or candidate_group, candidate_group]
+    def union_with(self, candidate_group: str) -> Union:
+        """Return the union of the present group and another one."""
+        assert self.group is not None
+        names = self.topology.union([self.group, candidate_group])
+        return Union(
+            self.active,
+            self.imm,
+            names,
+            self._filter(names),
+            self.models.of(names),
         )
 
-    def decided(self, after: Belief) -> Belief:
-        """Return the belief after a cycle over both groups: over one of them as soon as the other has to end.
+    def bring_in(self, candidate_group: str) -> None:
+        """Activate another group in addition to the present one."""
+        assert self.group is not None
+        self.active = self.topology.union([self.group, candidate_group])  # VSMM 8.4
+        self.candidate_group = candidate_group
+        self._log_ratio = 0.0
 
-        The likelihoods' ratio is that of all cycles since the new group came. Interpretation V12.
+    def judged(self, after: Belief) -> Belief:
+        """Return the belief after a cycle over both groups, and end one if it has lost.
+
+        The ratio of the likelihoods covers all cycles since the new group was
+        activated. Interpretation V12.
         """
         assert self.candidate_group is not None
         assert self.group is not None
-        old, new = (
-            [self.active.index(name) for name in self.groups[group]]
-            for group in (self.group, self.candidate_group)
-        )
+        old = [self.active.index(name) for name in self.groups[self.group]]
+        new = [self.active.index(name) for name in self.groups[self.candidate_group]]
+        # VSMM 9
+        self._log_ratio += _log_ratio(after.log_likelihoods, old, new)
+        smaller = min(_log_ratio(after.log_probabilities, old, new), self._log_ratio)
+        if smaller < np.log(MIN_RATIO):
+            return self.keep_only(self.group, after)
+        if smaller > 0.0:
+            return self.keep_only(self.candidate_group, after)
+        return after
 
-        def log_ratio(logarithms: Array) -> float:
-            return float(
-                np.logaddexp.reduce(logarithms[new])
-                - np.logaddexp.reduce(logarithms[old])
-            )
-
-        self._log_ratio += log_ratio(after.log_likelihoods)  # VSMM 9
-        smaller = min(log_ratio(after.log_probabilities), self._log_ratio)
-        if smaller < np.log(ENDED):
-            return self._only(self.group, after)
-        return self._only(self.candidate_group, after) if smaller > 0.0 else after
-
-    def _only(self, group: str, belief: Belief) -> Belief:
-        """Return the belief over one group, which alone stays in force."""
+    def keep_only(self, group: str, belief: Belief) -> Belief:
+        """End the other groups, and return the belief over the one that is kept."""
         old = self.active
         self.active = self.groups[group]
         self.group = group
         self.candidate_group = None
         return normalised(regrouped(belief, old, self.active, {}))
+
+
+def _log_ratio(logarithms: Array, old: Sequence[int], new: Sequence[int]) -> float:
+    """Return the logarithm of the ratio of the new models' sum to the old ones'."""
+    new_sum = np.logaddexp.reduce(logarithms[new])
+    old_sum = np.logaddexp.reduce(logarithms[old])
+    return float(new_sum - old_sum)

@@ -1,4 +1,4 @@
-"""The variable-structure multiple-model tracker: its settings, a first pose from one frame, and each frame."""
+"""The tracker `vsmm`: its settings, the first pose, and each frame."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -32,39 +32,42 @@ from posefit_vsmm.state import (
 )
 from posefit_vsmm.switching import DefaultForm, Form, PatentForm, Structure, Switching
 
-# The first pose: typical poses at several yaws, then draws around the best so far
-YAWS_NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # where the yaw is about known
+# The first pose: typical poses at several yaws, then samples around the best so far
+YAWS_NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # from an approximate yaw
 YAWS_ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
-TYPICAL_SHARE = 0.6  # of the budget: what the typical poses may have
-DRAWS = 40  # in a round
-# from a typical pose: a quaternion that far off costs 1 per cent
+TYPICAL_SHARE = 0.6  # of the budget: at most this for the typical poses
+DRAWS = 40  # samples per round
+# a quaternion this far from the typical pose adds 1 per cent to the cost
 TYPICAL_DEVIATION = np.radians(15.0)
-# one a round, the last one for the rest
+# one per round; later rounds use the last one
 DRAW_DEVIATIONS = np.radians([20.0, 12.0, 7.0, 4.0])
 # metres and radians. Interpretation V7
 INITIAL_DEVIATIONS = np.repeat([0.05, np.radians(15.0)], [3, ERROR - 3])
 
 # Interpretation V14
-# frames that the models go on alone without a visible person; then the track is lost
+# The models predict this many frames without a visible person; then the track is lost.
 MAX_BLIND_FRAMES = 15
-LOST_IOU = 0.35  # below it, for so many frames, the track is lost
+# The track is also lost if the IoU is below LOST_IOU for LOST_FRAMES frames.
+LOST_IOU = 0.35
 LOST_FRAMES = 8
-# after these a limb that is not detected, while an end point is unassigned, is sought
-# all around
+# A limb is missing if it is not detected for this many frames while some end point is
+# unassigned. The variance of its joints then grows by MISSING_DEVIATION**2 per frame,
+# so that the limb is searched for in a larger area.
 MISSING_FRAMES = 2
-MISSING_DEVIATION = np.radians(15.0)  # that each of its joints then gains a frame
-# bones whose turns a limb's end depends on
+MISSING_DEVIATION = np.radians(15.0)
+# the bones that move a limb's end
 _LIMBS = {"hand": ("humerus", "radius"), "foot": ("femur", "tibia")}
 
 
 class Variant(NamedTuple):
-    """What a variant is made of: the letter of the patent, or what tracks better."""
+    """The parts that differ between the default and the patent's letter."""
 
     form: Form  # Interpretations V4 and V11
     rules: Callable[[], Rules]  # Interpretations V8 and V15
     shrunk_to: Literal["identity", "zero"]  # Interpretation V5
-    fps: float | None  # of a step of the models; None is the task's. Interpretation V6
-    # whether a hidden joint counts as measured where its own filter has it.
+    # frame rate of the models; None for the task's. Interpretation V6
+    fps: float | None
+    # whether a hidden joint counts as measured at its filter's prediction.
     # Interpretation V9
     imputes: bool
     recovers: bool  # Interpretation V14
@@ -82,7 +85,7 @@ VARIANTS = {
 
 @final
 class TrackFilter:
-    """One track, as far as it has come."""
+    """The state of one track, advanced frame by frame."""
 
     def __init__(self, tracker: "VSMM", rng: np.random.Generator) -> None:
         task = tracker.task
@@ -94,7 +97,8 @@ class TrackFilter:
             task.body.skeleton, variant.fps or task.fps, tracker.process_noise
         )
         self.switching = Switching(models, TOPOLOGY, variant.form, tracker.structure)
-        self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
+        self._dependent = library.dependent
+        self._free = free_errors(task.body.skeleton)
         self._cameras = JointCameras(
             task.body,
             task.cameras,
@@ -103,30 +107,32 @@ class TrackFilter:
             tracker.joint_noise,
         )
         self._imputes = variant.imputes
-        self._recovers = (
-            variant.recovers if tracker.recovery is None else tracker.recovery
-        )
+        self._recovers = tracker.recovery
+        if tracker.recovery is None:
+            self._recovers = variant.recovers
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
         self._belief: Belief | None = None
-        self._blind_frames = self._bad_frames = 0
+        self._evaluations = 0  # in the current frame
+        self._blind_frames = 0
+        self._bad_frames = 0
+        # for each limb, the frames since it was last detected; see MISSING_FRAMES
+        self._missing: dict[str, int] = {}
 
     def frame(self, observation: Observation) -> Frame:
-        """Return the next frame."""
+        """Return the frame of the next observation."""
         start = time.perf_counter()
         self._evaluations = 0
-        usable = observation.usable
-        views = [
-            lines_of(silhouette.mask) if usable else None
-            for silhouette in observation.silhouettes
-        ]
+        views: list[Lines | None] = [None] * len(observation.silhouettes)
+        if observation.usable:
+            views = [lines_of(view.mask) for view in observation.silhouettes]
         blind = all(lines is None for lines in views)
         self._blind_frames = self._blind_frames + 1 if blind else 0
-        if self._recovers and (
-            self._bad_frames >= LOST_FRAMES or self._blind_frames > MAX_BLIND_FRAMES
-        ):
+        bad = self._bad_frames >= LOST_FRAMES
+        lost = bad or self._blind_frames > MAX_BLIND_FRAMES
+        if self._recovers and lost:
             self._belief = None
-        # the latest pose once more, or an upright one
+        # nothing to start from: repeat the latest pose, or stand upright
         if self._belief is None and blind:
             pose = np.append(self._task.yaw or 0.0, np.zeros(65))
             place = self._task.anchor
@@ -149,13 +155,19 @@ class TrackFilter:
         state, _ = self.switching.fused(belief)
         details["filter_seconds"] = time.perf_counter() - start
         (pose,), (place,) = decode(state[None], self._dependent)
-        self._evaluations += 1  # that of the frame's own cost
+        self._evaluations += 1  # for the cost of the frame itself
         return self._frame(pose, place, observation, details)
 
     def _detected(
         self, belief: Belief, views: Sequence[Lines | None], observation: Observation
     ) -> tuple[Belief, list[JointMeasurement], dict[str, Any]]:
-        """Return the belief, wider where limbs are sought, what each camera measured, and the joints as details."""
+        """Detect the joints of a frame.
+
+        Returns:
+            The belief, with larger variances for missing limbs; the measurement of each
+            camera; and the joints and their confidence as details of the frame.
+
+        """
         expected, spread = self.switching.predicted(belief)
         measured = self._cameras.detect(views, expected, spread, observation.landmarks)
         if self._recovers and (extra := self._missing_variances(measured)).any():
@@ -163,24 +175,22 @@ class TrackFilter:
             measured = self._cameras.detect(
                 views, expected, spread + np.diag(extra), observation.landmarks
             )
-        self._joint_filters = self._joint_filters or [
-            JointFilter(view.points) for view in measured
-        ]
-        imputed = [
-            view.imputed(
-                joint_filter.follow(view.points, view.confidence, view.variances)
-            )
-            for view, joint_filter in zip(measured, self._joint_filters, strict=True)
-        ]
+        if not self._joint_filters:
+            self._joint_filters = [JointFilter(view.points) for view in measured]
+        imputed = []
+        for view, joint_filter in zip(measured, self._joint_filters, strict=True):
+            points = joint_filter.follow(view.points, view.confidence, view.variances)
+            imputed.append(view.imputed(points))
         joints = [view.points for view in imputed]
         confidence = [view.confidence for view in measured]
         details = {"joints": np.array(joints), "confidence": np.array(confidence)}
         return belief, imputed if self._imputes else measured, details
 
     def _start(self, observation: Observation) -> Belief:
-        """Return the belief in the state (43,) that fits this frame best, with all models equally probable.
+        """Return the belief in the state (43,) that fits this frame best.
 
-        Typical poses of the models are tried at several yaws, and then draws around the best so far.
+        Typical poses of the models are tried at several yaws, then samples around the
+        best so far. All models are equally probable.
         """
         task = self._task
         latest = self._latest
@@ -196,9 +206,10 @@ class TrackFilter:
         budget = task.evaluations - 1
         yaws = YAWS_ALL_AROUND if yaw is None else yaw + YAWS_NEAR
         states = self.switching.models.typical_states(yaws, anchor)
-        count = max(
-            1, min(len(states), int(TYPICAL_SHARE * budget)) - (known_pose is not None)
-        )
+        count = min(len(states), int(TYPICAL_SHARE * budget))
+        if known_pose is not None:
+            count -= 1  # for the known pose
+        count = max(1, count)
         states = states[np.linspace(0, len(states) - 1, count).astype(np.int64)]
         if known_pose is not None:
             states = np.concatenate([encode(known_pose[None], anchor[None]), states])
@@ -212,51 +223,51 @@ class TrackFilter:
             errors = self._free * self._rng.normal(0.0, deviation, (DRAWS, ERROR))
             errors[:, :3] = 0.0
             costs, states = self._aligned_costs(observation, plus(best, errors))
-            costs += ((minus(states, typical)[:, 3:] / TYPICAL_DEVIATION) ** 2).sum(
-                axis=1
-            )
+            turned = minus(states, typical)[:, 3:] / TYPICAL_DEVIATION  # (40, 30)
+            costs += (turned**2).sum(axis=1)
             if costs.min() < best_cost:
                 best = states[costs.argmin()]
                 best_cost = float(costs.min())
             evaluations += DRAWS
         self.switching.restart()
         deviations = INITIAL_DEVIATIONS * np.maximum(self._free, STIFF)
-        self._bad_frames, self._missing = (
-            0,
-            dict.fromkeys(("left hand", "right hand", "left foot", "right foot"), 0),
-        )
+        self._bad_frames = 0
+        limbs = ("left hand", "right hand", "left foot", "right foot")
+        self._missing = dict.fromkeys(limbs, 0)
         self._evaluations = evaluations
         return self.switching.start(best, np.diag(deviations**2))
 
     def _aligned_costs(
         self, observation: Observation, states: Array
     ) -> tuple[Array, Array]:
-        """Return the costs (n,) of states (n, 43) in an observation, and the states, moved to where they fit it."""
+        """Return the costs (n,) of states (n, 43), and the states.
+
+        Each state is first moved to where it fits the observation.
+        """
         task = self._task
         known = observation.translation
         poses, places = decode(states, self._dependent)
         scene = task.body, task.cameras, observation.silhouettes
-        places = (
-            align(*scene, poses, places)
-            if known is None
-            else np.tile(known, (len(states), 1))
-        )
-        return pose_costs(*scene, poses, places, threads=task.threads)[
-            0
-        ], np.column_stack([places, states[:, 3:]])
+        if known is None:
+            places = align(*scene, poses, places)
+        else:
+            places[:] = known
+        costs, _ = pose_costs(*scene, poses, places, threads=task.threads)
+        return costs, np.column_stack([places, states[:, 3:]])
 
     def _missing_variances(self, measured: Sequence[JointMeasurement]) -> Array:
-        """Return the variances (33,) to add for limbs whose ends are not detected while an end point is unassigned."""
+        """Return the variances (33,) to add for missing limbs; see MISSING_FRAMES."""
         extra = np.zeros(ERROR)
+        bones = extra[FIRST_BONE:].reshape(-1, 3)  # a view: writing to it fills `extra`
         unassigned = any(view.unassigned for view in measured)
         for limb, frames in self._missing.items():
             detected = any(view.confidence[AT[limb]] > 0.0 for view in measured)
             self._missing[limb] = frames + 1 if unassigned and not detected else 0
+            if self._missing[limb] < MISSING_FRAMES:
+                continue
             side, end = limb.split()
-            for bone in _LIMBS[end] if self._missing[limb] >= MISSING_FRAMES else ():
-                extra[FIRST_BONE:].reshape(-1, 3)[BONES.index(side[0] + bone)] = (
-                    MISSING_DEVIATION**2
-                )
+            for bone in _LIMBS[end]:
+                bones[BONES.index(side[0] + bone)] = MISSING_DEVIATION**2
         return np.asarray(extra * np.maximum(self._free, STIFF) ** 2)
 
     def _frame(
@@ -266,7 +277,7 @@ class TrackFilter:
         observation: Observation,
         details: Mapping[str, Any],
     ) -> Frame:
-        """Return a frame with its cost, the label of its activity, and the models in its details."""
+        """Return a frame with its cost, its activity, and the models in its details."""
         task = self._task
         belief = self._belief
         switching = self.switching
@@ -278,31 +289,33 @@ class TrackFilter:
             task.body, task.cameras, observation.silhouettes, pose[None], place[None]
         )
         if not self._blind_frames:
-            iou = metrics.iou(
-                np.array(known_views(list(counts[:, 0]), observation.silhouettes))
-            ).mean()
+            known = known_views(list(counts[:, 0]), observation.silhouettes)
+            iou = metrics.iou(np.array(known)).mean()
             self._bad_frames = self._bad_frames + 1 if iou < LOST_IOU else 0
-        models = {
-            name: getattr(switching, name)
-            for name in ("group", "candidate_group", "groups")
+        models: dict[str, Any] = {
+            "group": switching.group,
+            "candidate_group": switching.candidate_group,
+            "groups": switching.groups,
+            "lost": belief is None,
+            "models": switching.active,
         }
-        models |= {"lost": belief is None, "models": switching.active}
         activity = None
         if belief is not None:
-            models |= {"probabilities": belief.probabilities}
+            models["probabilities"] = belief.probabilities
             activity = most_probable(
                 switching.topology.activities, switching.active, belief.probabilities
             )
         cost = float(costs[0])
-        figures = (
-            pose,
-            place,
-            cost,
-            counts[:, 0],
-            self._evaluations,
-            np.array([[self._evaluations, cost]]),
+        self._latest = Frame(
+            pose=pose,
+            translation=place,
+            cost=cost,
+            areas=counts[:, 0],
+            evaluations=self._evaluations,
+            trace=np.array([[self._evaluations, cost]]),
+            activity=activity,
+            details={**details, **models},
         )
-        self._latest = Frame(*figures, details={**details, **models}, activity=activity)
         return self._latest
 
 
@@ -310,16 +323,20 @@ class TrackFilter:
 class VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
-    `vsmm:patent` sets every interpretation to the patent's letter; the default differs from it where tracks are
-    better. The other settings count in both.
+    `vsmm:patent` sets every interpretation to the patent's letter; the default differs
+    where that tracks better. The other settings apply to both.
 
     Settings:
-        variant: "default", or the "patent"'s letter. Interpretations V4 to V6, V8, V9, V11, V14 and V15.
-        structure: "variable", one group at a time and two while it changes; "all" models always, a plain IMM.
-        process_noise (Q): of the models, as a multiple of their residuals' covariance, above 0. Interpretation V7.
-        joint_noise (R): of the detected joints, as a multiple of their variances, above 0. Interpretation V7.
-        recovery: whether a lost pose is estimated again and a lost limb sought all around; by default yes, and no in
-            the patent. Interpretation V14.
+        variant: "default", or "patent" for the patent's letter. Interpretations V4 to
+            V6, V8, V9, V11, V14 and V15.
+        structure: "variable" runs one group of models, and two during a switch; "all"
+            runs all models always, a plain IMM.
+        process_noise (Q): of the models, as a multiple of their residuals' covariance,
+            above 0. Interpretation V7.
+        joint_noise (R): of the detected joints, as a multiple of their variances, above
+            0. Interpretation V7.
+        recovery: whether a lost pose is estimated again and a lost limb is searched for
+            in a larger area; by default yes, in the patent no. Interpretation V14.
     """
 
     task: Task
@@ -339,7 +356,10 @@ class VSMM:
     def track(
         self, observations: Iterable[Observation], rng: np.random.Generator
     ) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""
+        """Yield a `Frame` for each observation.
+
+        Its `details` hold the models, their probabilities, the group and the joints.
+        """
         track_filter = TrackFilter(self, rng)
         for observation in observations:
             yield track_filter.frame(observation)

@@ -1,4 +1,4 @@
-"""Array types, checked arrays that cannot be written to, and the compilation of plain functions of arrays."""
+"""Array types, checked read-only arrays, and compilation of functions of arrays."""
 
 import os
 from collections.abc import Callable
@@ -14,63 +14,72 @@ Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
 
 if "NUMBA_CPU_NAME" in os.environ:
-    # A processor that is named has its own instructions and none besides. numba, not yet imported, takes the name for
-    # their order only: x86-64-v3 would still have AVX-512 where this machine has it.
+    # A named processor must have only its own instructions. numba, which is not
+    # imported yet, uses the name only to schedule instructions: x86-64-v3 would still
+    # have AVX-512 on a machine that has it.
     os.environ.setdefault("NUMBA_CPU_FEATURES", "")
 
 
 def jit(function: Callable[..., Any]) -> Any:
-    """Return a plain function of arrays compiled by numba, once a machine; it may run in several threads at once.
+    """Return a plain function of arrays, compiled by numba once per machine.
 
-    Rounding may differ from strict IEEE order only where a product and a sum are contracted, or in a zero's sign.
+    It may run in several threads at once. Its rounding differs from strict IEEE order
+    only if a product and a sum are contracted, or in the sign of a zero.
     """
     return _compiled(function, "never")
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Return a plain function of arrays that becomes part of the compiled functions that call it.
+    """Return a plain function of arrays that is inlined into its compiled callers.
 
-    A call costs as much as filling a few blocks of pixels: each array is counted as in use, and then as not.
+    A call would cost as much as filling a few blocks of pixels, since it changes the
+    reference count of each array twice.
     """
     return _compiled(function, "always")
 
 
 def _compiled(function: Callable[..., Any], inline: str) -> Any:
-    import numba
+    from posefit.arrays.compiling import compiled
 
-    from posefit.arrays.compiling import cached
-
-    options: dict[str, Any] = {
+    options = {
         "nogil": True,
         "error_model": "numpy",
         "fastmath": {"contract", "nsz"},
         "inline": inline,
+        # These functions are not called from C. Wrappers for that would take a twelfth
+        # of the time to compile.
+        "no_cfunc_wrapper": True,
     }
-    # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
-    options["no_cfunc_wrapper"] = True
-    compiled: Any = numba.njit(**options)(function)
-    # NUMBA_DISABLE_JIT: nothing is compiled
-    return compiled if compiled is function else cached(compiled)
+    return compiled(function, options)
 
 
 def writeable(values: ArrayLike) -> Array:
-    """Return values as a float64 array in C order that may be written to, the same array where it is one.
+    """Return values as a writeable float64 array in C order.
 
-    Compiled loops are typed by their arguments' layout: one more layout would cost one more compilation.
+    An array that is one already is returned itself. Compiled loops are typed by their
+    arguments' layout: another layout would cost another compilation.
     """
-    if (
-        isinstance(values, np.ndarray)
-        and values.dtype == np.float64
-        and values.flags.carray
-    ):
-        return values
+    if isinstance(values, np.ndarray):
+        fits = values.dtype == np.float64 and values.flags.carray
+        if fits:
+            return values
     return np.require(values, np.float64, ["C", "W"])
 
 
 def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
-    """Return a copy of finite numbers that cannot be written to; a word in a shape stands for any length.
+    """Return a read-only float64 copy of finite numbers.
 
-    Raises InputError, beginning with the name, where they are no such numbers.
+    Args:
+        name: the name of the numbers, which begins messages.
+        values: the numbers.
+        shape: the shape that they must have; a word in it stands for any length.
+
+    Returns:
+        The copy.
+
+    Raises:
+        InputError: if they are not numbers, have another shape, or are not finite.
+
     """
     sides = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
     try:
@@ -79,18 +88,16 @@ def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
         raise InputError(
             f"{name} must be numbers of shape {sides}, got {quoted(values)}"
         ) from None
-    fits = array.shape == shape or (
-        array.ndim == len(shape)
-        and all(
-            isinstance(side, str) or side == length
-            for side, length in zip(shape, array.shape, strict=True)
-        )
-    )
+    fits = array.ndim == len(shape)
+    if fits:
+        for side, length in zip(shape, array.shape, strict=True):
+            fits &= isinstance(side, str) or side == length
     if not fits:
         raise InputError(f"{name} must have shape {sides}, got {array.shape}")
-    if not np.isfinite(array).all():
+    finite = np.isfinite(array)
+    if not finite.all():
         raise InputError(
-            f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not"
+            f"{name} must be finite, got {np.count_nonzero(~finite)} that are not"
         )
     array.setflags(write=False)
     return array

@@ -1,105 +1,111 @@
-"""Where numba keeps what it compiled: a folder for each state of a module, so that nothing there is stale.
+"""The cache of compiled functions: one folder per module and state of its sources.
 
-numba's own cache looks at the one file that a function stands in, and what is compiled holds copies of functions and
-constants of others. So the folder's name is a digest of all of these and of numba's version. It is in NUMBA_CACHE_DIR
-where that is set, else in the user's cache.
+The cache is numba's (`cache=True`). numba itself only checks the file that a function
+is in, but compiled code holds copies of functions and constants of other modules. So
+the name of the folder has a digest of all their sources and of numba's version. The
+folder is in NUMBA_CACHE_DIR if that is set, otherwise in the user's cache.
+
+numba trusts its files: a damaged one raises an exception or crashes the process. So
+each folder lists the SHA-256 of its files. A process that starts to use a folder
+removes files that differ from the list, and their functions are compiled again. numba
+saves one function at a time without a lock, and two processes may write the same file.
+So functions are saved and listed under a lock on the folder.
 """
 
 import hashlib
 import logging
 import multiprocessing
 import os
-import pickle
 import shutil
 import sys
-from contextlib import suppress
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core import event
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core import event  # numba's documented interface for applications
 
 from posefit.arrays.stored import cache_folder
 
 config: Any = numba.config
-MAX_FOLDERS = 256  # of a user's cache: those of older sources are removed
+MAX_FOLDERS = 256  # in the user's cache: the oldest ones beyond this are removed
+# bytes: with less free space nothing is saved, since numba would raise an error in the
+# middle of a call
+MIN_FREE = 64 << 20
+SUMS = "SHA256SUMS"
+# the folder of each module with compiled functions; None if nothing can be saved
+_folders: dict[str, Path | None] = {}
+_choosing_folder = threading.Lock()
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]
-    """Logs once that a function of posefit's is compiled, but not in a process that another one started."""
+    """Logs once that posefit's functions are compiled.
+
+    A process started by another one logs nothing.
+    """
 
     announced = False
 
     def on_start(self, event: Any) -> None:
-        """Log a warning, which is printed on stderr unless logging is configured otherwise."""
+        """Log a warning, which goes to stderr unless logging is configured."""
         if self.announced or multiprocessing.parent_process() is not None:
             return
         if event.data["dispatcher"].py_func.__module__.startswith("posefit"):
             self.announced = True
-            message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
-            logging.getLogger("posefit").warning(message)
+            logging.getLogger("posefit").warning(
+                "compiling the kernels, once on this machine; "
+                "this takes ten seconds or more ..."
+            )
 
     def on_end(self, event: Any) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
-event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
+class _Saving(event.Listener):  # type: ignore[misc]
+    """Locks a function's folder while numba saves the function, and lists its files.
 
-
-class CheckedFile(IndexDataCacheFile):
-    """A file of numba's cache that begins with a digest of the rest: what is damaged is never run."""
-
-    def _save_data(self, name: str, data: Any) -> None:
-        dumped = self._dump(data)  # type: ignore[no-untyped-call]
-        with self._open_for_write(self._data_path(name)) as file:  # type: ignore[no-untyped-call]
-            file.write(hashlib.sha256(dumped).digest() + dumped)
-
-    def _load_data(self, name: str) -> Any:
-        content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
-        digest = content[:32]
-        dumped = content[32:]
-        if hashlib.sha256(dumped).digest() != digest:
-            raise ValueError(f"{name} is damaged")
-        return pickle.loads(dumped)
-
-
-class TolerantCache(FunctionCache):
-    """numba's cache, for which a file that is damaged, or cannot be read or written, is a miss.
-
-    Each signature has an index of its own: of one index two processes may write, one loses what the other compiled.
+    numba saves a function after it is compiled and before the compiler's lock is
+    released.
     """
 
-    def open_index(self, sig: Any) -> None:
-        """Use the index of a signature."""
-        base = f"{self._impl.filename_base}-{hashlib.sha256(str(sig).encode()).hexdigest()[:12]}"
-        stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = CheckedFile(self.cache_path, base, stamp)  # type: ignore[no-untyped-call]
+    def __init__(self) -> None:
+        self._thread = threading.local()
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what was compiled for a signature; None where it is not there."""
-        self.open_index(sig)
-        try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except Exception:  # whatever a damaged file raises
-            with suppress(OSError):
-                self.flush()  # type: ignore[no-untyped-call]
-            return None
+    def on_start(self, event: Any) -> None:
+        """Do nothing: only the end of a compilation matters."""
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Write what was compiled for a signature, if there is room."""
-        self.open_index(sig)
-        with suppress(OSError):
-            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+    def on_end(self, event: Any) -> None:
+        """Lock a function's folder once it is compiled; unlock it once it is saved."""
+        if event.kind == "numba:compile":
+            folder = _folders.get(event.data["dispatcher"].py_func.__module__)
+            if folder is not None:
+                saving = ExitStack()
+                self._thread.saving = saving
+                saving.enter_context(_locked(folder))
+                saving.callback(_list_files, folder)
+            return
+        saving = self._thread.__dict__.pop("saving", None)
+        if saving is not None:
+            saving.close()
+
+
+_saving = _Saving()
+event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
+event.register("numba:compile", _saving)  # type: ignore[no-untyped-call]
+event.register("numba:compiler_lock", _saving)  # type: ignore[no-untyped-call]
 
 
 @lru_cache
 def state_of(module: str) -> str:
-    """Return a module's name and a digest of its state, on which all depends that its functions compile or compute.
+    """Return a module's name with a digest of everything that its functions depend on.
 
-    That is the module's source, the constants that it imports, and the same of the modules whose functions it imports.
+    That is the module's source, the constants that it imports, and the same for the
+    modules of the functions that it imports.
     """
     digest = hashlib.sha256(numba.__version__.encode())
     modules = [module]
@@ -108,42 +114,120 @@ def state_of(module: str) -> str:
         loaded = sys.modules[name]
         digest.update(Path(str(loaded.__file__)).read_bytes())
         for key, value in sorted(vars(loaded).items()):
+            constant = isinstance(value, int | float | str | tuple | np.generic)
+            owner = getattr(value, "__module__", None)
             if isinstance(value, np.ndarray):
                 digest.update(key.encode() + value.tobytes())
-            elif isinstance(
-                value, int | float | str | tuple | np.generic
-            ) and not key.startswith("__"):
+            elif constant and not key.startswith("__"):
                 digest.update(f"{key} {value!r}".encode())
-            elif (
-                (owner := getattr(value, "__module__", None))
-                and owner.startswith(own)
-                and owner not in modules
-            ):
+            elif owner and owner.startswith(own) and owner not in modules:
                 modules.append(owner)
     return f"{module}-{digest.hexdigest()[:16]}"
 
 
-def cached(dispatcher: Any) -> Any:
-    """Return a function of numba's, which finds in its folder what any process compiled before."""
-    before = config.CACHE_DIR
+def compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return a function compiled by numba with these options.
+
+    It is saved for later processes if that is possible.
+    """
+    if config.DISABLE_JIT:
+        return function
+    module = function.__module__
+    if module not in _folders:
+        _folders[module] = _usable_folder(module)
+    folder = _folders[module]
+    if folder is None:
+        return numba.njit(**options)(function)
+    with _choosing_folder:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(folder)
+        try:
+            dispatcher = numba.njit(cache=True, **options)(function)
+            # numba may choose another folder, with stale files
+            usable = Path(dispatcher.stats.cache_path).is_relative_to(folder)
+        except RuntimeError:  # the function is not from a file
+            usable = False
+        finally:
+            config.CACHE_DIR = before
+    return dispatcher if usable else numba.njit(**options)(function)
+
+
+def _usable_folder(module: str) -> Path | None:
+    """Return the folder of a module's compiled functions, without damaged files.
+
+    None if nothing can be saved.
+    """
     try:
-        name = state_of(dispatcher.py_func.__module__)
-        base = Path(before) if before else cache_folder()
-        if not (base / name).is_dir():
-            (base / name).mkdir(parents=True)
-            for old in (
-                sorted(base.iterdir(), key=os.path.getmtime)[:-MAX_FOLDERS]
-                if not before
-                else ()
-            ):
-                shutil.rmtree(old, ignore_errors=True)
-        config.CACHE_DIR = str(base / name)
-        cache = TolerantCache(dispatcher.py_func)  # type: ignore[no-untyped-call]
-        # else numba chose a place where stale files may be
-        if Path(cache.cache_path).is_relative_to(base):
-            dispatcher._cache = cache
+        base = cache_folder()
+        folder = base / state_of(module)
+        if not folder.is_dir():
+            folder.mkdir(parents=True)
+            _remove_oldest(base)
+        if shutil.disk_usage(folder).free < MIN_FREE:
+            return None
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"room for a file")
+        with _locked(folder):
+            _remove_damaged(folder)
     except (OSError, RuntimeError):
-        pass  # no home, no room, or no file of the function: every process compiles
-    finally:
-        config.CACHE_DIR = before
-    return dispatcher
+        return None  # no home directory, no free space, or a module without a file
+    return folder
+
+
+def _remove_oldest(base: Path) -> None:
+    """Remove the oldest folders from the user's cache, not from NUMBA_CACHE_DIR."""
+    if config.CACHE_DIR:
+        return
+    folders = sorted(base.iterdir(), key=os.path.getmtime)
+    for old in folders[:-MAX_FOLDERS]:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Lock a folder against other processes, if the operating and file systems can."""
+    with ExitStack() as stack:
+        with suppress(ImportError, OSError):
+            import fcntl
+
+            file = stack.enter_context((folder / "lock").open("ab"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+            # if a child process has the file open too, closing it would not unlock it
+            stack.callback(fcntl.flock, file, fcntl.LOCK_UN)
+        yield
+
+
+def _files_in(folder: Path) -> Iterator[Path]:
+    yield from folder.rglob("*.nb[ic]")  # numba's indices and compiled functions
+
+
+def _sum_of(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _list_files(folder: Path) -> None:
+    """List the SHA-256 of a folder's files in the format of `sha256sum`.
+
+    If the list cannot be written, the next process removes the files.
+    """
+    with suppress(OSError):
+        lines = [
+            f"{_sum_of(path)}  {path.relative_to(folder)}\n"
+            for path in _files_in(folder)
+        ]
+        (folder / SUMS).write_text("".join(lines))
+
+
+def _remove_damaged(folder: Path) -> None:
+    """Remove the files of a folder that differ from the list."""
+    try:
+        listed = set((folder / SUMS).read_text(errors="replace").splitlines())
+    except OSError:
+        listed = set()
+    for path in list(_files_in(folder)):
+        try:
+            intact = f"{_sum_of(path)}  {path.relative_to(folder)}" in listed
+        except OSError:
+            intact = False
+        if not intact:
+            path.unlink()

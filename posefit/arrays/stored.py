@@ -1,8 +1,9 @@
-"""Arrays that are made once on a machine, and kept in the cache where the compiled functions are.
+"""Arrays that are computed once per machine, and stored next to compiled functions.
 
-A file's name is a digest of all that its arrays are made from, so nothing there is stale. A file is written under a
-random name and then renamed, so that processes beside each other read whole files only. A file that is damaged, or that
-cannot be read, is made again; if it cannot be written, each process makes its arrays for itself.
+A file's name is a digest of everything that its arrays are computed from, so files are
+never stale. A file is written under a random name and then renamed, so that other
+processes never read half a file. If a file is damaged or cannot be read, its arrays are
+computed again; if it cannot be written, each process computes them for itself.
 """
 
 import hashlib
@@ -18,17 +19,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# files of a kind, which are about ten megabytes each: the ones not used for longest are
-# removed
+# files of a kind, about ten megabytes each: the least recently used are removed
 MAX_FILES = 24
-# whatever a damaged archive raises
+# the exceptions that a damaged archive raises
 _DAMAGED = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
 def cache_folder() -> Path:
-    """Return the folder of what is made once on a machine: NUMBA_CACHE_DIR, or posefit's in the user's cache."""
+    """Return the cache: NUMBA_CACHE_DIR, or posefit's folder in the user's cache."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen)
@@ -36,22 +36,22 @@ def cache_folder() -> Path:
 
 
 def stored(kind: str, key: bytes, make: Callable[[], Arrays]) -> Arrays:
-    """Return the arrays of a key, read from the cache, or made and written there.
+    """Return the arrays of a key, read from the cache, or made and written to it.
 
     Args:
-        kind: the folder of such arrays in the cache.
-        key: what the arrays are made from, or a digest of it.
-        make: returns the arrays by their names; the same ones for the same key.
+        kind: the name of the folder in the cache.
+        key: the data that the arrays are made from, or a digest of it.
+        make: returns the arrays by name; always the same ones for the same key.
 
     Returns:
-        The arrays by their names.
+        The arrays by name.
 
     """
     name = hashlib.sha256(key).hexdigest()[:32]
     try:
         path = cache_folder() / kind / f"{name}.npz"
         arrays = _read(path)
-    except RuntimeError:  # there is no home, and so no cache
+    except RuntimeError:  # no home directory, and so no cache
         arrays = make()
     except _DAMAGED:
         arrays = make()
@@ -61,13 +61,13 @@ def stored(kind: str, key: bytes, make: Callable[[], Arrays]) -> Arrays:
 
 
 def _read(path: Path) -> Arrays:
-    """Return the arrays of a file. An archive has a checksum of each array, which is compared as it is read."""
-    # NumPy leaves a damaged archive open that it has opened itself
+    """Return the arrays of a file; reading an archive compares its checksums."""
+    # NumPy would leave a damaged archive open if it opened it itself
     with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}
     if not arrays:
         raise ValueError(f"{path} is empty")
-    # it is in use: it stays longer than others
+    # mark the file as recently used
     with suppress(OSError):
         os.utime(path)
     return arrays
@@ -75,14 +75,14 @@ def _read(path: Path) -> Arrays:
 
 def _write(path: Path, arrays: Arrays) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.stem}-{secrets.token_hex(4)}.npz")
+    temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}.npz")
     try:
-        with beside.open("xb") as file:
+        with temporary.open("xb") as file:
             named: dict[str, Any] = dict(arrays)
             np.savez(file, **named)
-        beside.replace(path)
+        temporary.replace(path)
     finally:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
     files = sorted(path.parent.iterdir(), key=os.path.getmtime)
     for old in files[:-MAX_FILES]:
         old.unlink(missing_ok=True)

@@ -169,7 +169,7 @@ def box(text: str) -> tuple[int, ...]:
 
 _video = under("How the person is segmented in video")
 _result = under("Results")
-FRAMES = under("What is seen")(
+FRAMES = under("Source and camera")(
     "--frames",
     default=":",
     callback=parsed_by(text_range),

@@ -12,7 +12,7 @@ from posefit.cli.output import print_result, results_alone
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def plugins(context: click.Context, as_json: bool) -> None:
-    """List the installed optimisers, priors, trackers, starts and segmenters.
+    """List the installed optimisers, priors, trackers, starts, segmenters and devices.
 
     The list has their settings; `show NAME` explains the settings of one.
     """
@@ -120,9 +120,9 @@ def check(
     The exit status is 1 if a rule is broken.
     """
     from posefit.fitting.check import one_of
-    from posefit.registry import KINDS
+    from posefit.registry import CHECKED_KINDS
 
-    one_of("kind", kind, KINDS)
+    one_of("kind", kind, CHECKED_KINDS)
     with results_alone():
         from posefit.testing.process import check_in_process
 

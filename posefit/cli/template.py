@@ -13,7 +13,7 @@ from posefit.files import new_folder
 from posefit.fitting.check import one_of
 from posefit.hooks import PROJECT
 from posefit.reading import quoted
-from posefit.registry import COMMAND, KINDS, Registrable, plugins_of, registry
+from posefit.registry import CHECKED_KINDS, COMMAND, Registrable, plugins_of, registry
 
 TAKEN = {"Frame"}  # names that a template's module uses itself
 
@@ -35,7 +35,7 @@ def write_plugin(
     Raises:
         InputError: the name cannot be a plugin's, or the folder exists.
     """
-    one_of("kind", kind, (*KINDS, COMMAND))
+    one_of("kind", kind, (*CHECKED_KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(
             "name must be small letters, digits, - and _, and begin with a letter, "

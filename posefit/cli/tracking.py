@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from posefit.output.content import Content
 
 _OF_FILES = ("source", "out", "force", "resume", "write")
-# what a user looks at first
+# the files that a user should open first
 HINTS = {
     "html": "open track.html",
     "mp4": "watch overlay.mp4",
@@ -41,18 +41,20 @@ COLOURS = {"good": "green", "doubtful": "yellow", "do not use": "red"}
 @click.command(cls=TrackCommand)
 @options(TRACK)
 @FRAMES
-@under("What is seen")(
+@under("Source and camera")(
     "--live",
     metavar="DEVICE|URL|-",
-    help="Frames as they come, instead of SOURCE; - reads PGM masks or PPM pictures.",
+    help="Track live frames instead of SOURCE. - reads PGM masks or PPM pictures "
+    "from standard input.",
 )
 def track(
     as_json: bool, live: str | None, verbose: bool, quiet: bool, **options: Any
 ) -> None:
     """Track a person through SOURCE.
 
-    A video; masks as a folder, image files, .npz or .npy; a built-in or recorded motion, an .amc or .bvh file. Several
-    sources are what several cameras saw at the same time.
+    SOURCE is a video; masks in a folder, image files, .npz or .npy; a built-in or
+    recorded motion; or an .amc or .bvh file. Several sources are the views of several
+    cameras at the same time.
 
     \b
     posefit track masks/ --fps 25 --height 1.75 --out walker
@@ -68,20 +70,19 @@ def track(
 
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
-    shown.log(
-        "took "
-        + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items())
-    )
+    phases = [f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()]
+    shown.log(f"took {', '.join(phases)}")
     _print(result.content, as_json, {}, options, verbose, HINTS)
 
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
-@under("What is seen")(
+@under("Source and camera")(
     "--frame",
     type=int,
     metavar="K",
-    help="The frame: its number as filmed, of a motion after resampling; by default the first.",
+    help="Number of the frame, as filmed or, for a motion, after resampling. "
+    "Default: the first.",
 )
 def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.
@@ -93,19 +94,12 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     from posefit.tracking.front import fit as run
 
     logging.getLogger("posefit").disabled = quiet
+    shown = Progress() if quiet else Progress(say)
     with results_alone() if as_json else nullcontext():
-        result = run(
-            progress=Progress() if quiet else Progress(say), **_arguments(options)
-        )
+        result = run(progress=shown, **_arguments(options))
     more = {"pose_degrees": [round(math.degrees(angle), 6) for angle in result.pose]}
-    _print(
-        result.track.content,
-        as_json,
-        more,
-        options,
-        verbose,
-        {kind: HINTS[kind] for kind in ("html", "png")},
-    )
+    hints = {kind: HINTS[kind] for kind in ("html", "png")}
+    _print(result.track.content, as_json, more, options, verbose, hints)
 
 
 def _track_live(
@@ -117,30 +111,22 @@ def _track_live(
         raise InputError(
             f"SOURCE must be left out with --live, got {' '.join(options['source'])}"
         )
-    if useless := [
-        name
-        for name in ("force", "resume", "write", "without_subject")
-        if options[name]
-    ]:
-        raise InputError(
-            f"--{useless[0].replace('_', '-')} must be left out with --live"
-        )
+    for name in ("force", "resume", "write", "without_subject"):
+        if options[name]:
+            flag = name.replace("_", "-")
+            raise InputError(f"--{flag} must be left out with --live")
     out = options["out"]
-    # frames that come are taken as those of a video
-    chosen = {
-        name: value
-        for name, value in _arguments(options, "video").items()
-        if name not in _OF_FILES
-    }
+    # live frames are treated like a video's
+    chosen = _arguments(options, "video")
+    for name in _OF_FILES:
+        chosen.pop(name, None)
     frames = track_live(live, progress=shown, **chosen)
-    summary = write_live(
-        frames,
-        out,
-        (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None,
-    )
-    latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"
+    each = (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None
+    summary = write_live(frames, out, each)
+    latency = summary["latency_ms"]
     shown.log(
-        f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}"
+        f"{summary['frames']} frames tracked, {summary['skipped']} skipped; "
+        f"latency {latency['p50']:g} ms, 99 % within {latency['p99']:g} ms"
     )
 
 
@@ -152,7 +138,10 @@ def _print(
     verbose: bool,
     hints: Mapping[str, str],
 ) -> None:
-    """Print what a track is: as JSON with something more, in three lines, or whole; then which file to look at."""
+    """Print a track: as JSON with `more` values, in a few lines, or in full.
+
+    Then name the files to open, out of `hints`.
+    """
     from posefit.output.files import WRITERS, chosen_kinds
     from posefit.output.text import brief, table
 
@@ -162,19 +151,18 @@ def _print(
     if verbose:
         click.echo(table(content))
     else:
-        worth, *work = brief(content)
+        first, *others = brief(content)
         grade = "good" if content.trust is None else content.trust.grade
-        click.secho(worth, bold=True, fg=COLOURS[grade])
-        click.echo("\n".join(work))
+        click.secho(first, bold=True, fg=COLOURS[grade])
+        click.echo("\n".join(others))
     out = options["out"]
-    kinds = chosen_kinds(options["write"])
-    shown = [hint for kind, hint in hints.items() if kind in kinds]
-    if out or not verbose:
-        click.echo(
-            f"written to {out}: {', '.join(shown or [WRITERS[kind][0] for kind in kinds])}"
-            if out
-            else "--verbose prints all figures; --out DIR writes files"
-        )
+    if out:
+        kinds = chosen_kinds(options["write"])
+        shown = [hint for kind, hint in hints.items() if kind in kinds]
+        files = [WRITERS[kind][0] for kind in kinds]
+        click.echo(f"written to {out}: {', '.join(shown or files)}")
+    elif not verbose:
+        click.echo("--verbose prints all figures; --out DIR writes files")
 
 
 @click.command()
@@ -191,7 +179,7 @@ def _print(
     "settings",
     multiple=True,
     metavar="[NAME.]SETTING=VALUE",
-    help="Of the segmenter; repeatable.",
+    help="Setting of the segmenter; repeatable.",
 )
 @FRAMES
 @options(track_flags("person"))
@@ -205,10 +193,11 @@ def extract(
     person: Any,
     **options: Any,
 ) -> None:
-    """Write the masks of one person in SOURCE as a file.
+    """Write the masks of one person in SOURCE to a file.
 
-    They are taken out of a video, or of pictures, before a still background; masks are cleaned, and motions drawn.
-    Several sources are what several cameras saw at the same time.
+    The person is segmented in a video or in pictures with a still background. Masks are
+    cleaned, and motions are rendered. Several sources are the views of several cameras
+    at the same time.
     """
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
@@ -233,15 +222,19 @@ def extract(
             pieces = f", {camera['in_pieces']} in pieces"
         folder = out if len(cameras) == 1 else f"{out}/{number}"
         click.echo(
-            f"{camera['frames']} frames, {camera['usable']} usable, {camera['touching_border']} touch the "
-            f"border{pieces}; written to {folder}: watch preview.mp4"
+            f"{camera['frames']} frames, {camera['usable']} usable, "
+            f"{camera['touching_border']} touch the border{pieces}; "
+            f"written to {folder}: watch preview.mp4"
         )
 
 
 def _arguments(
     options: dict[str, Any], medium: "Medium | None" = None
 ) -> dict[str, Any]:
-    """Return the keywords of `posefit.track` that the command's options stand for; of a stream with its medium."""
+    """Return the command's options as keywords of `posefit.track`.
+
+    `medium` is given for a stream; otherwise the source is resolved.
+    """
     from posefit.footage.source import resolve
     from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
@@ -253,7 +246,9 @@ def _arguments(
     options["extraction"] = extraction_of(options, medium)
     if left_out := options.pop("without_subject"):
         chosen = TrackOptions(
-            **{name: options[name] for name in ("method", "settings", "train")}
+            method=options["method"],
+            settings=options["settings"],
+            train=options["train"],
         )
         motion = options["source"].named[0] if medium == "motion" else None
         options["train"] = without_subjects(completed(chosen, motion).train, left_out)
@@ -263,21 +258,31 @@ def _arguments(
 def extraction_of(
     options: dict[str, Any], medium: "Medium", settings: Sequence[str] | None = None
 ) -> Any:
-    """Return how the person is taken out of a video, by options that are taken out of them; None by default.
+    """Return how to segment the person in a video, or None for the default.
 
-    `settings` are texts of the segmenter's settings; without them, those of `options` that begin with its name. Raises
-    InputError where the options are given for another kind of source.
+    Args:
+        options: The command's options. The options of the segmentation are removed.
+        medium: The kind of source.
+        settings: Settings of the segmenter as strings. By default they are the settings
+            in `options` that begin with its name.
+
+    Returns:
+        The segmentation, or None for the default.
+
+    Raises:
+        InputError: The options are given for a source that is not segmented.
+
     """
     from posefit.footage.segmentation import Extraction, segmenter_name
     from posefit.footage.source import useless_for
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
-    values = {
-        name: options.pop(name)
-        for name in ("extraction", "background", "roi", "ignore", "width")
-    }
-    values = {name: value for name, value in values.items() if value is not None}
+    values = {}
+    for name in ("extraction", "background", "roi", "ignore", "width"):
+        value = options.pop(name)
+        if value is not None:
+            values[name] = value
     if medium not in ("video", "pictures"):
         for name, value in values.items():
             raise useless_for(medium, name, value, "video")
@@ -290,21 +295,23 @@ def extraction_of(
         settings = [text for text in texts if text.partition(".")[0] == name]
         options["settings"] = tuple(text for text in texts if text not in settings)
     if settings:
-        values["settings"] = parse_texts(
-            name, registry().offer("segmenter", name).factory, settings
-        )
+        factory = registry().offer("segmenter", name).factory
+        values["settings"] = parse_texts(name, factory, settings)
     return Extraction(**values) if values else None
 
 
 def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:
-    """Return what a method learns from, some people of the library left out."""
+    """Return the training motions without some people of the library."""
     from posefit.motion import recorded
 
     if not any(recorded.is_library(clips) for clips in train):
         raise InputError(
-            f"without_subject must be given with --train library, got {', '.join(train)}"
+            "without_subject must be given with --train library, "
+            f"got {', '.join(train)}"
         )
-    return [
-        recorded.leaving_out(clips, subjects) if recorded.is_library(clips) else clips
-        for clips in train
-    ]
+    kept = []
+    for clips in train:
+        if recorded.is_library(clips):
+            clips = recorded.leaving_out(clips, subjects)
+        kept.append(clips)
+    return kept

@@ -1,8 +1,17 @@
-"""How far the border of a drawn body is from that of a mask, and what would bring them together, in numba.
+"""Gauss-Newton on contours, in numba: how far the border of a drawn body is from a mask's, and what moves it there.
 
-The border of a drawn body depends on two joints and two radii of each bone. What moves them is a twist: an angle
-turns everything beyond its joint. So the squares of a bone's distances are a 6 x 6 matrix over twists, and an angle
-meets the sum of those of the bones that it moves. Shapes are checked by the callers.
+docs/background/contour-fit.md derives the method; its equations have numbers, which are on the lines here, as in
+`# contour (3)`. In short:
+
+- A bone is drawn as a tapered cone, which six numbers place in the picture: two joints (u, v) and two radii. A distance
+  between the borders is one residual; its derivatives by these numbers are a row of six (1) to (4).
+- The residuals of a bone are summed up to a 6 x 6 Hessian and a gradient (5) by a weight that bounds outliers (6).
+- A twist, velocity and rotation, moves a bone. The chain rule makes of both a spatial Hessian and a spatial force over
+  twists (7) to (9), as a rigid body has a spatial inertia.
+- An angle turns everything beyond its joint. So it meets the sum over these bones, which the composite-rigid-body
+  algorithm forms from the ends of the limbs to the root (10) to (13).
+
+Shapes are checked by the callers.
 """
 
 import math
@@ -22,10 +31,13 @@ PIXEL_DEVIATION = 0.5  # pixels, besides
 # metres of the border that are off together, so that they are one measurement
 CORRELATION_LENGTH = 0.09
 MIN_ROBUST_SCALE = 3.0  # pixels: what is farther off counts less
-CAP = 2  # points of a quarter, about, of the disc at a bone's end
+CAP = 2  # points on a half of the disc's arc at a bone's end
 # pixels within another bone from which on a point of a bone's border is hidden
 COVERED = 0.25
 TINY = 1e-9
+# columns of a row of `cones`: the first disc; by how much the last one is off it, and its radius is less; the length of
+# the bone, and that of the cone's sides, which is 0 if one of its discs covers the other
+X0, Y0, R0, DX, DY, TAPER, LENGTH, SIDE = range(8)
 
 
 class Contour(NamedTuple):
@@ -35,7 +47,7 @@ class Contour(NamedTuple):
     corner: NDArray[np.int64]  # (2,) column and row of the field's first pixel
     size: NDArray[np.int64]  # (2,) rows and columns of the field
     points: Array  # (n, 2) pixels of the border
-    step: float  # pixels of the border that a point stands for
+    step: float  # pixels of the border that a point represents
 
 
 class Contours(NamedTuple):
@@ -49,8 +61,16 @@ class Contours(NamedTuple):
     step: float
 
 
+class Bones(NamedTuple):
+    """The drawn bones of one view."""
+
+    cones: Array  # (B, 8) with columns from X0 to SIDE
+    discs: Array  # (B, 3) a disc about each bone: its middle and radius
+    neighbours: NDArray[np.int64]  # (n,) those that may hide a bone's border
+
+
 class Growth(NamedTuple):
-    """What changes with F factors of the build, and the squares by them; F may be 0."""
+    """What changes with F factors of the build, and the normal equations by them; F may be 0."""
 
     joints: Array  # (F, 27, 3), or (T, F, 27, 3): how joints change
     radii: Array  # (F, 26, 2): how radii change
@@ -60,21 +80,16 @@ class Growth(NamedTuple):
 
 
 class BoneSquares(NamedTuple):
-    """Half the Hessians of each joint's bone, or of T frames', and forces, over twists."""
+    """Spatial Hessians and forces of the bone that ends in each joint, or those of T frames, halved."""
 
     hessians: Array  # (27, 6, 6), or (T, 27, 6, 6)
-    # (27, 6, 1 + F), or (T, 27, 6, 1 + F): half the gradient, and half the derivatives
-    # by F factors
+    # (27, 6, 1 + F), or (T, 27, 6, 1 + F): the gradient, and its derivatives by F factors
     forces: Array
 
 
 @jit
 def write_cones(parents, centres, radii, cones, discs):
-    """Write what distances from bones need (B, 8), and a disc about each bone (B, 3): its middle and radius.
-
-    A cone is its first point and radius, by how much the last point is off it and the last radius is less, its length,
-    and that of its sides; 0 where one of its discs covers the other.
-    """
+    """Write what distances from bones need (B, 8), and a disc about each bone (B, 3): its middle and radius."""
     for b in range(parents.size):
         x = centres[parents[b], 0]
         y = centres[parents[b], 1]
@@ -86,26 +101,30 @@ def write_cones(parents, centres, radii, cones, discs):
         square = dx * dx + dy * dy
         length = math.sqrt(square)
         side = math.sqrt(square - dr * dr) if square > dr * dr + TINY else 0.0
-        for i, value in enumerate((x, y, r0, dx, dy, dr, length, side)):
-            cones[b, i] = value
-        discs[b, 0], discs[b, 1], discs[b, 2] = (
-            x + 0.5 * dx,
-            y + 0.5 * dy,
-            0.5 * length + max(r0, r1),
-        )
+        cones[b, X0] = x
+        cones[b, Y0] = y
+        cones[b, R0] = r0
+        cones[b, DX] = dx
+        cones[b, DY] = dy
+        cones[b, TAPER] = dr
+        cones[b, LENGTH] = length
+        cones[b, SIDE] = side
+        discs[b, 0] = x + 0.5 * dx
+        discs[b, 1] = y + 0.5 * dy
+        discs[b, 2] = 0.5 * length + max(r0, r1)
 
 
 @inlined
 def cone_distance(x, y, cone):
     """Return how far a point is outside a cone, below 0 within, the share of the bone it is at, and its normal."""
-    x0 = cone[0]
-    y0 = cone[1]
-    r0 = cone[2]
-    dx = cone[3]
-    dy = cone[4]
-    dr = cone[5]
-    length = cone[6]
-    side = cone[7]
+    x0 = cone[X0]
+    y0 = cone[Y0]
+    r0 = cone[R0]
+    dx = cone[DX]
+    dy = cone[DY]
+    dr = cone[TAPER]
+    length = cone[LENGTH]
+    side = cone[SIDE]
     if side == 0.0:
         share = 0.0 if dr >= 0.0 else 1.0
     else:
@@ -115,14 +134,19 @@ def cone_distance(x, y, cone):
     ox = x - (x0 + share * dx)
     oy = y - (y0 + share * dy)
     off = math.sqrt(ox * ox + oy * oy)
-    return off - (r0 - share * dr), share, ox / max(off, TINY), oy / max(off, TINY)
+    distance = off - (r0 - share * dr)  # contour (1)
+    return distance, share, ox / max(off, TINY), oy / max(off, TINY)
 
 
 @inlined
-def _add(block, gradient, share, across, down, radius_change, off, weight):
-    """Add the square of one distance, which moves by (across, down) with its axis and by `radius_change`."""
+def jacobian_row(share, across, down, radius_change):
+    """Return the derivatives of a residual by a bone's six numbers: u and v of both joints, and both radii.
+
+    They are shared out among the ends of a bone by where the point is, from 0 at its start to 1 at its end. There the
+    residual changes by (across, down) a pixel that the axis moves, and by `radius_change` a pixel of radius.
+    """
     rest = 1.0 - share
-    values = (
+    return (  # contour (2) and (4)
         across * rest,
         down * rest,
         across * share,
@@ -130,10 +154,15 @@ def _add(block, gradient, share, across, down, radius_change, off, weight):
         radius_change * rest,
         radius_change * share,
     )
+
+
+@inlined
+def accumulate(hessian, gradient, row, residual, weight):
+    """Add a residual with its derivatives by six numbers to a bone's Hessian and gradient, halved. contour (5)."""
     for i in range(6):
-        gradient[i] += weight * off * values[i]
+        gradient[i] += weight * residual * row[i]
         for j in range(6):
-            block[i, j] += weight * values[i] * values[j]
+            hessian[i, j] += weight * row[i] * row[j]
 
 
 @jit
@@ -167,67 +196,99 @@ def _write_neighbours(bone, discs, neighbours):
 
 
 @jit
-def _covered(x, y, neighbours, cones, discs):
-    for b in neighbours:
-        near = (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[
-            b, 2
-        ]
+def visible(x, y, bones):
+    """Return whether a point of a bone's border is not covered by one of its neighbours."""
+    cones = bones.cones
+    discs = bones.discs
+    for b in bones.neighbours:
+        dx = x - discs[b, 0]
+        dy = y - discs[b, 1]
+        near = dx**2 + dy**2 < discs[b, 2] * discs[b, 2]
         if near and cone_distance(x, y, cones[b])[0] < -COVERED:
-            return True
-    return False
+            return False
+    return True
 
 
 @jit
-def add_pulls(parents, centres, radii, contour, scale, blocks, gradients):
-    """Add the squares of the distances of the mask's border from the body's, and of the body's from the mask's.
+def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradients):
+    """Add the squared distances of the mask's border from the body's, and of the body's border from the mask's.
 
-    Those of a bone go to its half of a second derivative, 6 x 6, and half of a gradient: by the column and row of its
-    two joints, and by both radii.
+    Each bone gets its own, as half a Hessian (B, 6, 6) and half a gradient (B, 6) by the column and row of its two
+    joints, and by both radii. Distances beyond `scale` pixels count less.
     """
-    cones = np.empty((parents.size, 8))
-    discs = np.empty((parents.size, 3))
+    count = parents.size
+    cones = np.empty((count, 8))
+    discs = np.empty((count, 3))
     write_cones(parents, centres, radii, cones, discs)
-    _add_mask_border(contour, scale, cones, discs, blocks, gradients)
-    neighbours = np.empty(parents.size, np.int64)
-    for b in range(parents.size):
+    _accumulate_mask_border(contour, scale, cones, discs, hessians, gradients)
+    neighbours = np.empty(count, np.int64)
+    for b in range(count):
         # else one of its discs covers the other
-        if cones[b, 6] > abs(cones[b, 5]) + TINY:
+        if cones[b, LENGTH] > abs(cones[b, TAPER]) + TINY:
             others = neighbours[: _write_neighbours(b, discs, neighbours)]
-            start = centres[parents[b]]
-            end = centres[b + 1]
-            _add_bone_border(
-                start,
-                end,
-                radii[b],
-                contour,
-                scale,
-                (others, cones, discs),
-                (blocks[b], gradients[b]),
+            bones = Bones(cones, discs, others)
+            axis = centres[parents[b]], centres[b + 1]
+            _accumulate_bone_border(
+                axis, radii[b], contour, scale, bones, hessians[b], gradients[b]
             )
 
 
 @inlined
-def _add_mask_border(contour, scale, cones, discs, blocks, gradients):
-    """Add the squares of the distances of the mask's border from the nearest bones."""
+def _accumulate_mask_border(contour, scale, cones, discs, hessians, gradients):
+    """Add the squared distances of the mask's border from the nearest bones."""
     bone = 0
     for i in range(contour.points.shape[0]):
         x = contour.points[i, 0]
         y = contour.points[i, 1]
         bone = _nearest_bone(x, y, bone, cones, discs)
-        off, share, nx, ny = cone_distance(x, y, cones[bone])
-        weight = contour.step / (1.0 + (off / scale) ** 2)
-        _add(blocks[bone], gradients[bone], share, -nx, -ny, -1.0, off, weight)
+        distance, share, nx, ny = cone_distance(x, y, cones[bone])
+        weight = contour.step / (1.0 + (distance / scale) ** 2)  # contour (6)
+        row = jacobian_row(share, -nx, -ny, -1.0)
+        accumulate(hessians[bone], gradients[bone], row, distance, weight)
 
 
 @inlined
-def _add_bone_border(start, end, ends, contour, scale, others, square):
-    """Add the squares of the distances of a bone's visible border, both sides and both ends, from the mask's."""
-    neighbours, cones, discs = others
-    block, gradient = square
+def _write_pair(points, first, share, along, across, length):
+    """Write a point of the border and its mirror image beyond the bone's axis.
+
+    A point is the share of the bone that it is at, its normal along the axis and across it, and its pixels of border.
+    """
+    for k in range(2):
+        points[first + k, 0] = share
+        points[first + k, 1] = along
+        points[first + k, 2] = across if k == 0 else -across
+        points[first + k, 3] = length
+
+
+@inlined
+def side_points(points, sides, length, cosine, sine):
+    """Write the points (n, 4) of both sides of a bone's border, its tangent segments; return how many there are."""
+    for i in range(sides + 1):
+        # the first and the last one have a neighbour on one side only
+        piece = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
+        _write_pair(points, 2 * i, i / sides, cosine, sine, piece)
+    return 2 * (sides + 1)
+
+
+@inlined
+def cap_points(points, first, share, radius, start, arc):
+    """Write points of both arcs of a disc, from the angle `start` to the axis on; return the number after them."""
+    for i in range(CAP):
+        angle = start + arc * (i + 0.5) / CAP
+        along = math.cos(angle)
+        across = math.sin(angle)
+        _write_pair(points, first + 2 * i, share, along, across, radius * arc / CAP)
+    return first + 2 * CAP
+
+
+@inlined
+def _accumulate_bone_border(axis, radii, contour, scale, bones, hessian, gradient):
+    """Add the squared distances of a bone's visible border, both sides and both ends, from the mask's."""
+    start, end = axis
     dx = end[0] - start[0]
     dy = end[1] - start[1]
-    r0 = ends[0]
-    r1 = ends[1]
+    r0 = radii[0]
+    r1 = radii[1]
     length = math.sqrt(dx * dx + dy * dy)
     dx = dx / length
     dy = dy / length
@@ -235,47 +296,28 @@ def _add_bone_border(start, end, ends, contour, scale, others, square):
     sine = math.sqrt(1.0 - cosine * cosine)
     tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
     sides = max(int(length / (2.0 * contour.step)) + 1, 2)
-    for k in range(2 * (sides + 1 + 2 * CAP)):
-        i = k // 2
-        side = 1.0 - 2.0 * (k % 2)
-        if i <= sides:
-            share = i / sides
-            along = cosine
-            aside = sine
-            stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
-        elif side > 0.0:
-            share = 1.0 if i <= sides + CAP else 0.0
-            if share > 0.0:
-                angle = tilt * (i - sides - 0.5) / CAP
-                stands = r1 * tilt / CAP
-            else:
-                rest = math.pi - tilt
-                angle = tilt + rest * (i - sides - CAP - 0.5) / CAP
-                stands = r0 * rest / CAP
-            along = math.cos(angle)
-            aside = math.sin(angle)
-        nx = along * dx - side * aside * dy
-        ny = along * dy + side * aside * dx
+    points = np.empty((2 * (sides + 1 + 2 * CAP), 4))
+    count = side_points(points, sides, length, cosine, sine)
+    count = cap_points(points, count, 1.0, r1, 0.0, tilt)
+    count = cap_points(points, count, 0.0, r0, tilt, math.pi - tilt)
+    for i in range(count):
+        share = points[i, 0]
+        along = points[i, 1]
+        across = points[i, 2]
+        nx = along * dx - across * dy
+        ny = along * dy + across * dx
         radius = r0 + share * (r1 - r0)
-        x = start[0] + share * length * dx + radius * nx
+        x = start[0] + share * length * dx + radius * nx  # contour (3)
         y = start[1] + share * length * dy + radius * ny
-        known, off, across, down = _mask_distance(x, y, contour)
-        if known and not _covered(x, y, neighbours, cones, discs):
-            weight = stands / (1.0 + (off / scale) ** 2)
-            _add(
-                block,
-                gradient,
-                share,
-                across,
-                down,
-                across * nx + down * ny,
-                off,
-                weight,
-            )
+        known, distance, slope_x, slope_y = field_distance(x, y, contour)
+        if known and visible(x, y, bones):
+            weight = points[i, 3] / (1.0 + (distance / scale) ** 2)  # contour (6)
+            row = jacobian_row(share, slope_x, slope_y, slope_x * nx + slope_y * ny)
+            accumulate(hessian, gradient, row, distance, weight)
 
 
 @inlined
-def _mask_distance(x, y, contour):
+def field_distance(x, y, contour):
     """Return whether a point lies in the field, how far it is from the mask's border there, and the slope of that."""
     known = False
     off = 0.0
@@ -301,21 +343,14 @@ def _mask_distance(x, y, contour):
     return known, off, across, down
 
 
-@jit
-def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
-    """Add the squares of one view to those of the bones, `sums`. `frames` (27, 4, 3) are of the joints.
+@inlined
+def _project_joints(camera, frames, centres, scales, moves):
+    """Write where joints are in the picture (27, 2), the pixels of a metre there (27,), and how both change.
 
-    A distance counts less beyond `reach` metres.
+    The derivatives by a joint's place are (3, 3): of its column, of its row, and of the pixels of a metre.
     """
     rotation, translation, focal, centre = camera
-    hessians, forces = sums
-    bones = parents.size
-    centres = np.empty((bones + 1, 2))
-    depth = np.empty(bones + 1)
-    wide = np.empty((bones, 2))
-    # of each joint: how its pixel and its size change with its place
-    moves = np.empty((bones + 1, 3, 3))
-    for j in range(bones + 1):
+    for j in range(frames.shape[0]):
         x = frames[j, 3, 0]
         y = frames[j, 3, 1]
         z = frames[j, 3, 2]
@@ -338,99 +373,112 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
             + translation[2],
             NEAR,
         )
-        centres[j, 0], centres[j, 1] = (
-            a / c * focal[0] + centre[0],
-            b / c * focal[1] + centre[1],
-        )
-        depth[j] = math.sqrt(focal[0] * focal[1]) / c
-        for i in range(3):
+        centres[j, 0] = a / c * focal[0] + centre[0]
+        centres[j, 1] = b / c * focal[1] + centre[1]
+        scales[j] = math.sqrt(focal[0] * focal[1]) / c
+        for i in range(3):  # contour (7)
             moves[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
             moves[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
-            moves[j, 2, i] = -depth[j] / c * rotation[2, i]
-    metres = depth[0]  # pixels of one, where the root is
-    for b in range(bones):
-        wide[b, 0], wide[b, 1] = (
-            depth[parents[b]] * radii[b, 0],
-            depth[b + 1] * radii[b, 1],
-        )
-    blocks = np.zeros((bones, 6, 6))
-    gradients = np.zeros((bones, 6))
-    add_pulls(
-        parents,
-        centres,
-        wide,
-        contour,
-        max(reach * metres, MIN_ROBUST_SCALE),
-        blocks,
-        gradients,
-    )
-    deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
-    worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
-    rows = np.empty((6, 6))
-    turned = np.empty((6, 6))
-    for b in range(bones):
-        p = parents[b]
-        # how each of the six numbers changes with a twist: velocity, then rotation
-        for k in range(6):
-            j = p if k in (0, 1, 4) else b + 1
-            size = radii[b, 0] if k == 4 else radii[b, 1]
-            which = k % 2 if k < 4 else 2
-            factor = 1.0 if k < 4 else size
-            mx = factor * moves[j, which, 0]
-            my = factor * moves[j, which, 1]
-            mz = factor * moves[j, which, 2]
-            x = frames[j, 3, 0]
-            y = frames[j, 3, 1]
-            z = frames[j, 3, 2]
-            rows[k, 0], rows[k, 1], rows[k, 2] = mx, my, mz
-            rows[k, 3], rows[k, 4], rows[k, 5] = (
-                y * mz - z * my,
-                z * mx - x * mz,
-                x * my - y * mx,
-            )
-        for i in range(6):
-            for j in range(6):
-                total = 0.0
-                for k in range(6):
-                    total += blocks[b, i, k] * rows[k, j]
-                turned[i, j] = total
-        for i in range(6):
+            moves[j, 2, i] = -scales[j] / c * rotation[2, i]
+
+
+@inlined
+def _end_of(k, b, parent):
+    """Return the joint that the k-th of a bone's six numbers belongs to."""
+    return parent if k in (0, 1, 4) else b + 1
+
+
+@inlined
+def _write_twist_rows(b, parent, radii, frames, moves, rows):
+    """Write the derivatives (6, 6) of a bone's six numbers by a twist: velocity, then rotation. contour (8)."""
+    for k in range(6):
+        j = _end_of(k, b, parent)
+        which = k % 2 if k < 4 else 2
+        size = radii[b, 0] if k == 4 else radii[b, 1]
+        factor = 1.0 if k < 4 else size
+        mx = factor * moves[j, which, 0]
+        my = factor * moves[j, which, 1]
+        mz = factor * moves[j, which, 2]
+        x = frames[j, 3, 0]
+        y = frames[j, 3, 1]
+        z = frames[j, 3, 2]
+        rows[k, 0] = mx
+        rows[k, 1] = my
+        rows[k, 2] = mz
+        rows[k, 3] = y * mz - z * my
+        rows[k, 4] = z * mx - x * mz
+        rows[k, 5] = x * my - y * mx
+
+
+@inlined
+def _accumulate_twists(rows, drawn, worth, work, hessian, force):
+    """Add a bone's Hessian and gradient by six numbers, `drawn`, to those over twists. contour (9)."""
+    block, gradient = drawn
+    for i in range(6):
+        for j in range(6):
             total = 0.0
             for k in range(6):
-                total += rows[k, i] * gradients[b, k]
-            forces[b + 1, i, 0] += worth * total
-            for j in range(6):
-                total = 0.0
-                for k in range(6):
-                    total += rows[k, i] * turned[k, j]
-                hessians[b + 1, i, j] += worth * total
-        if len(grown.joints):
-            _add_growth(
-                b,
-                p,
-                rows,
-                depth,
-                (blocks[b], gradients[b]),
-                worth,
-                grown,
-                forces[b + 1],
-            )
+                total += block[i, k] * rows[k, j]
+            work[i, j] = total
+    for i in range(6):
+        total = 0.0
+        for k in range(6):
+            total += rows[k, i] * gradient[k]
+        force[i, 0] += worth * total
+        for j in range(6):
+            total = 0.0
+            for k in range(6):
+                total += rows[k, i] * work[k, j]
+            hessian[i, j] += worth * total
 
 
 @jit
-def _add_growth(b, p, rows, depth, square, worth, grown, forces):
-    """Add what bone b, from joint p, has to do with factors of the build, see `add_view`."""
-    block, gradient = square
+def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
+    """Add the squares of one view to those of the bones, `sums`. `frames` (27, 4, 3) are of the joints.
+
+    A distance counts less beyond `reach` metres.
+    """
+    hessians, forces = sums
+    count = parents.size
+    centres = np.empty((count + 1, 2))
+    scales = np.empty(count + 1)
+    moves = np.empty((count + 1, 3, 3))
+    _project_joints(camera, frames, centres, scales, moves)
+    drawn_radii = np.empty((count, 2))
+    for b in range(count):
+        drawn_radii[b, 0] = scales[parents[b]] * radii[b, 0]
+        drawn_radii[b, 1] = scales[b + 1] * radii[b, 1]
+    metre = scales[0]  # pixels, where the root is
+    scale = max(reach * metre, MIN_ROBUST_SCALE)
+    blocks = np.zeros((count, 6, 6))
+    gradients = np.zeros((count, 6))
+    accumulate_borders(parents, centres, drawn_radii, contour, scale, blocks, gradients)
+    variance = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metre) ** 2
+    worth = 1.0 / (metre**3 * CORRELATION_LENGTH * variance)  # contour (6)
+    rows = np.empty((6, 6))
+    work = np.empty((6, 6))
+    for b in range(count):
+        drawn = blocks[b], gradients[b]
+        _write_twist_rows(b, parents[b], radii, frames, moves, rows)
+        _accumulate_twists(rows, drawn, worth, work, hessians[b + 1], forces[b + 1])
+        if len(grown.joints):
+            _add_growth(b, parents[b], rows, scales, drawn, worth, grown, forces[b + 1])
+
+
+@jit
+def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
+    """Add the derivatives of bone b's residuals by factors of the build, see `add_view`. contour (14)."""
+    block, gradient = drawn
     factors = len(grown.joints)
     changes = np.zeros((6, 1 + factors))
     changed = np.zeros((6, 1 + factors))
     for k in range(6):
-        j = p if k in (0, 1, 4) else b + 1
+        j = _end_of(k, b, parent)
         for f in range(factors):
             for i in range(3):
                 changes[k, 1 + f] += rows[k, i] * grown.joints[f, j, i]
             if k > 3:
-                changes[k, 1 + f] += depth[j] * grown.radii[f, b, k - 4]
+                changes[k, 1 + f] += scales[j] * grown.radii[f, b, k - 4]
     for k in range(6):
         changed[k, 0] = worth * gradient[k]
         for i in range(6):
@@ -446,17 +494,19 @@ def _add_growth(b, p, rows, depth, square, worth, grown, forces):
 
 @jit
 def write_screws(chain, frames, sines, cosines, screws):
-    """Write the twist (69, 6) of the place's axes, velocity then rotation, and of each angle."""
+    """Write the twist (69, 6) of the place's axes, velocity then rotation, and of each angle. contour (10)."""
     screws[:] = 0.0
     root = frames[0, 3]
     axes = np.empty((3, 3))
-    axes[0, 0], axes[0, 1], axes[0, 2] = 0.0, 1.0, 0.0
-    axes[1, 0], axes[1, 1], axes[1, 2] = cosines[0], 0.0, -sines[0]
-    axes[2, 0], axes[2, 1], axes[2, 2] = (
-        frames[0, 2, 0],
-        frames[0, 2, 1],
-        frames[0, 2, 2],
-    )
+    # yaw turns about the world's vertical, pitch about the axis that yaw has turned, roll about the body's own
+    axes[0, 0] = 0.0
+    axes[0, 1] = 1.0
+    axes[0, 2] = 0.0
+    axes[1, 0] = cosines[0]
+    axes[1, 1] = 0.0
+    axes[1, 2] = -sines[0]
+    for i in range(3):
+        axes[2, i] = frames[0, 2, i]
     for k in range(3):
         screws[k, k] = 1.0
         _screw(screws[3 + k], axes[k], root)
@@ -480,20 +530,25 @@ def write_screws(chain, frames, sines, cosines, screws):
 
 @inlined
 def _screw(screw, axis, pivot):
+    """Write the twist of a turn about an axis through a point: the velocity of the world's origin, and the axis."""
     screw[0] = pivot[1] * axis[2] - pivot[2] * axis[1]
     screw[1] = pivot[2] * axis[0] - pivot[0] * axis[2]
     screw[2] = pivot[0] * axis[1] - pivot[1] * axis[0]
-    screw[3], screw[4], screw[5] = axis[0], axis[1], axis[2]
+    screw[3] = axis[0]
+    screw[4] = axis[1]
+    screw[5] = axis[2]
 
 
 @jit
-def add_bones(chain, screws, hessians, forces, matrix, gradients):
+def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
     """Write the second derivatives (69, 69), their lower half, and the gradient and those by factors (69, 1 + F).
 
-    They are by a place and a pose, whose twists are `screws` (69, 6), 0 for what stays as it is. The `hessians` and
-    `forces` of bones are summed up.
+    This is the composite-rigid-body algorithm, with spatial Hessians for spatial inertias. The derivatives are by a
+    place and a pose, whose twists are `screws` (69, 6), 0 for what is held. The `hessians` and `forces` of bones are
+    replaced by those of all that moves with a joint.
     """
     parents = chain.parents
+    # from the ends of the limbs to the root, contour (11)
     for b in range(parents.size - 1, -1, -1):
         p = parents[b]
         for i in range(6):
@@ -501,7 +556,8 @@ def add_bones(chain, screws, hessians, forces, matrix, gradients):
                 hessians[p, i, j] += hessians[b + 1, i, j]
             for f in range(gradients.shape[1]):
                 forces[p, i, f] += forces[b + 1, i, f]
-    matrix[:], gradients[:] = 0.0, 0.0
+    matrix[:] = 0.0
+    gradients[:] = 0.0
     force = np.empty(6)
     for joint in range(parents.size + 1):
         first, count = _numbers(chain, joint)
@@ -514,7 +570,10 @@ def add_bones(chain, screws, hessians, forces, matrix, gradients):
                     total += hessians[joint, i, j] * screws[a, j]
                 force[i] = total
                 for f in range(gradients.shape[1]):
-                    gradients[a, f] += screws[a, i] * forces[joint, i, f]
+                    gradients[a, f] += (
+                        screws[a, i] * forces[joint, i, f]
+                    )  # contour (12)
+            # the numbers of the joint and of those between it and the root
             other = joint
             while True:
                 start, many = _numbers(chain, other)
@@ -522,7 +581,7 @@ def add_bones(chain, screws, hessians, forces, matrix, gradients):
                     total = 0.0
                     for i in range(6):
                         total += screws[c, i] * force[i]
-                    matrix[a, c] = total
+                    matrix[a, c] = total  # contour (13)
                 if other == 0:
                     break
                 other = parents[other - 1]
@@ -559,7 +618,7 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
 
 @jit
 def add_all_bones(chain, placed, bones, free, out):
-    """Write what `add_bones` sums up in T frames, of those numbers of a frame, `free` (m,), that may change.
+    """Write what `composite_hessian` gives in T frames, of those numbers of a frame, `free` (m,), that may change.
 
     `placed` are frames, sines and cosines of `place_frames`, and `bones` Hessians and forces. `out` are second
     derivatives (T, m, m) and gradients with derivatives by factors (T, m, 1 + F).
@@ -575,7 +634,7 @@ def add_all_bones(chain, placed, bones, free, out):
         write_screws(chain, frames[k], sines[k], cosines[k], all_screws)
         for a in free:
             screws[a] = all_screws[a]
-        add_bones(chain, screws, hessians[k], forces[k], matrix, gradient)
+        composite_hessian(chain, screws, hessians[k], forces[k], matrix, gradient)
         for i in range(len(free)):
             gradients[k, i] = gradient[free[i]]
             for j in range(i + 1):

@@ -16,7 +16,6 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.silhouette.cost import (
     BETA,
-    Areas,
     check_square,
     costs_in,
     drawing_of,
@@ -24,7 +23,12 @@ from posefit.silhouette.cost import (
     mean_over_views,
     pose_costs,
 )
-from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import (
+    Areas,
+    Silhouette,
+    coarser_camera,
+    coarser_silhouette,
+)
 from posefit.silhouette.sharing import parts_of, work_through
 
 
@@ -159,8 +163,8 @@ class SilhouetteCost:
 
     @cached_property
     def on_device(self) -> bool:
-        """Whether a GPU draws the poses: then all of them at once, and threads have nothing to share."""
-        return any(silhouette.device != "cpu" for silhouette in self.silhouettes)
+        """Whether a device draws the poses: then all of them at once, and threads have nothing to share."""
+        return any(silhouette.device is not None for silhouette in self.silhouettes)
 
     @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:

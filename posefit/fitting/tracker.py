@@ -29,9 +29,9 @@ from posefit.fitting.start import modes_apart, posterior_of, start_in
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import BETA, Areas
+from posefit.silhouette.cost import BETA
 from posefit.silhouette.drawn import PoseCount, uncounted
-from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.mask import Areas, Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
 # k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted

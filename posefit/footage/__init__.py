@@ -21,7 +21,8 @@ Each row is one step, in one file:
 | masks of segmented frames | a verdict: can they be a person? | quality.py |
 | a stream | a `View` of each frame | live.py |
 | views and calibrations | the `Scene`, straightened, in metres, +y up | cameras.py |
-| a known motion | the `Scene` of its rendered masks, on a GPU if asked | scene.py |
+| a known motion | the `Scene` of its rasterised masks | scene.py |
+| a `Scene` | the same on a device, such as a GPU | device.py |
 
 To add a kind of source, write a reader and add a line to `source.KINDS`. Decoded masks
 are stored as bits at once, and a `View` never changes. What a source does not state is

@@ -49,8 +49,8 @@ def extract(
 
     masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,), `first`, the
     number of the first frame, `fps` if it is known, and `landmarks` (T, 27, 3) if the
-    segmenter reports any, see `Segmenter`. quality.csv compares the masks of a film with
-    its pictures. Several cameras are written to the folders 1, 2 and so on.
+    segmenter reports any, see `Segmenter`. quality.csv compares the masks of a film
+    with its pictures. Several cameras are written to the folders 1, 2 and so on.
 
     The folder appears complete or not at all.
 

@@ -16,7 +16,6 @@ from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import project
-from posefit.silhouette.cuda.device import check_device, moved_to
 from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
@@ -182,23 +181,6 @@ def observed_views(scene: Scene) -> list[View]:
         )
         views.append(view)
     return views
-
-
-def on_device(scene: Scene, device: str) -> Scene:
-    """Return a scene whose poses are rasterised on "cpu" or "cuda".
-
-    Raises InputError if this machine does not have the device.
-    """
-    check_device(device)
-    if device == "cpu":
-        return scene
-    at = partial(_moved, scene.observations, device)
-    return replace(scene, observations=LazyObservations(scene.count, at))
-
-
-def _moved(observations: Sequence[Observation], device: str, k: int) -> Observation:
-    silhouettes = [moved_to(mask, device) for mask in observations[k].silhouettes]
-    return replace(observations[k], silhouettes=silhouettes)
 
 
 def with_corruption(

@@ -1,4 +1,4 @@
-"""The person's flesh: a tapered cone on every bone."""
+"""Body shape: one tapered cone per bone."""
 
 from dataclasses import dataclass, field, replace
 
@@ -16,7 +16,8 @@ from posefit.geometry.skeleton import (
     kind,
 )
 
-# Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.
+# Radii as shares of the bone's length, at its start and at its end. Ours: read off an
+# adult's build.
 PROPORTIONS = {
     "hipjoint": (0.80, 0.72),
     "femur": (0.205, 0.130),
@@ -39,10 +40,16 @@ PROPORTIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A skeleton with the two radii of every bone's truncated cone, in metres. SAPSO section 2."""
+    """A skeleton and the two radii in metres of each bone's cone. SAPSO section 2.
+
+    Attributes:
+        skeleton: The skeleton.
+        radii: The radii (26, 2) in metres, at the start and at the end of each bone.
+
+    """
 
     skeleton: Skeleton
-    radii: Array = field(repr=False)  # (26, 2) where the bone starts, where it ends
+    radii: Array = field(repr=False)  # (26, 2)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radii", frozen("radii", self.radii, (len(BONES), 2)))
@@ -51,12 +58,12 @@ class Body:
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> "Body":
-        """Return the body whose radii are `PROPORTIONS` of the bone lengths."""
+        """Return the body with radii of `PROPORTIONS` times the bone lengths."""
         shares = np.array([PROPORTIONS[kind(bone)] for bone in BONES])
         return cls(skeleton, shares * skeleton.lengths[:, None])
 
     def joint_radii(self) -> Array:
-        """Return the largest radius (27,) that a bone has at each joint."""
+        """Return the radius (27,) at each joint: the largest of all bones there."""
         radii = np.zeros(len(JOINTS))
         np.maximum.at(radii, np.array(PARENTS[1:]), self.radii[:, 0])
         np.maximum.at(radii, np.arange(1, len(JOINTS)), self.radii[:, 1])
@@ -64,35 +71,44 @@ class Body:
 
     @property
     def stature(self) -> float:
-        """How tall the body stands, in metres: its legs straight and upright, the rest as in its rest pose."""
+        """The height in metres, with straight upright legs and the rest as at rest."""
         skeleton = self.skeleton
-        at = BONES.index
+        index = BONES.index
         joints = skeleton.joints(np.zeros(ANGLES))
-        crown = joints[JOINTS.index("head"), 1] + self.radii[at("head"), 1]
-        leg = skeleton.lengths[[at("lfemur"), at("ltibia")]].sum()
-        sole = (
-            max(0.0, -float(skeleton.offsets[at("lfoot"), 1]))
-            + self.radii[at("lfoot"), 1]
-        )
-        return float(crown - joints[JOINTS.index("lhipjoint"), 1] + leg + sole)
+        crown = joints[JOINTS.index("head"), 1] + self.radii[index("head"), 1]
+        hip = joints[JOINTS.index("lhipjoint"), 1]
+        leg = skeleton.lengths[[index("lfemur"), index("ltibia")]].sum()
+        drop = max(0.0, -float(skeleton.offsets[index("lfoot"), 1]))
+        sole = drop + self.radii[index("lfoot"), 1]
+        return float(crown - hip + leg + sole)
 
     def scaled(self, lengths: Array | float, girths: Array | float) -> "Body":
-        """Return the body with its bones' lengths and radii multiplied by factors, one for all or one a bone (26,)."""
+        """Return the body with other lengths and radii.
+
+        Args:
+            lengths: Factors of the bones' lengths: one number, or one per bone (26,).
+            girths: Factors of the radii: one number, or one per bone (26,).
+
+        """
         lengths = np.broadcast_to(lengths, len(BONES))
         girths = np.broadcast_to(girths, len(BONES))
-        skeleton = replace(
-            self.skeleton, offsets=self.skeleton.offsets * lengths[:, None]
-        )
+        offsets = self.skeleton.offsets * lengths[:, None]
+        skeleton = replace(self.skeleton, offsets=offsets)
         return Body(skeleton, self.radii * girths[:, None])
 
 
 def varied(body: Body, percent: float, rng: np.random.Generator) -> Body:
-    """Return a body whose bones and radii vary by at most `percent` each, the same left and right."""
+    """Return a body whose lengths and radii vary by at most `percent` each.
+
+    The left and the right side vary alike.
+    """
     if percent == 0.0:
         return body
     mirror = np.array(MIRROR)
-    shares = [
-        1.0 + rng.uniform(-percent, percent, len(JOINTS)) / 100.0 for _ in range(2)
-    ]
-    lengths, girths = (0.5 * (share + share[mirror])[1:] for share in shares)
+    factors = []
+    for _ in ("lengths", "girths"):
+        factor = 1.0 + rng.uniform(-percent, percent, len(JOINTS)) / 100.0
+        # the mean of both sides is the same left and right
+        factors.append(0.5 * (factor + factor[mirror])[1:])
+    lengths, girths = factors
     return body.scaled(lengths, girths)

@@ -15,55 +15,65 @@ from posefit.reading import parsed_json, quoted, read_text
 
 LARGEST_SIDE = 16_384  # pixels
 LARGEST_FILE = 1_000_000  # bytes
-# across the larger side; our guess for an unknown camera
+# across the larger side of the image; our guess for an unknown camera
 FIELD_OF_VIEW = math.radians(40.0)
-# by how much of themselves the focal lengths of square pixels may differ: of a limb that
-# is 40 pixels wide, a tenth of a pixel
+# Pixels count as square if the focal lengths differ by at most this share. On a limb
+# that is 40 pixels wide the difference is then a tenth of a pixel.
 SQUARE = 0.005
-FOCALS = 0.05, 100.0  # times the larger side: lenses of 170 degrees to 0.6
-MARGIN = 0.06  # share of the image left free around what `framing` shows
+FOCALS = 0.05, 100.0  # times the larger side: lenses from 170 down to 0.6 degrees
+MARGIN = 0.06  # share of the image that `framing` leaves free around the points
 _KEYS = ("width", "height", "focal", "centre", "camera_from_world")
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A calibrated view: `points_camera = rotation @ points_world + translation`, in metres."""
+    """A calibrated view.
+
+    `points_camera = rotation @ points_world + translation`, in metres.
+
+    Attributes:
+        width: Pixels of the image's width.
+        height: Pixels of the image's height.
+        focal: Focal lengths (2,) in pixels, across and down.
+        centre: The principal point (2,) in pixels.
+        rotation: The rotation (3, 3) from the world to the camera.
+        translation: The translation (3,) in metres.
+
+    """
 
     width: int
     height: int
-    focal: Array  # (2,) pixels
-    centre: Array  # (2,) pixels
-    rotation: Array = field(repr=False)  # (3, 3) camera_from_world
-    translation: Array = field(repr=False)  # (3,) metres
+    focal: Array  # (2,)
+    centre: Array  # (2,)
+    rotation: Array = field(repr=False)  # (3, 3)
+    translation: Array = field(repr=False)  # (3,)
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):
             side = getattr(self, name)
-            if (
-                isinstance(side, bool)
-                or not isinstance(side, int | np.integer)
-                or not 1 <= side <= LARGEST_SIDE
-            ):
+            is_whole = isinstance(side, int | np.integer) and not isinstance(side, bool)
+            if not (is_whole and 1 <= side <= LARGEST_SIDE):
                 raise InputError(
-                    f"{name} must be a whole number from 1 to {LARGEST_SIDE}, got {quoted(side)}"
+                    f"{name} must be a whole number from 1 to {LARGEST_SIDE}, "
+                    f"got {quoted(side)}"
                 )
             object.__setattr__(self, name, int(side))
-        for name, shape in (
-            ("focal", (2,)),
-            ("centre", (2,)),
-            ("rotation", (3, 3)),
-            ("translation", (3,)),
-        ):
+        shapes = {
+            "focal": (2,),
+            "centre": (2,),
+            "rotation": (3, 3),
+            "translation": (3,),
+        }
+        for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         if (self.focal <= 0.0).any():
             raise InputError(f"focal must be positive, got {self.focal.tolist()}")
         check_focal(self.focal, (self.width, self.height))
-        if (
-            np.abs(self.rotation @ self.rotation.T - np.eye(3)).max() > 1e-5
-            or np.linalg.det(self.rotation) < 0.0
-        ):
+        skew = np.abs(self.rotation @ self.rotation.T - np.eye(3)).max()
+        if skew > 1e-5 or np.linalg.det(self.rotation) < 0.0:
             raise InputError(
-                f"rotation must be orthonormal and right-handed, got {self.rotation.tolist()}"
+                "rotation must be orthonormal and right-handed, "
+                f"got {self.rotation.tolist()}"
             )
 
     @property
@@ -80,10 +90,22 @@ class Camera:
         size: tuple[int, int],
         field_of_view: float = FIELD_OF_VIEW,
     ) -> "Camera":
-        """Return an upright camera of `size` (width, height) that looks level at `target` (3,).
+        """Return an upright, level camera that looks at a target.
 
-        It stands `distance` metres away in the direction `azimuth` radians about the vertical: 0 is world +z, and
-        pi/2 is world +x. `field_of_view` is the angle across the image's larger side.
+        Args:
+            target: The point (3,) in the middle of the image.
+            azimuth: The direction from the target to the camera, in radians about the
+                vertical: 0 is world +z, and pi/2 is world +x.
+            distance: Metres from the target to the camera.
+            size: Width and height in pixels.
+            field_of_view: The angle in radians across the image's larger side.
+
+        Returns:
+            The camera.
+
+        Raises:
+            InputError: The distance or the field of view is out of range.
+
         """
         if not (math.isfinite(distance) and distance >= 0.0):
             raise InputError(f"distance must be 0 or more metres, got {distance}")
@@ -116,30 +138,54 @@ class Camera:
         cx: float | None = None,
         cy: float | None = None,
     ) -> "Camera":
-        """Return a level camera at the world's origin that looks along -z, of focal lengths and centre in pixels.
+        """Return a level camera at the world's origin that looks along -z.
 
-        By default `fy` is `fx`, and the centre is that of the image. Raises InputError where a focal length is less
-        than a tenth of the width: it is in millimetres.
+        Args:
+            width: Pixels of the image's width.
+            height: Pixels of the image's height.
+            fx: The focal length across, in pixels.
+            fy: The focal length down, in pixels; by default `fx`.
+            cx: The principal point across, in pixels; by default the image's centre.
+            cy: The principal point down, in pixels; by default the image's centre.
+
+        Returns:
+            The camera.
+
+        Raises:
+            InputError: `fx` is less than a tenth of the width, so that it is probably
+                in millimetres.
+
         """
         if 0.0 < fx < 0.1 * width:
             raise InputError(
-                f"fx must be in pixels, for {width} of them at least {0.1 * width:g}, got {fx:g}"
+                f"fx must be in pixels: at least {0.1 * width:g} "
+                f"for a width of {width}, got {fx:g}"
             )
         focal = np.array([fx, fx if fy is None else fy])
-        centre = np.array(
-            [width / 2.0 if cx is None else cx, height / 2.0 if cy is None else cy]
-        )
-        return cls(
-            width, height, focal, centre, np.diag([1.0, -1.0, -1.0]), np.zeros(3)
-        )
+        if cx is None:
+            cx = width / 2.0
+        if cy is None:
+            cy = height / 2.0
+        level = np.diag([1.0, -1.0, -1.0])
+        return cls(width, height, focal, np.array([cx, cy]), level, np.zeros(3))
 
     @classmethod
     def framing(
         cls, points: Array, radii: Array, azimuth: float, size: tuple[int, int]
     ) -> "Camera":
-        """Return the nearest camera at `azimuth` that sees all balls, points (n, 3) with radii (n,), with a margin.
+        """Return the nearest camera that sees some balls, with a margin.
 
-        It aims at the middle of the points' bounding box. `azimuth` and `size` as in `around`.
+        It aims at the middle of the bounding box of the balls' centres.
+
+        Args:
+            points: The centres (n, 3) of the balls.
+            radii: The radii (n,) of the balls in metres.
+            azimuth: The direction of the camera, as in `around`.
+            size: Width and height in pixels.
+
+        Returns:
+            The camera.
+
         """
         points = np.asarray(points, dtype=np.float64)
         radii = np.asarray(radii, dtype=np.float64)
@@ -147,29 +193,33 @@ class Camera:
         near = cls.around(target, azimuth, 0.0, size)
         x, y, z = (points @ near.rotation.T + near.translation).T
         free = (1.0 - MARGIN) * 0.5 * np.array(size) / near.focal
-        needed = (
-            np.maximum((np.abs(x) + radii) / free[0], (np.abs(y) + radii) / free[1]) - z
-        )
-        return cls.around(
-            target, azimuth, float(max(needed.max(), (radii - z).max() + 0.5)), size
-        )
+        across = (np.abs(x) + radii) / free[0]  # (n,) metres of depth that are needed
+        down = (np.abs(y) + radii) / free[1]
+        needed = np.maximum(across, down) - z
+        # every ball stays at least half a metre before the camera
+        clear = (radii - z).max() + 0.5
+        return cls.around(target, azimuth, float(max(needed.max(), clear)), size)
 
     def project(self, points: Array) -> tuple[Array, Array]:
-        """Return pixels (..., 2) and depths (...) in metres of world points (..., 3)."""
+        """Return pixels (..., 2) and depths (...) in metres of points (..., 3)."""
         in_camera = np.asarray(points) @ self.rotation.T + self.translation
         depths = in_camera[..., 2]
         return in_camera[..., :2] / depths[..., None] * self.focal + self.centre, depths
 
     @cached_property
     def square(self) -> bool:
-        """Whether its pixels are square, so that a ball is a circle in its pictures; bodies are drawn by that."""
+        """Whether the pixels are square, so that a ball is a circle in the picture.
+
+        Bodies are rasterised under this assumption.
+        """
         longest = float(self.focal.max())
         return longest - float(self.focal.min()) <= SQUARE * longest
 
     def squared(self) -> "Camera":
-        """Return the camera of the same view whose pixels are square; it is this one where its own are.
+        """Return a camera of the same view with square pixels: this one if it has them.
 
-        The longer focal length holds in both directions, so that pictures get more columns or more rows.
+        The longer focal length holds in both directions, so that pictures get more
+        columns or more rows.
         """
         if self.square:
             return self
@@ -185,21 +235,33 @@ class Camera:
         )
 
     def to_json(self) -> str:
-        """Return the text that `from_json` reads: sizes and pixels, and the 4 x 4 matrix camera_from_world."""
+        """Return the camera as JSON, which `from_json` reads."""
         matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = self.rotation, self.translation
-        values = (
-            self.width,
-            self.height,
-            self.focal.tolist(),
-            self.centre.tolist(),
-            matrix.tolist(),
-        )
-        return json.dumps(dict(zip(_KEYS, values, strict=True)), indent=1)
+        matrix[:3, :3] = self.rotation
+        matrix[:3, 3] = self.translation
+        values = {
+            "width": self.width,
+            "height": self.height,
+            "focal": self.focal.tolist(),
+            "centre": self.centre.tolist(),
+            "camera_from_world": matrix.tolist(),
+        }
+        return json.dumps(values, indent=1)
 
     @classmethod
     def from_json(cls, path: str | Path) -> "Camera":
-        """Return the camera of what `to_json` wrote: a file or the text. Raises InputError naming the key."""
+        """Return the camera that `to_json` wrote.
+
+        Args:
+            path: A file, or the JSON text itself.
+
+        Returns:
+            The camera.
+
+        Raises:
+            InputError: The text is not valid; the message names the key.
+
+        """
         text = path if isinstance(path, str) and path.lstrip().startswith("{") else ""
         path = "camera" if text else path
         expected = f"{path}: expected a JSON object with {', '.join(_KEYS)}"
@@ -208,17 +270,18 @@ class Camera:
             values = parsed_json(text)
         except ValueError as error:
             raise InputError(f"{expected}, got {error}") from None
-        if not isinstance(values, dict) or set(values) != set(_KEYS):
-            raise InputError(
-                f"{expected}, got {sorted(values) if isinstance(values, dict) else type(values).__name__}"
-            )
+        if not isinstance(values, dict):
+            raise InputError(f"{expected}, got {type(values).__name__}")
+        if set(values) != set(_KEYS):
+            raise InputError(f"{expected}, got {sorted(values)}")
         try:
             matrix = frozen(
                 "camera_from_world", values.pop("camera_from_world"), (4, 4)
             )
             if matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
                 raise InputError(
-                    f"camera_from_world must have the last row 0 0 0 1, got {matrix[3].tolist()}"
+                    "camera_from_world must have the last row 0 0 0 1, "
+                    f"got {matrix[3].tolist()}"
                 )
             return cls(**values, rotation=matrix[:3, :3], translation=matrix[:3, 3])
         except ValueError as error:
@@ -226,18 +289,18 @@ class Camera:
 
 
 def is_focal(focal: Array, size: Sequence[float] | Array) -> bool:
-    """Return whether a lens may have such focal lengths (2,) for pictures of a size."""
-    return bool(
-        FOCALS[0] * max(size) <= np.min(focal)
-        and np.max(focal) <= FOCALS[1] * max(size)
-    )
+    """Return whether a lens may have these focal lengths (2,) for some size."""
+    shortest = FOCALS[0] * max(size)
+    longest = FOCALS[1] * max(size)
+    return bool(shortest <= np.min(focal) and np.max(focal) <= longest)
 
 
 def check_focal(focal: Array, size: Sequence[float] | Array) -> None:
-    """Raise InputError where no lens has such focal lengths (2,) for pictures of a size."""
+    """Raise InputError if no lens has these focal lengths (2,) for a size."""
     if not is_focal(focal, size):
         low, high = (share * max(size) for share in FOCALS)
-        came = " and ".join(f"{length:g}" for length in focal)
+        found = " and ".join(f"{length:g}" for length in focal)
         raise InputError(
-            f"focal must be in pixels, for such pictures {low:g} to {high:g}, got {came}"
+            f"focal must be in pixels: {low:g} to {high:g} for pictures of this size, "
+            f"got {found}"
         )

@@ -1,8 +1,10 @@
-"""Forward kinematics in numba: plain functions over arrays, shapes checked by the callers.
+"""Forward kinematics in numba: functions over arrays, whose callers check the shapes.
 
-LANES poses are moved at a time, side by side in vector registers. All numbers of them are in one flat array, LANES of a
-kind after those of another. As the compiler knows these offsets, it sees that rows do not overlap and keeps loops over
-lanes in registers; of rows at unknown offsets it would compare the places first, and only for loops of 16 and more.
+LANES poses are processed at a time, side by side in vector registers. All their numbers
+are in one flat array: LANES values of one quantity, then LANES values of the next.
+Because the compiler knows these offsets, it sees that rows do not overlap, and keeps
+loops over lanes in registers. For rows at unknown offsets it would compare the
+addresses first, and would do so only for loops of 16 and more.
 """
 
 from typing import NamedTuple
@@ -12,17 +14,22 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
 
-# poses side by side: the fewest that bones are moved for in vector registers
+# poses side by side: the fewest for which the compiler uses vector registers
 LANES = 16
 
-# pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
-# where the first term left out is below 1e-10.
+# pi in two parts, so that angles of many turns keep their digits. The sine and the
+# cosine are Taylor polynomials on [-pi/2, pi/2], where the first omitted term is below
+# 1e-10.
 PI_HIGH = 3.141592653589793
 PI_LOW = 1.2246467991473532e-16
 
-# Where rows of lanes begin: angles; their sines and cosines, and those of three angles more that are always 0; a matrix
-# (3, 4) from the world to the frame that joints are placed in; bones (26, 3) in their own frames; frames (27, 4, 3) of
-# joints, three axes and a place each; and these places once more, each coordinate of all 27 in turn.
+# The offsets of the rows of lanes, in this order:
+# - the angles, then their sines and their cosines; each has three more, of angles that
+#   are always 0;
+# - a matrix (3, 4) from the world to the frame in which joints are placed;
+# - the bones (26, 3) in their own frames;
+# - the frames (27, 4, 3) of the joints: three axes and a position each;
+# - the positions again: x of all 27 joints, then y, then z.
 _ANGLES = 66
 _BONES = 26
 _JOINTS = 27
@@ -32,15 +39,15 @@ _OFFSETS = _VIEW + 12 * LANES
 _FRAMES = _OFFSETS + 3 * _BONES * LANES
 X, Y, Z = (_FRAMES + (12 + i) * _JOINTS * LANES for i in range(3))
 _END = Z + _JOINTS * LANES
-# an index that is provably not negative needs no check whether it counts from the end
+# with this mask an index is provably not negative, and numba omits the test for that
 NATURAL = 0x7FFFFFFF
 
 
 class Chain(NamedTuple):
-    """A skeleton as the kernel wants it; bones in an order where parents come first."""
+    """A skeleton as the kernel needs it; parents come before children."""
 
-    parents: NDArray[np.int64]  # (26,) joint a bone starts from; it ends in joint b + 1
-    # (26,) index in the pose of the bone's rx, or -1 where it cannot turn
+    parents: NDArray[np.int64]  # (26,) the joint where bone b starts; it ends in b + 1
+    # (26,) the index of the bone's rx in a pose, or -1 if it cannot turn
     angles: NDArray[np.int64]
     turns: Array  # (26, 3, 3) parent's frame from this bone's frame, at rest
     offsets: Array  # (26, 3) the bone in its own frame
@@ -48,7 +55,10 @@ class Chain(NamedTuple):
 
 @inlined
 def sine_cosine_near_zero(x):
-    """Return the sine and cosine of an angle from -pi/2 to pi/2. Polynomials, so that they run in vector registers."""
+    """Return the sine and cosine of an angle from -pi/2 to pi/2.
+
+    They are polynomials, so that the compiler can use vector registers.
+    """
     z = x * x
     s = -1.0 / 1307674368000.0
     s = s * z + 1.0 / 6227020800.0
@@ -85,7 +95,7 @@ def rotated(first, second, sine, cosine):
 
 @inlined
 def empty_lanes():
-    """Return room for the numbers of LANES poses; joints are placed in the world's frame."""
+    """Return the array for LANES poses; joints are placed in the world's frame."""
     lanes = np.empty(_END)
     for k in range(12 * LANES):
         lanes[_VIEW + k] = 1.0 if k // LANES % 5 == 0 else 0.0
@@ -99,7 +109,10 @@ def empty_lanes():
 
 @inlined
 def set_view(lanes, first, stop, rotation, translation, focal, centre):
-    """Place the joints of some lanes in a camera's picture: x and y in pixels, times the depth, and the depth."""
+    """Make some lanes place joints in a camera's picture.
+
+    Their coordinates are x and y in pixels, times the depth, and the depth.
+    """
     for i in range(translation.size):
         for j in range(translation.size + 1):
             coordinate, depth = (
@@ -115,7 +128,7 @@ def set_view(lanes, first, stop, rotation, translation, focal, centre):
 @inlined
 def set_offsets(lanes, first, stop, offsets):
     """Give some lanes the bones of a body (26, 3)."""
-    # numbers known to the compiler would have it write out every turn
+    # with constant bounds the compiler would unroll these loops completely
     for b in range(offsets.shape[0]):
         for i in range(offsets.shape[1]):
             for lane in range(first, stop):
@@ -123,8 +136,50 @@ def set_offsets(lanes, first, stop, offsets):
 
 
 @inlined
+def all_same(rows):
+    """Return whether all lanes have the same pose, as for the last of n poses."""
+    same = True
+    for lane in range(1, LANES):
+        same &= rows[lane] == rows[0]
+    return same
+
+
+@inlined
+def write_sines(poses, rows, lanes):
+    """Write the sines and cosines of the angles of a pose for each lane."""
+    for lane in range(LANES):
+        for a in range(_ANGLES):
+            lanes[_ANGLE + LANES * a + lane] = poses[rows[lane], a]
+    for k in range(LANES * _ANGLES):
+        sine, cosine = sine_cosine(lanes[_ANGLE + k])
+        lanes[_SINE + k] = sine
+        lanes[_COSINE + k] = cosine
+
+
+@inlined
+def write_sines_of_one(pose, lanes):
+    """Write those of one pose that is in all lanes, each of them computed once."""
+    # one angle after another, in the room of the angles of all lanes
+    sines = _ANGLE + _ANGLES
+    cosines = sines + _ANGLES
+    for a in range(_ANGLES):
+        lanes[_ANGLE + a] = pose[a]
+    for a in range(_ANGLES):
+        sine, cosine = sine_cosine(lanes[_ANGLE + a])
+        lanes[sines + a] = sine
+        lanes[cosines + a] = cosine
+    for a in range(_ANGLES):
+        for lane in range(LANES):
+            lanes[_SINE + LANES * a + lane] = lanes[sines + a]
+            lanes[_COSINE + LANES * a + lane] = lanes[cosines + a]
+
+
+@inlined
 def place_roots(places, rows, lanes):
-    """Write the frames of the root joints: Ry @ Rx @ Rz of yaw, pitch and roll, at places (n, 3)."""
+    """Write the frames of the root joints, at places (n, 3).
+
+    Their axes are Ry @ Rx @ Rz of yaw, pitch and roll.
+    """
     for k in range(LANES):
         sy = lanes[_SINE + k]
         sp = lanes[_SINE + LANES + k]
@@ -158,11 +213,11 @@ def place_roots(places, rows, lanes):
 
 @inlined
 def place_bones(chain, lanes):
-    """Write the frame of the joint in which each bone ends, from that of the joint it starts from."""
+    """Write the frame at the end of each bone, from the frame at its start."""
     parents, angles, turns, _ = chain
     for b in range(parents.size):
         a = angles[b] if angles[b] >= 0 else _ANGLES
-        # read before the loop: for all that the compiler knows, writing a row of lanes could change them
+        # read before the loop: the compiler assumes that writing lanes changes them
         xx = turns[b, 0, 0]
         xy = turns[b, 0, 1]
         xz = turns[b, 0, 2]
@@ -206,12 +261,15 @@ def place_bones(chain, lanes):
 
 @jit
 def place_lanes(chain, poses, places, rows, lanes):
-    """Write frames and joints of the poses (n, 66), their roots at places (n, 3), that are in these rows (LANES,)."""
-    for lane in range(LANES):
-        for a in range(_ANGLES):
-            lanes[_ANGLE + LANES * a + lane] = poses[rows[lane], a]
-    for k in range(LANES * _ANGLES):
-        lanes[_SINE + k], lanes[_COSINE + k] = sine_cosine(lanes[_ANGLE + k])
+    """Write the frames and joints of LANES poses.
+
+    `rows` (LANES,) has their indices in `poses` (n, 66) and in `places` (n, 3), which
+    has the positions of the roots.
+    """
+    if all_same(rows):
+        write_sines_of_one(poses[rows[0]], lanes)
+    else:
+        write_sines(poses, rows, lanes)
     place_roots(places, rows, lanes)
     place_bones(chain, lanes)
     for j in range(_JOINTS):
@@ -223,16 +281,20 @@ def place_lanes(chain, poses, places, rows, lanes):
 
 @inlined
 def set_rows(rows, first, n):
-    """Write which LANES of n poses follow from `first` on; the last one again where there are no more."""
+    """Write the indices of the LANES poses from `first` on.
+
+    Beyond the last of the n poses its index is repeated.
+    """
     for lane in range(LANES):
         rows[lane] = min(first + lane, n - 1)
 
 
 @jit
 def place_frames(chain, poses, places, sines, cosines, frames):
-    """Write the frames (n, 27, 4, 3) of the joints of poses (n, 66) at places (n, 3): three axes and an origin each.
+    """Write the frames (n, 27, 4, 3) of the joints of poses (n, 66) at places (n, 3).
 
-    And the sines and cosines (n, 66) of their angles.
+    A frame is three axes and an origin. The sines and cosines (n, 66) of the angles are
+    written too.
     """
     n = poses.shape[0]
     rows = np.empty(LANES, np.int64)
@@ -266,7 +328,7 @@ def read_joints(lanes, lane, joints):
 
 @jit
 def joint_positions(chain, poses, places):
-    """Return the joints (n, 27, 3) of poses (n, 66) with their roots at places (n, 3)."""
+    """Return the joints (n, 27, 3) of poses (n, 66) with roots at places (n, 3)."""
     n = poses.shape[0]
     rows = np.empty(LANES, np.int64)
     lanes = empty_lanes()

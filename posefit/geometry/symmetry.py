@@ -1,9 +1,11 @@
-"""Poses with nearly the same silhouette as a given one: left and right exchanged, turned, reflected.
+"""Poses with nearly the same silhouette: left and right exchanged, turned, reflected.
 
-A silhouette shows neither which leg is in front nor how deep anything is. A search that has chosen the wrong one of two
-such poses stays there, as each frame continues the last, unless a tracker tries the other one. These are plain
-functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones of the two sides are seldom
-equally long; the silhouettes differ as much as the sides do.
+A silhouette shows neither which leg is in front nor the depth of anything. A search
+that has chosen the wrong one of two such poses keeps it, because each frame continues
+the last, unless a tracker tries the other pose. These functions take poses (n, 66),
+leave the roots where they are, and undo themselves when they are applied twice. The
+bones of the two sides are seldom equally long, so the silhouettes differ as much as the
+sides do.
 """
 
 from collections.abc import Sequence
@@ -32,7 +34,9 @@ from posefit.reading import quoted
 
 Limbs = Literal["legs", "arms"]
 
-_LEFT_RIGHT = np.diag([-1.0, 1.0, 1.0])  # of a body at rest, whose left is at +x
+_LEFT_RIGHT = np.diag(
+    [-1.0, 1.0, 1.0]
+)  # the reflection of a body at rest; its left is at +x
 _BONES: dict[Limbs, tuple[str, ...]] = {
     "legs": (*LIMBS["left leg"], *LIMBS["right leg"]),
     "arms": (*LIMBS["left arm"], *LIMBS["right arm"]),
@@ -40,22 +44,25 @@ _BONES: dict[Limbs, tuple[str, ...]] = {
 
 
 def mirrored_poses(skeleton: Skeleton, poses: Array) -> Array:
-    """Return poses (n, 66) whose left and right are exchanged: a stride becomes the one half a cycle later.
+    """Return poses (n, 66) with left and right exchanged.
 
-    The body is reflected in the upright plane that it faces along, and each side takes the name of the other. Viewed
-    exactly from its side that leaves the silhouette as it is, as the camera looks across that plane and depth does not
-    show; the farther the camera stands from the side, the more it shows.
+    A stride becomes the stride half a cycle later. The body is reflected in the upright
+    plane along which it faces, and each side takes the name of the other. Exactly from
+    the body's side the silhouette stays the same, because the camera looks across this
+    plane and depth is invisible. The farther the camera is from there, the more the
+    silhouette changes.
     """
     exchanged = _exchanged(skeleton, poses, JOINTS)
-    exchanged[:, 2] *= -1.0  # a lean to the left is one to the right
+    exchanged[:, 2] *= -1.0  # a lean to the left becomes a lean to the right
     return exchanged
 
 
 def turned_poses(poses: Array) -> Array:
-    """Return poses (n, 66) that face the other way, their joints as they are.
+    """Return poses (n, 66) that face the opposite way, with the same joint angles.
 
-    From in front, and from behind, an upright body that stands still shows the same outline; one that walks, only
-    about the same, with left and right on the other side. From its side knees and feet point the wrong way.
+    From the front or from behind, an upright body at rest keeps its outline. A walking
+    body nearly keeps it, with left and right on the other sides. From the side, knees
+    and feet point the wrong way.
     """
     poses = np.array(poses, dtype=np.float64)
     poses[:, 0] = wrapped(poses[:, 0] + np.pi)
@@ -63,12 +70,21 @@ def turned_poses(poses: Array) -> Array:
 
 
 def reflected_poses(skeleton: Skeleton, poses: Array, camera_yaw: float) -> Array:
-    """Return poses (n, 66) reflected along the line of sight: towards the camera becomes away from it.
+    """Return poses (n, 66) reflected along the line of sight.
 
-    `camera_yaw` is the yaw in radians of a person who faces the camera, see `facing`. Near and far trade places, and
-    so do left and right: a turn of 30 degrees out of the picture becomes one into it. Whatever the pose,
-    and from whatever side, a level camera far away sees the same silhouette. From the side it is `mirrored_poses`, and
-    from in front it is `turned_poses` with left and right exchanged.
+    Near and far are exchanged, and so are left and right: a turn of 30 degrees out of
+    the picture becomes a turn into it. A level camera far away sees the same silhouette
+    for every pose and from every side. From the side, the result is `mirrored_poses`;
+    from the front, it is `turned_poses` with left and right exchanged.
+
+    Args:
+        skeleton: The skeleton.
+        poses: The poses (n, 66).
+        camera_yaw: The yaw in radians of a person who faces the camera; see `facing`.
+
+    Returns:
+        The reflected poses (n, 66).
+
     """
     reflected = mirrored_poses(skeleton, poses)
     reflected[:, 0] = wrapped(2.0 * camera_yaw + np.pi - reflected[:, 0])
@@ -76,10 +92,11 @@ def reflected_poses(skeleton: Skeleton, poses: Array, camera_yaw: float) -> Arra
 
 
 def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
-    """Return poses (n, 66) whose two `legs`, or two `arms`, have each the other's angles, mirrored.
+    """Return poses (n, 66) in which the two `legs`, or the two `arms`, are exchanged.
 
-    The trunk and the other limbs stay. Viewed from the side, the near and the far limb of a pair lie on each other or
-    cross, and the silhouette is nearly the same whichever of them is in front.
+    Each limb gets the mirrored angles of the other; the rest of the body stays. From
+    the side, the near and the far limb overlap or cross, and the silhouette is nearly
+    the same whichever is in front.
     """
     if limbs not in _BONES:
         raise InputError(
@@ -89,13 +106,16 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
 
 
 def facing(camera: Camera, place: Array) -> float:
-    """Return the yaw in radians of a person at a place (3,) who faces a camera."""
+    """Return the yaw in radians of a person at a place (3,) who faces the camera."""
     x, _, z = camera.position - np.asarray(place)
     return float(np.arctan2(x, z))
 
 
 def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
-    """Return poses (n, 66) in which the joints of some names have the angles of their counterparts, mirrored."""
+    """Return poses (n, 66) in which some joints mirror the other side.
+
+    They have the mirrored angles of the joints on the other side.
+    """
     poses = np.asarray(poses, dtype=np.float64)
     result = poses.copy()
     for j, frame in _frames(skeleton):
@@ -113,14 +133,13 @@ def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
 
 @lru_cache(maxsize=16)
 def _frames(skeleton: Skeleton) -> list[tuple[int, Array | None]]:
-    """Return each joint with its bone's rest frame, from the reflected one of its counterpart.
+    """Return each inner joint with the map from its counterpart's frame to its own.
 
-    None stands for a mere reflection, which keeps angles of more than half a turn as they are.
+    The map includes the reflection. None stands for the reflection alone, so that
+    angles of more than half a turn can be kept.
     """
-    frames = [
-        (j, skeleton.axes[j - 1].T @ _LEFT_RIGHT @ skeleton.axes[MIRROR[j] - 1])
-        for j in INNER
-    ]
-    return [
-        (j, None if np.allclose(frame, _LEFT_RIGHT) else frame) for j, frame in frames
-    ]
+    frames: list[tuple[int, Array | None]] = []
+    for j in INNER:
+        frame = skeleton.axes[j - 1].T @ _LEFT_RIGHT @ skeleton.axes[MIRROR[j] - 1]
+        frames.append((j, None if np.allclose(frame, _LEFT_RIGHT) else frame))
+    return frames

@@ -1,4 +1,4 @@
-"""Units of length: which one a file is in, by a length that a person has."""
+"""Units of length, and the unit of a file by the height of its person."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from posefit.reading import quoted
 Unit = Literal["m", "cm", "mm", "inch", "foot", "cmu"]
 UNITS: tuple[Unit, ...] = get_args(Unit)
 INCH = 0.0254  # metres
-CMU_UNIT = INCH / 0.45  # of the CMU database: its .asf files say `length 0.45`
+CMU_UNIT = INCH / 0.45  # metres; .asf files of the CMU database say `length 0.45`
 METRES: Mapping[Unit, float] = {
     "m": 1.0,
     "cm": 0.01,
@@ -27,27 +27,30 @@ UNIT_NAMES: Mapping[Unit, str] = {
     "foot": "feet",
     "cmu": "the CMU database's unit (5.64 cm)",
 }
-STATURES = 0.9, 2.4  # metres that a person stands, from a child of two years on
+STATURES = 0.9, 2.4  # metres: the height of a person from two years on
 
 
 def metres_of(unit: Unit) -> float:
-    """Return how many metres a unit has. Raises InputError where it is none."""
+    """Return the metres in a unit. Raises InputError if the unit is unknown."""
     if unit not in METRES:
         raise InputError(f"unit must be one of {', '.join(UNITS)}, got {quoted(unit)}")
     return METRES[unit]
 
 
 def unit_of(stature: float) -> Unit | None:
-    """Return the unit in which a person may stand so tall; None where there is none, or a length that is none.
+    """Return the unit in which a person may have this height, or None.
 
-    Where several are possible it is the one that is nearest to the middle of `STATURES`, by ratio.
+    If several units are possible, it is the unit nearest to the middle of `STATURES`,
+    by ratio. The result is None if no unit is possible or the height is not positive
+    and finite.
     """
     if not (math.isfinite(stature) and stature > 0.0):
         return None
     low, high = STATURES
     middle = math.log(low * high) / 2.0
-    off = {
-        unit: abs(float(math.log(stature * METRES[unit])) - middle) for unit in UNITS
-    }
-    best = min(UNITS, key=off.__getitem__)
+
+    def distance(unit: Unit) -> float:
+        return abs(float(math.log(stature * METRES[unit])) - middle)
+
+    best = min(UNITS, key=distance)
     return best if low <= stature * METRES[best] <= high else None

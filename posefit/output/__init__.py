@@ -1,11 +1,13 @@
-"""What a track leaves behind: files, pictures, a page and a printed table.
+"""The results of a track: files, pictures, a page and a printed table.
 
 | looking for | file |
 |---|---|
-| the folder that appears whole | folder.py |
-| what a track goes on from that ended too early; whether two tracks are the same | record.py, identity.py |
-| every file, a line a format; what they are made of | files.py, content.py |
+| the output folder, which appears only when it is complete | folder.py |
+| the record from which an interrupted track continues | record.py |
+| whether two tracks have the same arguments | identity.py |
+| every file of a track, one line per format | files.py |
+| the data that the files are made of | content.py |
 | pictures: overlay.mp4 and summary.png | picture.py, drawing.py |
 | the page, track.html | page/ |
-| what is printed | text.py |
+| the text that is printed | text.py |
 """

@@ -1,4 +1,4 @@
-"""What the files of a track are made of, and its page."""
+"""The data of a track, from which its files and its page are made."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -25,10 +25,10 @@ from posefit.version import __version__
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """What was tracked, and how."""
+    """The arguments and the circumstances of a track."""
 
     motion: str
-    source: list[str] | None = None  # one a camera
+    source: list[str] | None = None  # one per camera
     frames_chosen: list[int | None] | None = None
     view_degrees: Any = None
     method: str
@@ -50,7 +50,7 @@ class Setup:
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingLog:
-    """How the track went, and what it leaves open."""
+    """The course of a track, and what it did not determine."""
 
     hypotheses: list[dict[str, Any]]
     build: Mapping[str, Any] | None
@@ -68,7 +68,7 @@ class TrackingLog:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """What the files of a track are made of."""
+    """The data of a track, from which its files are made."""
 
     scene: Scene
     frames: Sequence[Frame]
@@ -81,7 +81,7 @@ class Content:
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Everything but the frames, as summary.json holds it."""
+        """The content of summary.json: everything except the frames."""
         trust = None if self.trust is None else asdict(self.trust)
         gait = self.gait.as_dict()
         values = {
@@ -91,10 +91,10 @@ class Content:
             "trust": trust,
             "gait": gait,
         }
-        return {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in values.items()
-        }
+        for name, value in values.items():
+            if isinstance(value, tuple):
+                values[name] = list(value)
+        return values
 
     @cached_property
     def motion(self) -> Motion:
@@ -103,12 +103,15 @@ class Content:
 
     @cached_property
     def blank(self) -> set[int]:
-        """The frames of which nothing is known: their numbers as filmed."""
+        """The numbers, as filmed, of the frames that show nothing of the person."""
         return unseen(self.table)
 
     @cached_property
     def columns(self) -> dict[str, Any]:
-        """The columns (T,) of frames.csv: figures, activity, and joints, unknown ones as NaN."""
+        """The columns (T,) of frames.csv: figures, activity and joints.
+
+        Unknown joints are NaN.
+        """
         points = self.motion.joints.reshape(len(self.frames), -1).T.copy()  # (81, T)
         points[:, np.isin(self.table["frame"], list(self.blank))] = np.nan
         names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
@@ -119,31 +122,36 @@ class Content:
 
     @cached_property
     def intervals(self) -> dict[str, Array]:
-        """How far joints and angles may be off, as poses.npz has it; empty where no frame has a posterior.
+        """The intervals of joints and angles in poses.npz.
 
-        `levels` (3,), `joint_radii` (T, 3, 27) metres about the root, of footage `place_radii` in the world, too, and
-        `angle_halves` (T, 3, 66) radians; NaN in frames without any.
+        The keys are `levels` (3,), `joint_radii` (T, 3, 27) in metres relative to the
+        root, and `angle_halves` (T, 3, 66) in radians. Tracks of footage also have
+        `place_radii` (T, 3, 27) in metres in the world. Frames without a posterior have
+        NaN. If no frame has a posterior, the mapping is empty.
         """
         if all(frame.posterior is None for frame in self.frames):
             return {}
         skeleton = self.scene.body.skeleton
         camera = self.scene.cameras[0]
-        radii, places = np.full((2, len(self.frames), len(LEVELS), len(JOINTS)), np.nan)
+        shape = (len(self.frames), len(LEVELS), len(JOINTS))
+        radii = np.full(shape, np.nan)
+        places = np.full(shape, np.nan)
         halves = np.full((len(self.frames), len(LEVELS), ANGLES), np.nan)
         for k, frame in enumerate(self.frames):
-            if frame.posterior is not None:
-                radii[k], in_world = (
-                    joint_intervals(skeleton, frame.posterior, frame.pose, world)
-                    for world in (False, True)
-                )
-                model = frame.posterior.recalibration or Recalibration()
-                places[k] = np.hypot(
-                    in_world, depth_halves(model, camera, frame.translation)
-                )
-                halves[k] = angle_intervals(frame.posterior, frame.pose)
+            posterior = frame.posterior
+            if posterior is None:
+                continue
+            radii[k] = joint_intervals(skeleton, posterior, frame.pose, False)
+            in_world = joint_intervals(skeleton, posterior, frame.pose, True)
+            model = posterior.recalibration or Recalibration()
+            depths = depth_halves(model, camera, frame.translation)
+            places[k] = np.hypot(in_world, depths)
+            halves[k] = angle_intervals(posterior, frame.pose)
         intervals = {
             "levels": np.array(LEVELS),
             "joint_radii": radii,
             "angle_halves": halves,
         }
-        return intervals | ({"place_radii": places} if self.scene.truth is None else {})
+        if self.scene.truth is None:
+            intervals["place_radii"] = places
+        return intervals

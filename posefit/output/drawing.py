@@ -1,6 +1,6 @@
-"""What pictures of a track are made of: colours, words, a body, and the thin bones of another mode.
+"""The parts of a track's pictures: text, the body, and another mode as thin bones.
 
-Colours are blue, green, red, as OpenCV has them. What is uncertain is faint.
+Colours are in OpenCV's order: blue, green, red. Uncertain limbs are faint.
 """
 
 import math
@@ -25,23 +25,24 @@ SPILLED = (235, 160, 70)
 LEFT = (80, 150, 245)
 RIGHT = (225, 165, 85)
 MIDDLE = (205, 205, 205)
-OTHER = (198, 156, 227)  # what else a frame may show
+OTHER = (198, 156, 227)  # another likely pose of a frame
 TEXT = (240, 240, 240)
-LINES = (70, 66, 64)  # of a chart
+LINES = (70, 66, 64)  # the lines of a chart
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 SIDE_VIEW_DISTANCE = 6.0  # metres
-# metres of a joint's 80 % interval: bones are solid, and faintest
+# metres, the radius of a joint's 80 % interval: below it bones are solid
 SOLID_RADIUS = 0.05
+# metres: above it bones are faintest
 FAINTEST_RADIUS = 0.3
-FAINTEST = 0.2  # how much of a faintest limb's colour is left
+FAINTEST = 0.2  # the opacity of the faintest limbs
 _STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
 SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
 _ENDS = [JOINTS.index(side + name) for side in "lr" for name in ("wrist", "foot")]
 
 
 def blank(height: int, width: int) -> Image:
-    """Return a picture (height, width, 3) of nothing."""
+    """Return an empty picture (height, width, 3)."""
     return np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
 
 
@@ -53,12 +54,15 @@ def write(
 
 
 def width_of(text: str, scale: float = 0.5) -> int:
-    """Return how many pixels wide a text is."""
+    """Return the width of a text in pixels."""
     return int(cv2.getTextSize(text, _FONT, scale, 1)[0][0])
 
 
 def wrapped(text: str, width: int, scale: float) -> list[str]:
-    """Return the lines of a text that are at most so many pixels wide, where no word is wider."""
+    """Return a text as lines that are at most `width` pixels wide.
+
+    A word that is wider has a line to itself.
+    """
     lines = [""]
     for word in text.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -70,28 +74,27 @@ def wrapped(text: str, width: int, scale: float) -> list[str]:
 
 
 def hexadecimal(colour: tuple[int, int, int]) -> str:
-    """Return a colour as a page has it."""
+    """Return a colour in the notation of web pages, such as `#e1a555`."""
     blue, green, red = colour
     return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def opacities(radii: Array) -> Array:
-    """Return how solid each bone (26,) is drawn, 0 to 1, given how far its joints (27,) may be off in metres.
+    """Return the opacity, 0 to 1, of each bone (26,).
 
-    A bone is as solid as the fainter of its two ends. Where that is unknown, NaN, it is solid.
+    `radii` (27,) are the radii in metres of the joints' intervals. A bone is as solid
+    as the fainter of its two ends. An end with an unknown radius, NaN, counts as solid.
     """
-    solid = np.clip(
-        (FAINTEST_RADIUS - np.nan_to_num(radii)) / (FAINTEST_RADIUS - SOLID_RADIUS),
-        FAINTEST,
-        1.0,
-    )
+    span = FAINTEST_RADIUS - SOLID_RADIUS
+    share = (FAINTEST_RADIUS - np.nan_to_num(radii)) / span  # (27,)
+    solid = np.clip(share, FAINTEST, 1.0)
     return np.asarray(np.minimum(solid[_STARTS], solid[1:]))
 
 
 def side_camera(
     body: Body, camera: Camera, pose: Array, translation: Array, side: int
 ) -> Camera:
-    """Return a camera that sees the whole body from the right of another one."""
+    """Return a camera to the right of another one, which sees the whole body."""
     joints = body.skeleton.joints(pose, translation)
     middle = 0.5 * (joints.min(axis=0) + joints.max(axis=0))
     back = -camera.rotation[2]
@@ -109,15 +112,13 @@ def side_camera(
 def side_view(
     body: Body, camera: Camera, pose: Array, translation: Array, side: int
 ) -> Image:
-    """Return the body (side, side, 3) viewed from the camera's right: left limbs orange, right ones blue."""
+    """Return a picture (side, side, 3) of the body from the camera's right.
+
+    Left limbs are orange and right limbs blue.
+    """
     image = blank(side, side)
-    draw_body(
-        image,
-        body,
-        side_camera(body, camera, pose, translation, side),
-        pose,
-        translation,
-    )
+    viewed = side_camera(body, camera, pose, translation, side)
+    draw_body(image, body, viewed, pose, translation)
     return image
 
 
@@ -129,30 +130,28 @@ def draw_body(
     translation: Array,
     solid: Array | None = None,
 ) -> None:
-    """Draw the body into an image of a camera's size, far bones first: left limbs orange, right ones blue.
+    """Draw the body into an image of the camera's size, far bones first.
 
-    `solid` (26,) is how much of each bone's colour is left; what lies behind shows through the rest.
+    Left limbs are orange and right limbs blue. `solid` (26,) is the opacity of each
+    bone; the picture behind a bone shows through the rest.
     """
     for bone, pixels, radii, shade in _cones(body, camera, pose, translation):
         colour = tuple(min(255.0, shade * c) for c in SIDE_COLOURS[SIDES[bone + 1]])
-        _cone(
-            image, pixels, radii, colour, 1.0 if solid is None else float(solid[bone])
-        )
+        opacity = 1.0 if solid is None else float(solid[bone])
+        _cone(image, pixels, radii, colour, opacity)
 
 
 def solid_map(
     body: Body, camera: Camera, pose: Array, translation: Array, solid: Array
 ) -> Array:
-    """Return how solid a body is at each pixel (height, width) of a camera, 0 to 1; 1 where there is none."""
+    """Return the opacity of a body, 0 to 1, at each pixel (height, width) of a camera.
+
+    Pixels without the body have 1.
+    """
     image = np.full((camera.height, camera.width), 255, dtype=np.uint8)
     for bone, pixels, radii, _ in _cones(body, camera, pose, translation):
-        cv2.fillConvexPoly(
-            image,
-            _hull(pixels, radii),
-            round(255.0 * float(solid[bone])),
-            cv2.LINE_8,
-            4,
-        )
+        level = round(255.0 * float(solid[bone]))
+        cv2.fillConvexPoly(image, _hull(pixels, radii), level, cv2.LINE_8, 4)
     return image / 255.0
 
 
@@ -164,10 +163,13 @@ def draw_bones(
     translation: Array,
     colour: Any = None,
 ) -> None:
-    """Draw bones as thin lines, of one colour or those of their sides; wrists and feet have the colours of theirs."""
+    """Draw bones as thin lines, in one colour or in the colours of their sides.
+
+    Wrists and feet always have the colours of their sides.
+    """
     pixels, depths = camera.project(body.skeleton.joints(pose, translation))
     thick = max(1, round(camera.height / 240))
-    # pixel centres are at +0.5 here, and at whole numbers in OpenCV
+    # the centres of pixels are at +0.5 here, but at whole numbers in OpenCV
     points = np.rint((np.nan_to_num(pixels) - 0.5) * 16).astype(np.int64).tolist()
     for joint, parent in enumerate(PARENTS[1:], 1):
         if min(depths[joint], depths[parent]) > NEAR:
@@ -175,32 +177,29 @@ def draw_bones(
             cv2.line(image, points[parent], points[joint], line, thick, cv2.LINE_AA, 4)
     for joint in _ENDS:
         if depths[joint] > NEAR:
-            cv2.circle(
-                image,
-                points[joint],
-                16 * (thick + 1),
-                SIDE_COLOURS[SIDES[joint]],
-                -1,
-                cv2.LINE_AA,
-                4,
-            )
+            colour_of_side = SIDE_COLOURS[SIDES[joint]]
+            radius = 16 * (thick + 1)
+            cv2.circle(image, points[joint], radius, colour_of_side, -1, cv2.LINE_AA, 4)
 
 
 def _cones(
     body: Body, camera: Camera, pose: Array, translation: Array
 ) -> Iterator[tuple[int, Array, Array, float]]:
-    """Yield bones before a camera, far ones first: number, pixels of both ends, radii there, and shade."""
+    """Yield the bones before a camera, far ones first.
+
+    Each has its number, the pixels of its ends (2, 2), its radii there (2,), and its
+    shade.
+    """
     pixels, depths = camera.project(body.skeleton.joints(pose, translation))
-    # as in the cost, where the two focal lengths differ
+    # the same scale as in the cost if the two focal lengths differ
     scale = np.sqrt(camera.focal.prod()) / depths
     for bone in np.argsort(-(depths[_STARTS] + depths[1:])):
         ends = [int(_STARTS[bone]), int(bone) + 1]
         if depths[ends].min() <= NEAR:
             continue
-        shade = (
-            1.0
-            - 0.25 * float(np.clip(depths[ends].mean() - depths[0], -0.4, 0.4)) / 0.4
-        )
+        # bones that are nearer than the root are lighter, so that depth can be seen
+        behind = float(np.clip(depths[ends].mean() - depths[0], -0.4, 0.4))
+        shade = 1.0 - 0.25 * behind / 0.4
         yield int(bone), pixels[ends], body.radii[bone] * scale[ends], shade
 
 
@@ -215,7 +214,7 @@ def _cone(
     image: Image, centres: Array, radii: Array, colour: Any, solid: float
 ) -> None:
     hull = _hull(centres, radii)
-    # what is behind it, where it is not solid: no more of the picture than it can touch
+    # only the part of the picture that the cone can touch is copied and blended
     left, top, wide, high = cv2.boundingRect(hull // 16)
     part = image[
         max(top - 2, 0) : max(top + high + 3, 0),

@@ -1,4 +1,7 @@
-"""The files of a track: a format is a line of `WRITERS`; pictures are made frame by frame, after everything else."""
+"""The files of a track. Each format is one line of `WRITERS`.
+
+Pictures are made last, frame by frame.
+"""
 
 import csv
 import errno
@@ -63,7 +66,7 @@ def _write_table(path: Path, content: Content) -> None:
 
 
 def _cell(name: str, value: Any) -> Any:
-    """Return what a table has for a value: micrometres of places, nothing of what is unknown."""
+    """Return a value as a table cell: places to a micrometre, unknown values empty."""
     if isinstance(value, str | None):
         return value
     if np.isnan(value):
@@ -73,8 +76,8 @@ def _cell(name: str, value: Any) -> Any:
 
 VIDEO = "overlay.mp4"
 Write = Callable[[Path, Content], None]
-# What a file is called where a user chooses some, its name, and what writes it; pictures are made frame by frame. A
-# format joins by a line.
+# For each kind of file, the name by which a user chooses it: the file's name and its
+# writer. Pictures have no writer, because they are made frame by frame.
 WRITERS: Mapping[str, tuple[str, Write | None]] = {
     "npz": ("poses.npz", _write_npz),
     "asf": ("skeleton.asf", lambda path, track: write_asf(path, track.motion.skeleton)),
@@ -118,7 +121,7 @@ WRITERS: Mapping[str, tuple[str, Write | None]] = {
     "html": ("track.html", None),
 }
 FILES = tuple(name for name, _ in WRITERS.values())
-# it says that a folder is a track's, and may be replaced by another
+# written in any case: it marks the folder as a track's, which `force` may replace
 ALWAYS = "summary"
 
 
@@ -130,21 +133,21 @@ def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
     """Return the kinds of files that a track writes, in the order of `WRITERS`.
 
     Args:
-        write: Kinds such as `bvh`, or names of files such as `track.bvh`; a text may have several, with commas between.
-            None of them are all.
+        write: Kinds such as `bvh`, or names of files such as `track.bvh`. A string may
+            have several, separated by commas. If empty, all kinds are chosen.
 
     Returns:
-        Kinds; `summary` is among them.
+        The kinds, always with `summary`.
 
     Raises:
-        InputError: A kind is not known.
+        InputError: A kind is unknown.
 
     """
     parts = [write] if isinstance(write, str) else list(write)
     if not all(isinstance(part, str) for part in parts):
         raise InputError(f"write must be names of files, got {quoted(write)}")
     named = {file: kind for kind, (file, _) in WRITERS.items()}
-    words = [word.strip() for part in parts for word in part.split(",")]
+    words = [word.strip() for word in ",".join(parts).split(",")]
     kinds = {named.get(word, word) for word in words if word}
     for kind in kinds:
         if kind not in WRITERS:
@@ -156,14 +159,17 @@ def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
 
 
 class _Attempt:
-    """Makes something that the poses do not depend on, step by step; after a step that fails it does nothing."""
+    """Makes a file that the poses do not depend on, step by step.
+
+    After a step that failed, the others are skipped.
+    """
 
     def __init__(self, *, wanted: bool = True) -> None:
         self._wanted = wanted
-        self.failure = ""  # of the step that failed
+        self.failure = ""  # the message of the step that failed
 
     def run(self, step: Callable[..., _Made], *arguments: Any) -> _Made | None:
-        """Return what a step returns, or None if it or an earlier one failed, or nothing is wanted."""
+        """Return the result of a step, or None if one failed or nothing is wanted."""
         if self.failure or not self._wanted:
             return None
         try:
@@ -175,7 +181,7 @@ class _Attempt:
             return None
 
     def finish(self, path: Path) -> str:
-        """Return why a file is missing, empty where it is not; nothing half-written is left."""
+        """Return why a file is missing, or "". Removes a half-written file."""
         if not self.failure:
             return ""
         path.unlink(missing_ok=True)
@@ -183,7 +189,10 @@ class _Attempt:
 
 
 def video_warning(folder: Path, scene: Scene) -> str:
-    """Return why there will be no video of a scene's track, as far as writing one frame to the folder shows."""
+    """Return why there will be no video of a scene's track, or "" if there will.
+
+    One frame is written to the folder as a trial.
+    """
     path = folder / VIDEO
     width, height = Painter(scene).size
     attempt = _Attempt()
@@ -202,9 +211,9 @@ def write_files(
     """Write files of a track to a folder, the pictures last.
 
     Args:
-        folder: That exists.
-        content: What the files are made of.
-        kinds: Of `chosen_kinds`.
+        folder: An existing folder.
+        content: The data of the track.
+        kinds: The kinds of files, as `chosen_kinds` returns them.
 
     Returns:
         A warning for each picture that could not be made.
@@ -219,7 +228,10 @@ def write_files(
 
 
 def _write_pictures(folder: Path, content: Content, kinds: Sequence[str]) -> list[str]:
-    """Write the video, the summary and the page in one pass through the footage; return a warning for each missing."""
+    """Write the video, the summary and the page in one pass through the footage.
+
+    Returns a warning for each of them that is missing.
+    """
     scene = content.scene
     table = content.table
     stills = Stills(scene)
@@ -253,14 +265,13 @@ def _write_pictures(folder: Path, content: Content, kinds: Sequence[str]) -> lis
     summary.run(_write_png, folder / "summary.png", image)
     document = page.run(lambda: track_document(track_data(content, stills)))
     page.run(_write_page, folder / "track.html", document)
-    missing = [
-        attempt.finish(folder / WRITERS[kind][0])
-        for kind, attempt in zip(
-            ("mp4", "png", "html"), (video, summary, page), strict=True
-        )
-        if kind in kinds
-    ]
-    return [*warnings, *filter(None, missing)]
+    attempts = {"mp4": video, "png": summary, "html": page}
+    for kind, attempt in attempts.items():
+        if kind not in kinds:
+            continue
+        if warning := attempt.finish(folder / WRITERS[kind][0]):
+            warnings.append(warning)
+    return warnings
 
 
 def _write_frame(writer: VideoWriter, image: Image | None) -> None:
@@ -289,11 +300,14 @@ def page_of(content: Content) -> str:
 
 
 def _filmed(scene: Scene, warnings: list[str]) -> Iterator[Image | None]:
-    """Yield the picture of each frame, then None for ever: there is no footage, or it cannot be read to its end."""
+    """Yield the picture of each frame, then None without end.
+
+    None stands for missing footage, or for footage that cannot be read to its end.
+    """
     if scene.pictures is not None:
         try:
             yield from scene.pictures()
-        except Exception as error:  # a file may have been moved meanwhile
+        except Exception as error:  # for example because the file was moved meanwhile
             words = cut(" ".join(str(error).split()))
             warnings.append(f"the footage could not be read again: {words}")
     yield from repeat(None)

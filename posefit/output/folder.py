@@ -1,7 +1,8 @@
-"""The folder a track leaves behind: it appears whole under its name, or not at all.
+"""The output folder of a track, which appears under its name only when it is complete.
 
-Until it is whole it stands beside its place, hidden, with every frame that was estimated so far. Where a track ends too
-early, because a disk is full or it is stopped, those frames are kept, and the same track can go on from them.
+Until then a hidden folder next to it holds the frames that were estimated so far. If
+a track is interrupted, because the disk is full or a user stops it, these frames are
+kept, and the same track can be resumed from them.
 """
 
 import os
@@ -29,14 +30,14 @@ from posefit.reading import cut, parsed_json, read_text
 RECORD = "frames.jsonl"
 SUMMARY = "summary.json"
 MAX_SUMMARY_BYTES = 10_000_000
-# what a filter carries from the latest frame, and from the one before it
+# what a filter carries from the latest frame, and from the frame before that
 CARRIED_FILES = ("carried-0.npz", "carried-1.npz")
-# the names of what a track writes to its folder
+# the names of all files that a track writes to its folder
 _WRITTEN = (*FILES, RECORD, *CARRIED_FILES)
 
 
 class Recorder:
-    """Where the frames of a track are recorded as they come; here nowhere."""
+    """Records the frames of a track as they come. This base class records nothing."""
 
     def __enter__(self) -> Self:
         return self
@@ -44,26 +45,28 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, _: object
     ) -> None:
-        """Nothing has to be closed."""
+        """Close nothing: this class keeps nothing open."""
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
-        """Return the frames that were recorded before, and the state of the random generator after them."""
+        """Return the frames recorded before, and the random state after the last."""
         return [], None
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
-        """Record a frame, and the state of the random generator after it."""
+        """Record a frame, and the random state after it."""
 
     def begin(self, scene: Scene) -> None:
-        """Say before the work what of a scene's track cannot be written."""
+        """Warn before the work if some file of a scene's track cannot be written."""
 
     def finish(self, content: Content) -> None:
         """Write everything."""
 
 
 class OutputFolder(Recorder):
-    """Writes beside the target and renames at the end. Raises InputError where the target may not be written.
+    """Writes to a hidden folder next to the target, and renames it at the end.
 
-    `spec` is what a track has to have in common with the one that it resumes, and `kinds` are those of `chosen_kinds`.
+    `spec` has the arguments that a track must share with the track that it resumes.
+    `kinds` are the kinds of files, as `chosen_kinds` returns them. Raises InputError if
+    the target may not be written.
     """
 
     def __init__(
@@ -75,10 +78,12 @@ class OutputFolder(Recorder):
         log: Callable[[str], None],
         kinds: Sequence[str] = tuple(WRITERS),
     ) -> None:
-        self.path, self._spec, self._log = Path(path), dict(spec), log
+        self.path = Path(path)
+        self._spec = dict(spec)
+        self._log = log
         self._kinds = kinds
         self._recorded = 0
-        self._slot = 0  # of the carried files, the one that is written next
+        self._slot = 0  # the index of the carried file that is written next
         self._force = force
         _check_target(self.path, force)
         self._unfinished = _interrupted(self.path, self._spec) if resume else None
@@ -90,7 +95,7 @@ class OutputFolder(Recorder):
                     earlier.remove(_WRITTEN)
                 self._unfinished = Unfinished.begin(self.path, self._spec)
             self.building = self._unfinished.path
-            # now, so that they are kept whatever fails before the first new frame
+            # read now, so that they are kept whatever fails before the first new frame
             frames, state, damage = read_frames(self.building / RECORD)
         except OSError as error:
             raise InputError(
@@ -101,7 +106,7 @@ class OutputFolder(Recorder):
         latest = -1
         for slot, name in enumerate(CARRIED_FILES):
             kept = read_carried(self.building / name)
-            # one of a frame that was not recorded any more counts for nothing
+            # ignore a file that belongs to a frame which was never recorded
             if kept is not None and latest < kept[0] < len(frames):
                 latest = kept[0]
                 self._slot = 1 - slot
@@ -130,14 +135,17 @@ class OutputFolder(Recorder):
         if self._recorded:
             for name in FILES:
                 (self.building / name).unlink(missing_ok=True)
-            notice = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
+            notice = (
+                f"; {self._recorded} finished frames are kept: "
+                "the same command with --resume continues from there"
+            )
             self._unfinished.close()
         else:
             self._unfinished.remove(_WRITTEN)
         if isinstance(error, OSError):
-            came = f"{error.strerror or error}{notice}"
+            cause = f"{error.strerror or error}{notice}"
             raise InputError(
-                f"{self.path}: expected room to write to, got {came}"
+                f"{self.path}: expected room to write to, got {cause}"
             ) from error
         if notice and isinstance(error, InputError):
             raise InputError(f"{error}{notice}") from error
@@ -145,14 +153,14 @@ class OutputFolder(Recorder):
             self._log(notice[2:])
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
-        """Return the frames that were recorded before, and the state of the random generator after them."""
+        """Return the frames recorded before, and the random state after the last."""
         frames, state = self._earlier
         return list(frames), state
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
-        """Record a frame, and the state of the random generator after it."""
+        """Record a frame, and the random state after it."""
         if (kept := frame.details.get(CARRIED)) is not None:
-            # the one before it stays until the frame is recorded
+            # the other file, of the frame before, is kept until this frame is recorded
             write_carried(
                 self.building / CARRIED_FILES[self._slot], self._recorded, kept
             )
@@ -161,68 +169,66 @@ class OutputFolder(Recorder):
         self._recorded += 1
 
     def begin(self, scene: Scene) -> None:
-        """Say before the work what of a scene's track cannot be written."""
+        """Warn before the work if the video of a scene's track cannot be written."""
         if "mp4" not in self._kinds:
             return
         if warning := video_warning(self.building, scene):
             self._log(f"{WARNING}{warning}")
 
     def finish(self, content: Content) -> None:
-        """Write everything, but for pictures that cannot be made: the poses do not depend on them."""
+        """Write everything, with a warning for each picture that cannot be made."""
         for warning in write_files(self.building, content, self._kinds):
             self._log(f"{WARNING}{warning}")
 
 
 def _check_target(path: Path, force: bool) -> None:
-    """Raise InputError where a folder may not be written under a name, before the work."""
-    opencv_name(path)  # it writes no other name
+    """Raise InputError if no folder may be written at a path."""
+    opencv_name(path)  # raises if OpenCV cannot write to the path
     if not os.path.lexists(path):
         return
     if path.is_symlink() or not path.is_dir():
-        came = "a link" if path.is_symlink() else "a file"
-        raise InputError(f"{path}: expected a folder to write to, got {came}")
+        found = "a link" if path.is_symlink() else "a file"
+        raise InputError(f"{path}: expected a folder to write to, got {found}")
     if not force:
         raise InputError(
             f"{path}: expected a new folder, got one that exists; --force replaces it"
         )
     if others := other_entries(path, _WRITTEN) or _unmarked(path):
-        came = f"one with {cut(others[0])}, which is none of posefit's"
+        found = f"one with {cut(others[0])}, which posefit did not write"
         raise InputError(
-            f"{path}: expected a folder of earlier results to replace, got {came}"
+            f"{path}: expected a folder of earlier results to replace, got {found}"
         )
 
 
 def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
-    """Return the unfinished folder of the track that goes on: the latest with the same arguments."""
+    """Return the latest unfinished folder of a track with the same arguments."""
     interrupted = Unfinished.interrupted(path)
     if not interrupted:
-        raise InputError(
-            f"{path}: expected a track that was interrupted to resume, got none"
-        )
+        raise InputError(f"{path}: expected an interrupted track to resume, got none")
     try:
         others = [difference(folder.info, spec) for folder in interrupted]
     except (AttributeError, TypeError):
         raise InputError(
-            f"{interrupted[0].path / MARK}: expected the arguments of a track, got others"
+            f"{interrupted[0].path / MARK}: expected the arguments of a track, "
+            "got something else"
         ) from None
-    place = interrupted[others.index(None)] if None in others else None
+    resumed = interrupted[others.index(None)] if None in others else None
     for folder in interrupted:
-        if folder is not place:
+        if folder is not resumed:
             folder.close()
-    if place is None:
+    if resumed is None:
         raise InputError(f"{path}: {others[0]}")
-    return place
+    return resumed
 
 
 def _unmarked(folder: Path) -> list[str]:
-    """Return the files of a folder whose summary is not one of a track: somebody else's."""
+    """Return the files of a folder, or nothing if its summary is one of a track."""
     names = sorted(entry.name for entry in folder.iterdir())
     try:
         summary = parsed_json(read_text(folder / SUMMARY, MAX_SUMMARY_BYTES))
     except (OSError, ValueError):
         return names
-    marked = (
-        isinstance(summary, dict)
-        and {"version", "method", "evaluations", "trust"} <= summary.keys()
-    )
-    return [] if marked else names
+    keys = {"version", "method", "evaluations", "trust"}
+    if isinstance(summary, dict) and keys <= summary.keys():
+        return []
+    return names

@@ -1,4 +1,7 @@
-"""Whether two tracks are the same: their arguments are compared by content, as cells of a sweep are."""
+"""Compares the arguments of two tracks by their content, not by their objects.
+
+A track can only be resumed with the same arguments.
+"""
 
 import hashlib
 import json
@@ -13,13 +16,17 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.reading import cut
 
-# of one argument of a track: its "text" in a message, the SHA-256 of its content as
-# "digest"
+# one argument of a track: "text" is its wording in messages, and "digest" is the
+# SHA-256 of its content
 Digest = dict[str, str]
 
 
 def digest_of(value: Any, files: bool = False) -> Digest:
-    """Return what a value is; with `files`, a text that names a file or folder is what that holds."""
+    """Return the digest of a value.
+
+    With `files`, a string that names a file or folder counts as the content of that
+    file or folder.
+    """
     content = json.dumps(_plain(value, files), sort_keys=True, separators=(",", ":"))
     return {
         "text": cut(repr(value)),
@@ -28,21 +35,28 @@ def digest_of(value: Any, files: bool = False) -> Digest:
 
 
 def difference(before: Mapping[str, Digest], now: Mapping[str, Digest]) -> str | None:
-    """Return a sentence about the first argument in which two tracks differ, or None where there is none."""
+    """Return a sentence about the first argument that differs, or None if all agree."""
     for name in sorted(before.keys() | now.keys()):
         earlier = before.get(name, {})
         later = now.get(name, {})
+        if earlier.get("digest") == later.get("digest"):
+            continue
         expected = earlier.get("text")
-        came = later.get("text")
-        if earlier.get("digest") != later.get("digest"):
-            if expected == came:
-                return f"{name} must be {expected} as it was, to resume, got one with another content"
-            return f"{name} must be {expected}, as before, to resume, got {came}"
+        found = later.get("text")
+        if expected == found:
+            return (
+                f"{name} must be {expected}, as before, to resume, "
+                "got other content under that name"
+            )
+        return f"{name} must be {expected}, as before, to resume, got {found}"
     return None
 
 
 def _plain(value: Any, files: bool) -> Any:
-    """Return what a value consists of, as JSON holds it: equal for equal contents, whatever the objects are."""
+    """Return the content of a value as JSON can hold it.
+
+    Values with equal content give equal results, even if they are different objects.
+    """
     same = partial(_plain, files=files)
     if value is None or isinstance(value, bool | int | float):
         return value
@@ -50,52 +64,37 @@ def _plain(value: Any, files: bool) -> Any:
         return ["text", str(value), _content(Path(value)) if files else None]
     if isinstance(value, np.ndarray | np.generic):
         array = np.ascontiguousarray(value)
-        return [
-            "array",
-            str(array.dtype),
-            list(array.shape),
-            hashlib.sha256(array.tobytes()).hexdigest(),
-        ]
+        digest = hashlib.sha256(array.tobytes()).hexdigest()
+        return ["array", str(array.dtype), list(array.shape), digest]
     if isinstance(value, Mapping):
-        return [
-            "mapping",
-            sorted([str(name), same(item)] for name, item in value.items()),
-        ]
-    if isinstance(value, Sequence | set | frozenset):
-        return [
-            "sequence",
-            [
-                same(item)
-                for item in (value if isinstance(value, Sequence) else sorted(value))
-            ],
-        ]
+        pairs = [[str(name), same(item)] for name, item in value.items()]
+        return ["mapping", sorted(pairs)]
+    if isinstance(value, set | frozenset):
+        value = sorted(value)
+    if isinstance(value, Sequence):
+        return ["sequence", [same(item) for item in value]]
     kind = f"{type(value).__module__}.{type(value).__qualname__}"
     if isinstance(value, partial):
         return [kind, same(value.func), same(value.args), same(value.keywords)]
     if isinstance(value, type | Callable):  # type: ignore[arg-type]
-        return [
-            "named",
-            getattr(value, "__module__", ""),
-            getattr(value, "__qualname__", kind),
-        ]
+        module = getattr(value, "__module__", "")
+        return ["named", module, getattr(value, "__qualname__", kind)]
     if is_dataclass(value):
-        return [
-            kind,
-            [[field.name, same(getattr(value, field.name))] for field in fields(value)],
-        ]
+        names = [field.name for field in fields(value)]
+        return [kind, [[name, same(getattr(value, name))] for name in names]]
     attributes = getattr(value, "__dict__", None)
     return [kind, same(attributes) if attributes is not None else repr(value)]
 
 
 def _content(path: Path) -> Any:
-    """Return the SHA-256 of a file, of a folder those of its files, or None where there is nothing."""
+    """Return the SHA-256 of a file, or the names and SHA-256 of a folder's files.
+
+    Returns None if nothing exists at the path.
+    """
     try:
         if path.is_dir():
-            return [
-                [file.name, _content(file)]
-                for file in sorted(path.iterdir())
-                if file.is_file()
-            ]
+            files = [entry for entry in sorted(path.iterdir()) if entry.is_file()]
+            return [[file.name, _content(file)] for file in files]
         if not path.is_file():
             return None
         with path.open("rb") as file:

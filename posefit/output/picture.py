@@ -1,7 +1,7 @@
-"""Pictures of a track: the observed silhouette with the fitted body on it, beside a view of the body from its side.
+"""Pictures of a track: the fitted body on the observed silhouette, and from its side.
 
-Where a method reports its uncertainty, uncertain limbs are faint, another mode is drawn as thin bones, and lost
-frames have a border.
+If a method reports its uncertainty, uncertain limbs are faint, another mode is drawn as
+thin bones, and lost frames have a border.
 """
 
 import math
@@ -39,48 +39,49 @@ from posefit.silhouette.foreground import Image
 from posefit.uncertainty.calibration import MAIN_LEVEL
 from posefit.uncertainty.modes import Mode, other_mode, other_modes
 
-Row = Mapping[str, float]  # of a table
+Row = Mapping[str, float]  # one row of a table
 PANEL = 480  # pixels high
-# times the panels' height that a picture is wide at most, as MPEG-4 has no frames of
-# more than 8,191 pixels; wider ones are lower
+# the greatest ratio of a picture's width to its height, because MPEG-4 allows at most
+# 8,191 pixels; wider pictures get a smaller height
 MAX_ASPECT = 4
-MIN_OVERLAY = 240  # pixels of its width, so that there is room for the words
-# of neither, the mask, the body, and both
+MIN_OVERLAY = 240  # pixels of width, so that the words fit
+# the colours of the background, mask only, body only, and both
 OVERLAP = np.array([BACKGROUND, MISSED, SPILLED, BOTH], dtype=np.uint8)
 SUMMARY_STILLS = 6  # frames on the summary
-SUMMARY_SCALE = 0.65  # of its words, which a page shows at three quarters of their size
-LABEL_HEIGHT = 38  # pixels that the label stands on
-SOLID = 0.65  # how much of the footage the body hides
-MIN_OTHER_WEIGHT = 0.2  # above which another mode is drawn
-# other modes on the summary of a single frame, at most, and their least weight
+SUMMARY_SCALE = 0.65  # of its text, which a page shows at three quarters of its size
+LABEL_HEIGHT = 38  # pixels of the strip behind the label
+SOLID = 0.65  # the opacity of the body over the footage
+MIN_OTHER_WEIGHT = 0.2  # modes with less weight are not drawn
+# the most other modes on the summary of a single frame, and their least weight
 ALTERNATIVES = 3
 MIN_WEIGHT = 0.05
 BORDER = 6  # pixels around a lost frame
 LINE_HEIGHT = 22  # pixels from one line to the next
-# a curve ends at twice what nine in ten frames have at most; what is above is a peak
+# the top of a curve is twice the 0.9 quantile; values above it are peaks
 PEAK = 2.0
 PEAK_QUANTILE = 0.9
-MAX_PEAKS = 3  # that are named
+MAX_PEAKS = 3  # this many peaks are named
 
 
 class Painter:
-    """Paints frame after frame; keeps small stills of a few of them for the summary, of those that are `usable`."""
+    """Paints frame after frame, and keeps small stills of a few for the summary.
+
+    The stills are of `usable` frames, if there are any.
+    """
 
     def __init__(self, scene: Scene, usable: Sequence[bool] = ()) -> None:
         self._scene = scene
-        # as many columns of cameras as rows, or one more
+        # the grid of cameras has as many columns as rows, or one more
         self._columns = math.ceil(math.sqrt(len(scene.cameras)))
         self._panel = PANEL // math.ceil(len(scene.cameras) / self._columns)
-        widths = [
-            panel_size(camera.width, camera.height, self._panel)[0]
-            for camera in scene.cameras
-        ]
-        # even, as a video's width has to be
-        self._widest = max(*widths, MIN_OVERLAY // self._columns // 2 * 2)
+        # the width of a video must be even
+        self._widest = MIN_OVERLAY // self._columns // 2 * 2
+        for camera in scene.cameras:
+            width, _ = panel_size(camera.width, camera.height, self._panel)
+            self._widest = max(self._widest, width)
         shown = np.flatnonzero(usable) if any(usable) else np.arange(scene.count)
-        self._wanted = np.unique(
-            shown[np.linspace(0, len(shown) - 1, SUMMARY_STILLS).round().astype(int)]
-        ).tolist()
+        spaced = np.linspace(0, len(shown) - 1, SUMMARY_STILLS).round().astype(int)
+        self._wanted = np.unique(shown[spaced]).tolist()
         self._stills: list[Image] = []
         self._count = 0
 
@@ -97,59 +98,62 @@ class Painter:
         filmed: Image | None = None,
         radii: Array | None = None,
     ) -> Image:
-        """Return the picture (height, width, 3) of a frame: on what was `filmed`, or on the masks.
+        """Return the picture (height, width, 3) of the next frame.
 
-        `radii` (levels, 27) are those of its joints' intervals, where it has a posterior.
+        Args:
+            frame: The estimate.
+            observation: The masks.
+            row: The frame's row of the table.
+            filmed: The footage, or None to draw on the masks.
+            radii: The radii (levels, 27) of the joints' intervals, or None if the frame
+                has no posterior.
+
         """
         skeleton = self._scene.body.skeleton
         solid = None if radii is None else opacities(radii[MAIN_LEVEL])
         other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
         image = self._panels(frame, observation, filmed, solid, other)
-        others = (
-            other_modes(skeleton, frame.modes, frame.pose)
-            if self._scene.count == 1
-            else []
-        )
+        others: list[Mode] = []
+        if self._scene.count == 1:
+            others = other_modes(skeleton, frame.modes, frame.pose)
         if self._count in self._wanted:
-            weight = sum(mode.weight for mode in frame.modes) - sum(
-                mode.weight for mode in others
-            )
-            self._stills.append(
-                self._still(image, row, f", {100.0 * weight:.0f} %" if others else "")
-            )
-        for mode in [mode for mode in others if mode.weight > MIN_WEIGHT][
-            :ALTERNATIVES
-        ]:
+            share = ""
+            if others:
+                all_weights = sum(mode.weight for mode in frame.modes)
+                weight = all_weights - sum(mode.weight for mode in others)
+                share = f", {100.0 * weight:.0f} %"
+            self._stills.append(self._still(image, row, share))
+        alternatives = [mode for mode in others if mode.weight > MIN_WEIGHT]
+        for mode in alternatives[:ALTERNATIVES]:
             alternative = replace(frame, pose=mode.pose, translation=mode.translation)
             still = self._panels(alternative, observation, filmed)
-            self._stills.append(
-                _labelled(still, f"or this, {100.0 * mode.weight:.0f} %")
-            )
+            words = f"or this, {100.0 * mode.weight:.0f} %"
+            self._stills.append(_labelled(still, words))
         label = [
             f"frame {self._scene.first + self._count}",
             f"cost {row['cost']:.2f}",
             f"IoU {row['iou']:.3f}",
         ]
-        label += (
-            [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
-        )
-        label += [] if observation.usable else ["pose held"]
-        image[:LABEL_HEIGHT] //= 4  # so that the label stands out from a bright sky
+        if "error_degrees" in row:
+            label.append(f"error {row['error_degrees']:.2f} deg")
+        if not observation.usable:
+            label.append("pose held")
+        # darkened, so that the label can be read on a bright sky
+        image[:LABEL_HEIGHT] //= 4
         write(image, "   ".join(label), (12, 26))
         side_column = image.shape[1] - PANEL + 12
         write(image, "from the camera's right", (side_column, 26))
         if filmed is None or len(self._scene.cameras) > 1:
             _write_legend(image, PANEL - 14)
         lost = row["lost"] >= LOST
-        notes = [("lost", MISSED)] if lost else []
-        notes += (
-            [("left and right unknown", OTHER)] if row["unknown_sides"] == 1.0 else []
-        )
-        notes += (
-            [(f"thin: may be this, {100.0 * other.weight:.0f} %", OTHER)]
-            if other is not None
-            else []
-        )
+        notes = []
+        if lost:
+            notes.append(("lost", MISSED))
+        if row["unknown_sides"] == 1.0:
+            notes.append(("left and right unknown", OTHER))
+        if other is not None:
+            words = f"thin: may be this, {100.0 * other.weight:.0f} %"
+            notes.append((words, OTHER))
         for k, (words, colour) in enumerate(reversed(notes)):
             write(image, words, (side_column, PANEL - 14 - LINE_HEIGHT * k), colour)
         if lost:
@@ -165,7 +169,7 @@ class Painter:
         solid: Array | None = None,
         other: Mode | None = None,
     ) -> Image:
-        """Return the `overlay` of a frame, and to its right the body viewed from its side."""
+        """Return the `overlay` of a frame, with the body from its side to the right."""
         body = self._scene.body
         pose = frame.pose
         place = frame.translation
@@ -177,13 +181,11 @@ class Painter:
         return np.hstack([self.overlay(frame, observation, filmed, solid, other), side])
 
     def _still(self, image: Image, row: Row, weight: str) -> Image:
-        """Return a small picture whose words, with the `weight` of its pose, can be read in a page."""
-        worth = (
-            f"error {row['error_degrees']:.1f} deg"
-            if "error_degrees" in row
-            else f"cost {row['cost']:.1f}"
-        )
-        label = f"frame {self._scene.first + self._count}, {worth}{weight}"
+        """Return a small picture below a label, which ends with the pose's `weight`."""
+        quality = f"cost {row['cost']:.1f}"
+        if "error_degrees" in row:
+            quality = f"error {row['error_degrees']:.1f} deg"
+        label = f"frame {self._scene.first + self._count}, {quality}{weight}"
         return _labelled(image, label, row["lost"] >= LOST)
 
     def overlay(
@@ -194,9 +196,10 @@ class Painter:
         solid: Array | None = None,
         other: Mode | None = None,
     ) -> Image:
-        """Return the body on what was `filmed` by the first camera, and on the masks of the others: (height, width, 3).
+        """Return a picture (height, width, 3) of the body in all cameras' views.
 
-        On masks its bones show which side is left.
+        The body is drawn on what was `filmed` by the first camera, and on the masks of
+        the other cameras. On masks, coloured bones show which side is left.
         """
         body = self._scene.body
         pose = frame.pose
@@ -207,43 +210,36 @@ class Painter:
             if filmed is not None and number == 0:
                 drawn = filmed.copy()
                 draw_body(drawn, body, camera, pose, place, solid)
-                panel = panel_of(
-                    np.asarray(
-                        cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0),
-                        np.uint8,
-                    ),
-                    height,
-                )
+                mixed = cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0)
+                panel = panel_of(np.asarray(mixed, np.uint8), height)
                 zoomed = _zoomed(camera, panel)
             else:
                 mask = observation.silhouettes[number].mask
                 fitted = project(body, camera, pose, place)
-                panel = OVERLAP[
-                    panel_of(
-                        mask.view(np.uint8) + 2 * fitted.view(np.uint8),
-                        height,
-                        sharp=True,
-                    )
-                ]
+                # 0 for neither, 1 for the mask, 2 for the body, 3 for both
+                overlap = mask.view(np.uint8) + 2 * fitted.view(np.uint8)
+                panel = OVERLAP[panel_of(overlap, height, sharp=True)]
                 zoomed = _zoomed(camera, panel)
                 if solid is not None:
                     share = solid_map(body, zoomed, pose, place, solid)
                     faint = share < 1.0
-                    share = share[share < 1.0, None]
-                    panel[faint] = share * panel[faint] + (1.0 - share) * np.array(
-                        BACKGROUND
-                    )
+                    share = share[faint, None]
+                    behind = (1.0 - share) * np.array(BACKGROUND)
+                    panel[faint] = share * panel[faint] + behind
                 draw_bones(panel, body, zoomed, pose, place)
             if other is not None:
                 draw_bones(panel, body, zoomed, other.pose, other.translation, OTHER)
             panels.append(panel)
         panels = [_padded(panel, self._widest, height) for panel in panels]
         grid = _grid(panels, self._columns, 0)
-        # the rows of seven or more do not fill the height
+        # the rows of seven or more cameras do not fill the height exactly
         return _padded(grid, grid.shape[1], PANEL)
 
     def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:
-        """Return notes and stills, above a curve of a track's error, or of its cost where truth is unknown."""
+        """Return the notes and stills above a curve of the track.
+
+        The curve is the error, or the cost if the truth is unknown.
+        """
         grid = _grid(self._stills, 2, BACKGROUND[0])
         width = grid.shape[1]
         parts = []
@@ -260,18 +256,13 @@ class Painter:
         if self._scene.count == 1:
             return np.vstack(parts)
         name = "error_degrees" if "error_degrees" in table else "cost"
-        return np.vstack(
-            [
-                *parts,
-                curve(
-                    table[name], name.replace("_", " "), width, 180, self._scene.first
-                ),
-            ]
-        )
+        label = name.replace("_", " ")
+        parts.append(curve(table[name], label, width, 180, self._scene.first))
+        return np.vstack(parts)
 
 
 def _labelled(image: Image, label: str, lost: bool = False) -> Image:
-    """Return a picture at half its size below a label."""
+    """Return a picture at half size, below a label."""
     still = np.asarray(
         cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8
     )
@@ -283,7 +274,7 @@ def _labelled(image: Image, label: str, lost: bool = False) -> Image:
 
 
 def _draw_border(image: Image, width: int) -> None:
-    # OpenCV's own thick lines are a pixel wider
+    # written here, because OpenCV's thick lines are a pixel wider
     image[:width] = image[-width:] = MISSED
     image[:, :width] = image[:, -width:] = MISSED
 
@@ -300,7 +291,10 @@ def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:
 
 
 def panel_size(width: int, height: int, panel: int) -> tuple[int, int]:
-    """Return the size, of an even width, at which a picture of some size fits into panels of some height."""
+    """Return the size of a picture in a panel `panel` pixels high; the width is even.
+
+    A picture wider than `MAX_ASPECT` times the height gets a smaller height.
+    """
     even = 2 * round(width * panel / height / 2)
     widest = MAX_ASPECT * panel
     if even > widest:
@@ -309,23 +303,26 @@ def panel_size(width: int, height: int, panel: int) -> tuple[int, int]:
 
 
 def panel_of(image: Image, height: int, sharp: bool = False) -> Image:
-    """Return a picture in a `panel_size`; a sharp one has no values between its own."""
+    """Return a picture scaled to its `panel_size`.
+
+    A `sharp` picture keeps its values; others are interpolated.
+    """
     size = panel_size(image.shape[1], image.shape[0], height)
-    how = (
-        cv2.INTER_NEAREST
-        if sharp
-        else cv2.INTER_AREA
-        if size[1] < image.shape[0]
-        else cv2.INTER_LINEAR
-    )
-    return np.asarray(cv2.resize(image, size, interpolation=how), dtype=np.uint8)
+    if sharp:
+        interpolation = cv2.INTER_NEAREST
+    elif size[1] < image.shape[0]:
+        interpolation = cv2.INTER_AREA
+    else:
+        interpolation = cv2.INTER_LINEAR
+    scaled = cv2.resize(image, size, interpolation=interpolation)
+    return np.asarray(scaled, dtype=np.uint8)
 
 
 def _zoomed(camera: Camera, panel: Image) -> Camera:
-    """Return a camera that sees the same in a panel."""
+    """Return the camera for a picture that was scaled to a panel."""
     height, width = panel.shape[:2]
     zoom = np.array([width / camera.width, height / camera.height])
-    # whole pixels may take a camera beyond the longest or the shortest lens
+    # rounding to whole pixels may lead beyond the longest or the shortest lens
     shortest, longest = np.multiply(FOCALS, max(width, height))
     return replace(
         camera,
@@ -337,55 +334,51 @@ def _zoomed(camera: Camera, panel: Image) -> Camera:
 
 
 def _padded(image: Image, width: int, height: int) -> Image:
-    """Return a picture with black to its right and below it, of some size."""
+    """Return a picture enlarged to a size, with black to its right and below it."""
     right = width - image.shape[1]
     below = height - image.shape[0]
     return np.pad(image, ((0, below), (0, right), (0, 0)))
 
 
 def _grid(panels: list[Image], columns: int, background: int) -> Image:
-    panels = panels + [np.full_like(panels[0], background)] * (-len(panels) % columns)
-    return np.vstack(
-        [np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)]
-    )
+    """Return panels side by side in rows; the last row is filled with `background`."""
+    missing = -len(panels) % columns
+    panels = panels + [np.full_like(panels[0], background)] * missing
+    rows = [np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)]
+    return np.vstack(rows)
 
 
 def curve(values: Array, name: str, width: int, height: int, first: int = 0) -> Image:
-    """Return a plot (height, width, 3) of values (T,), one a frame, from 0 up; peaks above its top are named."""
+    """Return a plot (height, width, 3) of values (T,), one per frame, from 0 up.
+
+    Peaks above the top of the plot are named in its title.
+    """
     image = blank(height, width)
     left = 66
     right = width - 16
     limit = PEAK * float(np.quantile(values, PEAK_QUANTILE))
-    # one a run of frames, the highest first
-    peaks = sorted(
-        (
-            start + int(values[start:stop].argmax())
-            for start, stop in runs(values > limit)
-        ),
-        key=lambda k: -values[k],
-    )
+    # one peak per run of frames above the limit, the highest first
+    peaks = []
+    for start, stop in runs(values > limit):
+        peaks.append(start + int(values[start:stop].argmax()))
+    peaks.sort(key=lambda k: -values[k])
     top = limit if peaks and limit > 0.0 else float(values.max())
     scale = (height - 56) / (max(top, 1e-9) * 1.15)
     for lines, level in enumerate((0.0, float(np.mean(values)), top)):
         row = int(height - 24 - level * scale)
         cv2.line(image, (left, row), (right, row), LINES, 1)
-        write(
-            image,
-            f"{level:.2f}",
-            (8, min(row, height - 24 - lines * LINE_HEIGHT) + 6),
-            scale=SUMMARY_SCALE - 0.1,
-        )
+        # labels keep a line's distance, even if their levels are closer
+        text_row = min(row, height - 24 - lines * LINE_HEIGHT) + 6
+        write(image, f"{level:.2f}", (8, text_row), scale=SUMMARY_SCALE - 0.1)
     x = np.linspace(left, right, max(len(values), 2))[: len(values)]
-    points = np.rint(
-        np.column_stack([x, height - 24 - scale * np.minimum(values, 1.1 * top)]) * 16
-    ).astype(np.int32)
+    y = height - 24 - scale * np.minimum(values, 1.1 * top)  # (T,)
+    points = np.rint(np.column_stack([x, y]) * 16).astype(np.int32)
     cv2.polylines(image, [points], False, BOTH, 2, cv2.LINE_AA, 4)
     words = "mean and maximum"
     if top == limit:
-        named = ", ".join(
-            f"{values[k]:.1f} in frame {first + k}" for k in peaks[:MAX_PEAKS]
-        )
-        more = f" and {len(peaks) - MAX_PEAKS} more" if len(peaks) > MAX_PEAKS else ""
-        words = f"mean, and the top; above it {named}{more}"
+        named = [f"{values[k]:.1f} in frame {first + k}" for k in peaks[:MAX_PEAKS]]
+        words = f"mean, and the top; above it {', '.join(named)}"
+        if len(peaks) > MAX_PEAKS:
+            words += f" and {len(peaks) - MAX_PEAKS} more"
     write(image, f"{name}, frame by frame: 0, {words}", (left, 20), scale=SUMMARY_SCALE)
     return image

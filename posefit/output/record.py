@@ -1,4 +1,7 @@
-"""The frames of a track as they come, a line each with its checksum: what a track that ended too early goes on from."""
+"""The record of a track's frames as they come: one line per frame, with a checksum.
+
+An interrupted track is resumed from it.
+"""
 
 import json
 import zlib
@@ -18,7 +21,7 @@ ARRAY = "number of an array"
 
 
 def append_frame(path: Path, frame: Frame, state: Mapping[str, Any]) -> None:
-    """Add a frame to a file, and the state of the random generator after it."""
+    """Append a frame to a file, with the state of the random generator after it."""
     posterior = None if frame.posterior is None else frame.posterior.as_dict()
     text = json.dumps(
         {**vars(frame), "posterior": posterior, "state": state}, default=_encoded
@@ -28,14 +31,17 @@ def append_frame(path: Path, frame: Frame, state: Mapping[str, Any]) -> None:
 
 
 def write_carried(path: Path, number: int, state: Mapping[str, Any]) -> None:
-    """Write what a filter carries from a frame, by its number: see `posefit.fitting.carried`."""
+    """Write what a filter carries from the frame of a number to the next.
+
+    See `posefit.fitting.carried`.
+    """
     arrays: list[Array] = []
 
     def apart(value: Any) -> Any:
         if isinstance(value, np.ndarray):
             arrays.append(value)
             return {ARRAY: len(arrays) - 1}
-        return value.item()  # a number of NumPy
+        return value.item()  # a NumPy number
 
     text = json.dumps({"number": number, "state": state}, default=apart)
     named = {f"array_{k}": array for k, array in enumerate(arrays)}
@@ -44,7 +50,10 @@ def write_carried(path: Path, number: int, state: Mapping[str, Any]) -> None:
 
 
 def read_carried(path: Path) -> tuple[int, dict[str, Any]] | None:
-    """Return what a filter carried from a frame, and its number; None where a file holds no such thing."""
+    """Return a frame's number and what a filter carried from it.
+
+    Returns None if the file does not exist or is damaged.
+    """
     if not path.is_file() or path.is_symlink():
         return None
     try:
@@ -57,14 +66,19 @@ def read_carried(path: Path) -> tuple[int, dict[str, Any]] | None:
 
             read = json.loads(str(file["text"]), object_hook=whole)
         return int(read["number"]), dict(read["state"])
-    except Exception:  # whatever a damaged file raises
+    except Exception:  # a damaged file may raise anything
         return None
 
 
 def read_frames(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
-    """Return the frames that a file records, the random generator's state after them, and where the file is damaged.
+    """Read the frames of a record, and cut the record off where it is damaged.
 
-    From there on it is cut off; a line that was being written when the track ended is no damage.
+    An incomplete last line, which was being written when the track ended, is no damage.
+
+    Returns:
+        The frames; the state of the random generator after them, or None if there are
+        no frames; and where the file is damaged, or "" if it is not.
+
     """
     frames = list[Frame]()
     whole_lines = list[bytes]()
@@ -74,19 +88,21 @@ def read_frames(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
     for number, line in enumerate(recorded.splitlines(keepends=True), 1):
         try:
             frame, state = _frame_of(line)
-        except Exception as error:  # whatever a damaged line raises
+        except Exception as error:  # a damaged line may raise anything
             if line.endswith(b"\n"):
-                damage = f"{path} line {number}: expected a frame, got {cut(' '.join(str(error).split()))}"
+                cause = cut(" ".join(str(error).split()))
+                damage = f"{path} line {number}: expected a frame, got {cause}"
             break
         frames.append(frame)
         whole_lines.append(line)
-    if (whole := b"".join(whole_lines)) != recorded:
+    whole = b"".join(whole_lines)
+    if whole != recorded:
         path.write_bytes(whole)
     return frames, state, damage
 
 
 def _encoded(value: Any) -> Any:
-    """Return what JSON holds of a frame's values: arrays with their type, else what it prints as."""
+    """Return a value as JSON can hold it: arrays with their type, others as text."""
     if isinstance(value, np.ndarray | np.generic):
         return {"dtype": str(value.dtype), "values": value.tolist()}
     return dict(value) if isinstance(value, Mapping) else str(value)
@@ -99,14 +115,15 @@ def _decoded(mapping: dict[str, Any]) -> Any:
 
 
 def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
-    """Return a recorded frame, and the state of the random generator after it. Raises an error where it is damaged."""
+    """Return a recorded frame and the random state after it, or raise if damaged."""
     checksum, _, text = line.rstrip(b"\n").partition(b" ")
     if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
         raise InputError("a damaged one")
     row = json.loads(text, object_hook=_decoded)
     state = row.pop("state")
     posterior = row.pop("posterior")
-    np.random.default_rng(0).bit_generator.state = state  # raises where it is none
-    return Frame(
-        **row, posterior=None if posterior is None else Posterior.from_dict(posterior)
-    ), state
+    # raises if this is no state of a generator
+    np.random.default_rng(0).bit_generator.state = state
+    if posterior is not None:
+        posterior = Posterior.from_dict(posterior)
+    return Frame(**row, posterior=posterior), state

@@ -1,4 +1,8 @@
-"""The table a track prints: the method beside trivial ones, what was not determined, and the budget."""
+"""The text that a track prints.
+
+It compares the method with trivial ones, and names what was not determined and the
+budget.
+"""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -10,32 +14,35 @@ from posefit.evaluation.trust import trust_line
 from posefit.output.content import Content
 from posefit.reading import counted
 
-# a part of the build that is off the average by less is not worth a word
+# parts of the build that differ less from the average are not mentioned
 MIN_BUILD_CHANGE = 0.05
-MIN_MODE = 0.08  # of the weight of a pose that is worth a word
-WIDTH = 30  # of the names
-GAIT_ROWS = (  # of a foot: names, labels, units, factors and digits
+MIN_MODE = 0.08  # poses with less weight do not count as open
+WIDTH = 30  # characters of the column of names
+GAIT_ROWS = (  # the measures of a foot: name, label, unit, factor and digits
     ("step_length", "step", "m", 1.0, 2),
     ("step_seconds", "step", "s", 1.0, 2),
     ("stance_share", "stance", "%", 100.0, 0),
 )
-MAX_NAMED = 8  # motions that were learned from, and are named
+MAX_NAMED = 8  # of more training motions only the first and the last are named
 
 
 def brief(track: Content) -> list[str]:
-    """Return in lines what a track is worth, which poses a single frame leaves open, and what it took."""
+    """Return the short report of a track as lines.
+
+    They say how good the track is, which poses a single frame leaves open, and how much
+    work the track took.
+    """
     setup = track.setup
     measures = track.measures
-    worth = track.trust.sentence if track.trust is not None else _worth(measures)
-    guessed = ", camera guessed" if setup.camera == "guessed" else ""
-    work = f"{setup.motion}: {counted(setup.frames, 'frame')} by {setup.method}{guessed}, {_effort(track)}"
+    lines = [_quality(measures) if track.trust is None else track.trust.sentence]
     open_poses = sum(weight >= MIN_MODE for weight in track.log.modes or [])
-    modes = (
-        [f"one silhouette leaves {open_poses} poses open"]
-        if setup.frames == 1 and open_poses > 1
-        else []
-    )
-    return [printable(line) for line in (worth, *modes, work)]
+    if setup.frames == 1 and open_poses > 1:
+        lines.append(f"one silhouette leaves {open_poses} poses open")
+    guessed = ", camera guessed" if setup.camera == "guessed" else ""
+    frames = counted(setup.frames, "frame")
+    made_by = f"{frames} by {setup.method}{guessed}"
+    lines.append(f"{setup.motion}: {made_by}, {_effort(track)}")
+    return [printable(line) for line in lines]
 
 
 def table(track: Content) -> str:
@@ -43,28 +50,28 @@ def table(track: Content) -> str:
     setup = track.setup
     measures = track.measures
     log = track.log
-    lines = (
-        []
-        if track.trust is None
-        else [track.trust.sentence, trust_line(asdict(track.trust))]
-    )
+    lines = []
+    if track.trust is not None:
+        lines += [track.trust.sentence, trust_line(asdict(track.trust))]
     names = setup.train
-    training = (
-        ", ".join(names)
-        if len(names) <= MAX_NAMED
-        else f"{len(names)} clips, {names[0]} to {names[-1]}"
-    )
+    training = ", ".join(names)
+    if len(names) > MAX_NAMED:
+        training = f"{len(names)} clips, {names[0]} to {names[-1]}"
+    frames = counted(setup.frames, "frame")
     lines.append(
-        f"{setup.motion}: {counted(setup.frames, 'frame')}, {setup.method}, seed {setup.seed}, "
+        f"{setup.motion}: {frames}, {setup.method}, seed {setup.seed}, "
         f"translation {setup.translation}, trained on {training}"
     )
     lines += _error_lines(setup.method, measures)
     lines += filter(None, [held_frames(track), undetermined(track)])
-    lines += [gait_line(track.gait.as_dict())] if setup.frames > 1 else []
-    lines += [] if log.build is None else [_build_line(log.build)]
+    if setup.frames > 1:
+        lines.append(gait_line(track.gait.as_dict()))
+    if log.build is not None:
+        lines.append(_build_line(log.build))
     if setup.camera == "guessed":
         lines.append(
-            "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
+            "camera guessed: level, 40 degrees across; "
+            "distances and size depend on this guess and on --height"
         )
     if tracks := log.hypotheses:
         best = next(k for k, hypothesis in enumerate(tracks) if hypothesis["kept"])
@@ -76,11 +83,11 @@ def table(track: Content) -> str:
         lines.append(f"{chosen}; trajectory cost by initial guess: {', '.join(costs)}")
     speed = MEASURES["evaluations_per_second"].number(measures.evaluations_per_second)
     lines.append(f"{_effort(track)}, {speed} poses a second")
-    return "\n".join(map(printable, lines))  # the names of files are among them
+    return "\n".join(map(printable, lines))  # the lines may have names of files
 
 
 def _error_lines(method: str, measures: Measures) -> list[str]:
-    """Return the errors of a method beside those of the baselines; none where the truth is unknown."""
+    """Return the errors of a method and of the baselines, if the truth is known."""
     if measures.error_degrees is None:
         return []
     lines = [
@@ -88,10 +95,10 @@ def _error_lines(method: str, measures: Measures) -> list[str]:
         f"{method:{WIDTH}} {measures.error_degrees.mean:9.2f}",
     ]
     for name, baseline in (measures.baselines_degrees or {}).items():
-        # a dash where a baseline has no error
+        # a dash if the skill is unknown because the baseline has no error
         skill = MEASURES["skill"].number((measures.skill or {})[name])
         lines.append(f"{BASELINES[name]:{WIDTH}} {baseline:9.2f} {skill:>7}")
-    # a tracker of its own may have no prior
+    # a tracker from a plugin may have no prior
     if measures.prior_floor_degrees is not None:
         floor = MEASURES["prior_floor_degrees"]
         lines.append(
@@ -110,31 +117,39 @@ def _build_line(build: Mapping[str, Any]) -> str:
         for name, factor in build["factors"].items()
         if abs(factor - 1.0) >= MIN_BUILD_CHANGE
     ]
-    return f"build: {build['stature_m']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
+    changes = ", ".join(parts) or "nothing notable"
+    stature = f"build: {build['stature_m']:.2f} m tall"
+    return f"{stature}; compared with the average: {changes}"
 
 
 def held_frames(track: Content) -> str:
-    """Return in one sentence how many frames were not searched; empty where that is none."""
+    """Return one sentence about the frames that were not searched, or ""."""
     count = track.measures.held_frames
+    if not count:
+        return ""
     show = "frame shows" if count == 1 else "frames show"
-    what = f"{count} {show} too little of the person: the pose is held or carried on, not searched"
     return (
-        f"{what}, and may be off the person; IoU is that of the others" if count else ""
+        f"{count} {show} too little of the person: the pose is held or carried on, "
+        "not searched, and may be wrong; the IoU is that of the other frames"
     )
 
 
 def undetermined(track: Content) -> str:
-    """Return in one sentence what the method says it did not determine; empty where that is nothing."""
+    """Return one sentence about what the method did not determine, or ""."""
     sides = len(track.log.unknown_sides or ())
     lost = len(track.log.lost_frames or ())
     of = f" of {track.setup.frames}"
-    parts = [f"left and right: unknown in {_frames(sides, of)}"] if sides else []
-    parts += [f"{_frames(lost, '' if sides else of)} lost"] if lost else []
+    parts = []
+    if sides:
+        parts.append(f"left and right: unknown in {_frames(sides, of)}")
+    if lost:
+        # the number of all frames is said once
+        parts.append(f"{_frames(lost, '' if sides else of)} lost")
     return "; ".join(parts)
 
 
 def gait_line(gait: Mapping[str, Any], *, by_side: bool = True) -> str:
-    """Return one line about the gait, or why it has no figures."""
+    """Return one line about the gait, or why there are no figures of it."""
     if not gait["walk"]:
         return f"no figures of gait: {gait['why']}"
     speed = "" if gait["speed"] is None else f", {gait['speed']:.2f} m/s"
@@ -142,16 +157,21 @@ def gait_line(gait: Mapping[str, Any], *, by_side: bool = True) -> str:
         f"{label} {left} and {right} {unit}"
         for label, unit, left, right in gait_rows(gait)
     )
-    parts = [
-        f"{'gait: ' if by_side else ''}{gait['cadence']:.0f} steps a minute{speed}, over {gait['steps']} steps"
-    ]
-    parts += [f"left and right: {sides}"] if by_side else []
-    parts += [f"no lengths: {gait['why_no_lengths']}"] if gait["why_no_lengths"] else []
+    label = "gait: " if by_side else ""
+    cadence = f"{gait['cadence']:.0f} steps a minute"
+    parts = [f"{label}{cadence}{speed}, over {gait['steps']} steps"]
+    if by_side:
+        parts.append(f"left and right: {sides}")
+    if gait["why_no_lengths"]:
+        parts.append(f"no lengths: {gait['why_no_lengths']}")
     return "; ".join(parts)
 
 
 def gait_rows(gait: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return the measures of a walk by side: label, unit, left and right; those that no side has are left out."""
+    """Return the measures of a walk by side: label, unit, left and right.
+
+    A measure that is unknown on both sides is left out.
+    """
     rows = []
     for name, label, unit, factor, digits in GAIT_ROWS:
         values = [gait[side][name] for side in ("left", "right")]
@@ -164,11 +184,11 @@ def gait_rows(gait: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def _worth(measures: Measures) -> str:
-    error = MEASURES["error_degrees"].shown(
-        measures.error_degrees.mean if measures.error_degrees else None
-    )
-    return f"{_shown(measures, 'mpjpe_mm')}, {error}, {_shown(measures, 'lost_rate')} of frames"
+def _quality(measures: Measures) -> str:
+    mean = measures.error_degrees.mean if measures.error_degrees else None
+    error = MEASURES["error_degrees"].shown(mean)
+    lost = _shown(measures, "lost_rate")
+    return f"{_shown(measures, 'mpjpe_mm')}, {error}, {lost} of frames"
 
 
 def _effort(track: Content) -> str:
@@ -178,13 +198,12 @@ def _effort(track: Content) -> str:
     budget = setup.evaluations_per_frame * max(len(track.log.hypotheses), 1)
     effort = measures.effort or {"frames": measures.evaluations}
     frame = effort["frames"] / setup.frames
-    # frames that are searched again have more than one budget
+    # no budget is named if frames were searched again and so used more than one
     of = f" of {budget:,}" if frame <= budget else ""
-    others = [
-        f"{count:,} for the {stage.replace('_', ' ')}"
-        for stage, count in effort.items()
-        if stage != "frames"
-    ]
+    others = []
+    for stage, count in effort.items():
+        if stage != "frames":
+            others.append(f"{count:,} for the {stage.replace('_', ' ')}")
     besides = f" (and {', '.join(others)})" if others else ""
     evaluations = f"{frame:,.0f}{of} evaluations{besides}"
     return f"{_shown(measures, 'iou')}, {evaluations} and {seconds} ms a frame"

@@ -72,7 +72,8 @@ def _columns() -> list[Column]:
         "error with losses",
         "degrees",
         2,
-        "the error, in which a lost frame counts as the mean training pose's at least",
+        "the error, in which a lost frame counts at least as much as the mean "
+        "training pose",
     )
     skills = []
     baselines = []
@@ -132,14 +133,14 @@ SCORE = Score(
     digits=2,
     down=False,
     paired="runs",
-    caption="Mean of a method's errors with losses: a lost frame counts as the mean "
-    "training pose's error at least. "
+    caption="Mean of a method's errors with losses: a lost frame counts at least "
+    "as much as the mean training pose. "
     "The line is its 95 % interval; dashed lines are baselines. In simulated studies "
     "the interval holds the true mean in 94 to 97 %, and in 88 to 91 % where a few "
     "errors are many times as large as the others.",
     leaderboard="Each figure is the mean of a method's runs. In the error with losses "
-    "a lost frame counts as the mean training pose's at least. First come the methods "
-    "that are not worse than the one of the lowest error (p not below 0.05), those "
+    "a lost frame counts at least as much as the mean training pose. First come the "
+    "methods that are not worse than the one of the lowest error (p not below 0.05), those "
     "that lost the fewest tracks first; then the others by their error. Skill is "
     "1 − error with losses / baseline: 0 is no better than the baseline, which uses "
     "the true root and translation. ",

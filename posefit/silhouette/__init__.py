@@ -1,13 +1,15 @@
-"""Masks, and what a body's silhouette costs against one. SAPSO (3), (4).
+"""Masks, and the cost of a body's silhouette against a mask. SAPSO (3), (4).
 
 | looking for | file |
 |---|---|
-| a mask, its unknown pixels, both as bits, and at half or quarter size | mask.py |
+| a mask with unknown pixels, as bit images, and at smaller sizes | mask.py |
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
-| thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |
-| a body drawn as spans of bits, compiled | rasteriser.py |
-| its pixels counted against silhouettes, and what it leaves of them, compiled | kernels.py |
-| a person separated from a background, pixel by pixel | foreground.py |
+| work on thousands of poses shared by threads | sharing.py |
+| the count of drawn poses | drawn.py |
+| the rasteriser: a body drawn into a bit image, compiled | rasteriser.py |
+| instructions that the rasteriser needs and numba lacks | spans.py |
+| pixels of bodies counted against silhouettes, compiled | kernels.py |
+| a person separated from the background, pixel by pixel | foreground.py |
 | which pieces of a mask are one person | pieces.py |
-| what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |
+| faults of masks, simulated: holes, blobs, shadows | corruption.py |
 """

@@ -1,6 +1,7 @@
-"""What goes wrong with a silhouette on its way from a camera: holes, blobs, a cast shadow, an occluder, a rough edge.
+"""Simulated faults of masks: an occluder, holes, a rough edge, a shadow, blobs.
 
-Every corruption has a strength from 0, nothing, to 1, far more than a good extraction leaves. Sizes follow the person.
+Every corruption has a strength: 0 changes nothing, and 1 is far worse than a good
+extraction. Sizes are relative to the person.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,11 +11,12 @@ import numpy as np
 
 from posefit.silhouette.mask import Mask, box_of
 
-# how many at strength 1
+# numbers of spots at strength 1
 HOLES = 12
 BLOBS = 8
-SHADOW = 0.25  # how tall a shadow is at strength 1, as a share of the person
-EDGE = 0.02  # of the person's height: how far the edge wanders at strength 1
+# shares of the person's height at strength 1
+SHADOW = 0.25  # the height of the shadow
+EDGE = 0.02  # the reach of the wandering edge
 
 
 def corrupted(
@@ -24,9 +26,17 @@ def corrupted(
     *,
     shows: bool = True,
 ) -> Mask:
-    """Return a mask (height, width) with each corruption at its strength; one that would be empty stays as it was.
+    """Return a mask with corruptions.
 
-    A strength too small to change a pixel of this mask is doubled until it does, so that it `shows`.
+    Args:
+        mask: (height, width).
+        noise: the strength, 0 to 1, of corruptions by name; see `CORRUPTIONS`.
+        rng: the source of random numbers.
+        shows: whether a strength too small to change a pixel is doubled until it does.
+
+    Returns:
+        The corrupted mask, or `mask` itself if nothing of it would be left.
+
     """
     spoilt = mask
     for name, corrupt in CORRUPTIONS.items():
@@ -34,7 +44,7 @@ def corrupted(
         if strength > 0.0 and spoilt.any():
             before = spoilt
             spoilt = corrupt(before, strength, rng)
-            # otherwise a frame would count as damaged that is not
+            # otherwise an unchanged frame would count as damaged
             while shows and strength < 1.0 and np.array_equal(spoilt, before):
                 strength = min(2.0 * strength, 1.0)
                 spoilt = corrupt(before, strength, rng)
@@ -44,42 +54,42 @@ def corrupted(
 def _discs(
     mask: Mask, count: int, radius: float, rng: np.random.Generator, inside: bool
 ) -> Mask:
-    """Return round spots in or around the person, whose radii are about a share of the person's height."""
+    """Return `count` round spots in or around the person.
+
+    `radius` is their mean radius as a share of the person's height.
+    """
     left, top, right, bottom = box_of(mask)
+    tall = bottom - top
     drawn = np.zeros(mask.shape, dtype=np.uint8)
     where = np.argwhere(mask)
     for _ in range(count):
         if inside:
             y, x = where[rng.integers(len(where))]
         else:
-            x = rng.uniform(left - 0.3 * (bottom - top), right + 0.3 * (bottom - top))
+            x = rng.uniform(left - 0.3 * tall, right + 0.3 * tall)
             y = rng.uniform(top, bottom)
-        cv2.circle(
-            drawn,
-            (int(x), int(y)),
-            max(1, round(radius * (bottom - top) * rng.uniform(0.5, 1.5))),
-            1,
-            -1,
-        )
+        pixels = max(1, round(radius * tall * rng.uniform(0.5, 1.5)))
+        cv2.circle(drawn, (int(x), int(y)), pixels, 1, -1)  # filled
     return drawn.astype(bool)
 
 
 def holes(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
-    """Return the mask with round holes, as where clothes look like the background."""
-    return np.asarray(
-        mask & ~_discs(mask, round(HOLES * strength), 0.03, rng, inside=True)
-    )
+    """Return the mask with round holes, as if clothes matched the background."""
+    spots = _discs(mask, round(HOLES * strength), 0.03, rng, inside=True)
+    return np.asarray(mask & ~spots)
 
 
 def blobs(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
-    """Return the mask with round blobs around the person, as where something else moves."""
-    return np.asarray(
-        mask | _discs(mask, round(BLOBS * strength), 0.04, rng, inside=False)
-    )
+    """Return the mask with round blobs around the person, as if other things moved."""
+    spots = _discs(mask, round(BLOBS * strength), 0.04, rng, inside=False)
+    return np.asarray(mask | spots)
 
 
 def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
-    """Return the mask with the person's shadow on the ground, as long as `strength` times the person."""
+    """Return the mask with the person's shadow on the ground.
+
+    Its length is `strength` times the person's height.
+    """
     bottom = box_of(mask)[3]
     lean = rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 1.2) * strength
     flat = SHADOW * strength
@@ -92,7 +102,10 @@ def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
 
 
 def occluder(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
-    """Return the mask behind an upright bar, as wide as `strength` times half the person."""
+    """Return the mask behind an upright bar.
+
+    The bar's width is `strength` times half the person's width.
+    """
     left, _, right, _ = box_of(mask)
     wide = max(1, round(0.5 * strength * (right - left)))
     start = int(rng.integers(left, max(left + 1, right - wide + 1)))
@@ -111,15 +124,26 @@ def jitter(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
 def wandering(
     mask: Mask, rim: float, reach: float, length: float, rng: np.random.Generator
 ) -> Mask:
-    """Return a mask (height, width) whose border is `rim` pixels outside of where it was, and wanders around that.
+    """Return a mask with its border moved outwards and roughened.
 
-    `reach` is the standard deviation of how many pixels it wanders, and `length` the pixels over which it does.
+    Args:
+        mask: (height, width).
+        rim: how far the border moves outwards, in pixels.
+        reach: the standard deviation of the border around that, in pixels.
+        length: the length scale of the roughness, in pixels.
+        rng: the source of random numbers.
+
+    Returns:
+        The mask (height, width).
+
     """
     inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
     outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
     smooth = cv2.GaussianBlur(rng.standard_normal(mask.shape), (0, 0), length)
+    # (height, width) pixels to the border, positive inside
+    distance = inside - outside
     return np.asarray(
-        inside - outside + rim + reach * smooth / max(float(smooth.std()), 1e-9) > 0.0
+        distance + rim + reach * smooth / max(float(smooth.std()), 1e-9) > 0.0
     )
 
 

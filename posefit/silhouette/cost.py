@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array, Bits, writeable
 from posefit.errors import InputError
@@ -12,24 +11,25 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.silhouette import drawn, kernels
-from posefit.silhouette.mask import Mask, Silhouette, unpack
+from posefit.silhouette.mask import Areas, Mask, Silhouette, unpack
 from posefit.silhouette.rasteriser import View, strips_and_words
 from posefit.silhouette.sharing import parts_of, work_through
 
 SCALE = 100.0  # S
 BETA = 0.5  # beta
 
-Areas = NDArray[np.int64]  # (..., 3): R, B, Y
-# where only the areas are wanted
+# if only the areas are needed
 _NO_IMAGES: Bits = np.empty((0, 0, 0), dtype=np.uint64)
 T = TypeVar("T")
 
 
 def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
-    """Return the arguments of `kernels.count_areas` before the poses. Made once, they hold for any number of calls."""
-    return _drawing(
-        body, camera, kernels.Observed(*silhouette.bits, silhouette.pixels), _NO_IMAGES
-    )
+    """Return the arguments of `kernels.count_areas` that come before the poses.
+
+    They can be used for any number of calls.
+    """
+    observed = kernels.Observed(*silhouette.bits, silhouette.pixels)
+    return _drawing(body, camera, observed, _NO_IMAGES)
 
 
 def _drawing(
@@ -43,7 +43,8 @@ def _drawing(
         camera.width,
         camera.height,
     )
-    return body.skeleton.chain, body.radii, view, observed, images
+    chain = tuple(body.skeleton.chain)
+    return chain, body.radii, tuple(view), tuple(observed), images
 
 
 def areas(
@@ -54,13 +55,28 @@ def areas(
     translations: Array,
     threads: int = 1,
 ) -> Areas:
-    """Return R, B, Y (n, 3) in pixels of poses (n, 66) with their root at translations (n, 3). SAPSO (3).
+    """Return the areas R, B, Y of poses. SAPSO (3).
 
-    R is silhouette without body, B body without silhouette, Y both; unknown pixels are in none. A bone with an end
-    nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`. They are made on
-    the silhouette's device. Raises InputError where shapes do not fit or poses are not finite.
+    R is the silhouette without the body, B the body without the silhouette, Y their
+    overlap; unknown pixels are in none of them. A bone is not drawn if one of its ends
+    is nearer than 5 cm or behind the camera. The silhouette's device counts.
+
+    Args:
+        body: the body.
+        camera: the camera.
+        silhouette: the silhouette in the camera's image.
+        poses: (n, 66).
+        translations: (n, 3) metres, the positions of the root.
+        threads: the number of threads; does not change the result.
+
+    Returns:
+        R, B, Y (n, 3) in pixels.
+
+    Raises:
+        InputError: if shapes do not match, or if a number is not finite.
+
     """
-    # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
+    # writeable arrays: numba would compile another kernel for read-only ones
     poses = writeable(poses)
     translations = writeable(translations)
     n = len(poses)
@@ -74,13 +90,12 @@ def areas(
     _check_finite("translations", translations)
     if silhouette.mask.shape != (camera.height, camera.width):
         raise InputError(
-            f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}"
+            f"mask must have shape {(camera.height, camera.width)}, "
+            f"got {silhouette.mask.shape}"
         )
     drawn.count_poses(n, silhouette)
-    if silhouette.device == "cuda":
-        from posefit.silhouette.cuda.areas import areas_on_device
-
-        return areas_on_device(body, camera, silhouette, poses, translations)
+    if silhouette.device is not None:
+        return silhouette.device.areas(body, camera, silhouette, poses, translations)
     counted = np.empty((n, 3), dtype=np.int64)
     drawing = drawing_of(body, camera, silhouette)
 
@@ -92,21 +107,28 @@ def areas(
 
 
 def _check_finite(name: str, values: Array) -> None:
-    if not np.isfinite(values).all():
+    """Raise InputError if some values are not finite."""
+    finite = np.isfinite(values)
+    if not finite.all():
         raise InputError(
-            f"{name} must be finite, got {np.count_nonzero(~np.isfinite(values))} numbers that are not"
+            f"{name} must be finite, "
+            f"got {np.count_nonzero(~finite)} numbers that are not"
         )
 
 
 def check_square(cameras: Sequence[Camera]) -> None:
-    """Raise InputError where the pixels of a camera are not square: discs are drawn where ellipses are seen."""
+    """Raise InputError if a camera's pixels are not square.
+
+    Discs would be drawn instead of the ellipses that such a camera sees.
+    """
     for camera in cameras:
         if camera.square:
             continue
         across, down = camera.focal
         raise InputError(
-            f"camera must have square pixels, focal lengths that are equal, got {across:g} and {down:g}: "
-            "`posefit.track` resamples masks for that, and Camera.squared() is the camera of such masks"
+            f"camera must have square pixels, focal lengths that are equal, "
+            f"got {across:g} and {down:g}: `posefit.track` resamples masks for that, "
+            "and Camera.squared() is the camera of such masks"
         )
 
 
@@ -119,41 +141,63 @@ def pose_costs(
     beta: float = BETA,
     threads: int = 1,
 ) -> tuple[Array, Areas]:
-    """Return the cost (n,) of poses (n, 66) at translations (n, 3), and their R, B, Y (views, n, 3). SAPSO (3), (4).
+    """Return the costs of poses, and their areas. SAPSO (3), (4).
 
-    The cost is the mean over the views of which something is known. Each view is counted on its silhouette's device.
-    Raises InputError where the pixels of a camera are not square.
+    The cost is the mean over the views with known pixels. Each view is counted on its
+    silhouette's device.
+
+    Args:
+        body: the body.
+        cameras: the camera of each view.
+        silhouettes: the silhouette of each view.
+        poses: (n, 66).
+        translations: (n, 3) metres, the positions of the root.
+        beta: the weight of missed silhouette; spilled body has the weight 1 - `beta`.
+        threads: the number of threads; does not change the result.
+
+    Returns:
+        The costs (n,), 0 to 100, and the areas R, B, Y (views, n, 3) in pixels.
+
+    Raises:
+        InputError: if the pixels of a camera are not square, if shapes do not match, or
+        if
+            a number is not finite.
+
     """
     check_square(cameras)
     views = zip(cameras, silhouettes, strict=True)
     counts = [areas(body, *view, poses, translations, threads) for view in views]
     costs = [mismatch(view, beta) for view in known_views(counts, silhouettes)]
-    return mean_over_views(costs), counts[0][None] if len(counts) == 1 else np.stack(
-        counts
-    )
+    # one view need not be copied
+    stacked = counts[0][None] if len(counts) == 1 else np.stack(counts)
+    return mean_over_views(costs), stacked
 
 
 def mean_over_views(costs: Sequence[Array]) -> Array:
-    """Return the mean (n,) of costs (n,), one array a view."""
+    """Return the mean (n,) of costs (n,), one array for each view."""
     if len(costs) == 1:
         return costs[0]
-    # sums of three or more depend on their order in the last digit, and views have none
+    # The last digit of a sum of three or more depends on their order; that of the views
+    # must not change the mean.
     return np.asarray(np.mean(np.sort(costs, axis=0), axis=0))
 
 
 def known_views(views: Sequence[T], silhouettes: Sequence[Silhouette]) -> Sequence[T]:
-    """Return those views of which something is known; all of them where nothing is."""
-    return [
-        view
-        for view, silhouette in zip(views, silhouettes, strict=True)
-        if silhouette.known
-    ] or views
+    """Return the views whose silhouettes have known pixels, or else all views."""
+    known = []
+    for view, silhouette in zip(views, silhouettes, strict=True):
+        if silhouette.known:
+            known.append(view)
+    return known or views
 
 
 def only_camera(
     cameras: Sequence[Camera], silhouettes: Sequence[Silhouette]
 ) -> Camera | None:
-    """Return the camera that alone sees the person, and so cannot see how far away they are; None where several do."""
+    """Return the only camera with known pixels; None if there are several.
+
+    A single camera does not see how far away the person is.
+    """
     seeing = known_views(cameras, silhouettes)
     return seeing[0] if len(seeing) == 1 else None
 
@@ -165,18 +209,24 @@ def costs_in(
     translations: Array,
     beta: float = BETA,
 ) -> Array:
-    """Return the cost (n,) of poses (n, 66) at translations (n, 3), with what `drawing_of` says of the silhouette.
+    """Return the costs (n,) of poses (n, 66) at translations (n, 3), without checks.
 
-    The arrays are as the kernel wants them: a search calls this for every population, and nothing is checked again.
+    `drawing` comes from `drawing_of`. The arrays must be float64, in C order and
+    writeable. Nothing is checked, since a search calls this for every population.
     """
     drawn.count_poses(len(poses), silhouette)
     counted = np.empty((len(poses), 3), dtype=np.int64)
+    costs = np.zeros(len(poses))
     kernels.count_areas(*drawing, poses, translations, counted)
-    return mismatch(counted, beta)
+    kernels.add_mismatch(counted, SCALE, beta, costs)
+    return costs
 
 
 def compile_kernels() -> None:
-    """Compile what every cost needs, before processes are started each of which would compile it."""
+    """Compile the kernels that every cost needs.
+
+    Called before processes are started, each of which would compile them otherwise.
+    """
     point = Body(
         Skeleton("point", np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1)), ()),
         np.zeros((26, 2)),
@@ -189,14 +239,24 @@ def compile_kernels() -> None:
 
 
 def mismatch(areas: Areas, beta: float = BETA) -> Array:
-    """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Interpretation S2.
+    """Return the costs (n,), 0 to 100, of areas. SAPSO (4), Interpretation S2.
 
-    Raises InputError where the areas have another shape.
+    Args:
+        areas: R, B, Y (n, 3) in pixels.
+        beta: the weight of missed silhouette; spilled body has the weight 1 - `beta`.
+
+    Returns:
+        The costs (n,).
+
+    Raises:
+        InputError: if the areas are not numbers of this shape.
+
     """
     counts = np.asarray(areas)
     if counts.ndim != 2 or counts.shape[1] != 3 or counts.dtype.kind not in "iuf":
         raise InputError(
-            f"areas must be numbers of shape (n, 3), got {counts.dtype} of shape {counts.shape}"
+            f"areas must be numbers of shape (n, 3), "
+            f"got {counts.dtype} of shape {counts.shape}"
         )
     costs = np.zeros(len(counts))
     kernels.add_mismatch(counts, SCALE, beta, costs)
@@ -204,19 +264,33 @@ def mismatch(areas: Areas, beta: float = BETA) -> Array:
 
 
 def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask:
-    """Return the mask (height, width) of one body, pose (66,), root at translation (3,)."""
+    """Return the mask of one body.
+
+    Args:
+        body: the body.
+        camera: the camera.
+        pose: (66,).
+        translation: (3,) metres, the position of the root.
+
+    Returns:
+        The mask (height, width) in the camera's image.
+
+    Raises:
+        InputError: if shapes do not match, or if a number is not finite.
+
+    """
     if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(
             f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}"
         )
-    return np.asarray(
-        masks_of(body, camera, np.asarray(pose)[None], np.asarray(translation)[None])[0]
-    )
+    poses = np.asarray(pose)[None]
+    translations = np.asarray(translation)[None]
+    return np.asarray(masks_of(body, camera, poses, translations)[0])
 
 
 def masks_of(body: Body, camera: Camera, poses: Array, translations: Array) -> Mask:
-    """Return the masks (n, height, width) of bodies, poses (n, 66), roots at translations (n, 3)."""
+    """Return the masks (n, height, width) of poses (n, 66) at translations (n, 3)."""
     drawn.count_poses(len(poses))
     _check_finite("pose", poses)
     _check_finite("translation", translations)

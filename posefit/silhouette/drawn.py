@@ -1,4 +1,4 @@
-"""Counts of drawn poses, by which the evaluations that a plugin reports are checked."""
+"""Counts of drawn poses, to check the evaluations that a plugin reports."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -12,10 +12,11 @@ T = TypeVar("T")
 
 
 class PoseCount:
-    """Counts the poses that are drawn within `counting`, by posefit's threads too.
+    """Counts the poses drawn within `counting`, also in posefit's threads.
 
-    Several may count at once, in one thread or in many. Poses drawn in threads that a plugin starts, in other processes
-    or by direct calls of the compiled loops are not counted.
+    Several counts may be active at once, in one thread or in many. Poses drawn in
+    threads that a plugin starts, in other processes or by direct calls of the compiled
+    loops are not counted.
     """
 
     def __init__(self) -> None:
@@ -23,12 +24,15 @@ class PoseCount:
         self._lock = threading.Lock()
 
     def add(self, poses: float) -> None:
-        """Count so many poses."""
+        """Add a number of poses to the count."""
         with self._lock:
             self.poses += poses
 
     def during(self, function: Callable[..., T], *arguments: Any) -> T:
-        """Return what a function returns, and count what it draws; unlike `counting` an outer count gets nothing."""
+        """Call a function, count the poses that it draws, and return its result.
+
+        Unlike `counting` it adds nothing to an outer count.
+        """
         token = _current.set(self)
         try:
             return function(*arguments)
@@ -37,7 +41,7 @@ class PoseCount:
 
     @contextmanager
     def counting(self) -> Iterator[None]:
-        """Count what is drawn in the body; an outer count gets it as well."""
+        """Count poses drawn in the `with` block; an outer count gets them as well."""
         outer = _current.get()
         before = self.poses
         token = _current.set(self)
@@ -54,7 +58,7 @@ _current: ContextVar[PoseCount | None] = ContextVar("drawn", default=None)
 
 @contextmanager
 def uncounted() -> Iterator[None]:
-    """Count nothing in the body, though it is called within `counting`."""
+    """Count nothing in the `with` block, even within `counting`."""
     token = _current.set(None)
     try:
         yield
@@ -63,7 +67,13 @@ def uncounted() -> Iterator[None]:
 
 
 def count_poses(poses: float, silhouette: Silhouette | None = None) -> None:
-    """Add poses that are drawn now to the current count; in a smaller picture by its share of the pixels."""
+    """Add poses to the current count.
+
+    In a smaller image a pose counts by its share of the pixels.
+    """
     count = _current.get()
-    if count is not None:
-        count.add(poses if silhouette is None else poses / silhouette.scale**2)
+    if count is None:
+        return
+    if silhouette is not None:
+        poses = poses / silhouette.scale**2
+    count.add(poses)

@@ -1,6 +1,7 @@
-"""From video frames to the mask of one person: a background model, clean edges, the largest piece, no holes.
+"""From video frames to people's masks: background models, cleaning, no holes.
 
-Frames and backgrounds are (height, width, 3) uint8. Nothing here keeps a frame, so a video may be as long as it likes.
+Frames and backgrounds are (height, width, 3) uint8. Frames are not kept, so a video may
+have any length.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -18,80 +19,97 @@ from posefit.silhouette.pieces import people_in
 Image = NDArray[np.uint8]  # (height, width, 3)
 
 SPREADS = 4.0  # a pixel is foreground this many standard deviations from the background
-MIN_DIFFERENCE_LEVELS = 18.0  # and at least so many grey levels
+MIN_DIFFERENCE_LEVELS = 18.0  # and at least this many grey levels
 SHADE = (0.45, 0.95)  # a shadow keeps this share of the background's brightness
-TINT = 14.0  # and its colour, to within so many grey levels after scaling
-NOISE = 3  # pixels to a side, of which the majority decides
-SPECK = 0.004  # of the image's height: what an opening takes away
-GAP = 0.012  # of the image's height: what a closing joins
-# of the person's height: shadow between parts of the person that are no farther apart
-# is clothing
+TINT = 14.0  # and, after scaling, its colour to within this many grey levels
+NOISE = 3  # pixels: the side of the square whose majority decides about a pixel
+SPECK = 0.004  # share of the image's height: an opening removes smaller specks
+GAP = 0.012  # share of the image's height: a closing joins smaller gaps
+# share of the person's height: shadow in smaller gaps between parts of the person is
+# clothing
 BRIDGE = 0.15
-BRIGHT = 127  # a pixel of a mask that is brighter belongs to the person
-MAX_HOLE_AREA = 0.02  # of the person's area: a hole that is smaller is filled
-SAMPLES = 40  # frames that a median looks at, spread over a film
+BRIGHT = 127  # brighter pixels of a mask belong to the person
+MAX_HOLE_AREA = 0.02  # share of the person's area: smaller holes are filled
+SAMPLES = 40  # frames of a median, spread over a film
 HISTORY = 500  # frames that a mixture remembers
-# squared standard deviations from its nearest Gaussian, from which on a pixel is
-# foreground
+# squared standard deviations: a pixel farther from its nearest Gaussian is foreground
 THRESHOLD = 25.0
 
 
 class Film(Protocol):
-    """What a segmenter gets before the first frame: a video at its working size, cut to the roi."""
+    """A video at its working size, cut to the roi, for a segmenter to learn from."""
 
     def __len__(self) -> int:
-        """How many frames the video has."""
+        """The number of frames."""
         ...
 
     def frames(
         self, start: int = 0, stop: int | None = None, step: int = 1
     ) -> Iterator[Image]:
-        """Yield every `step`th frame of start to stop."""
+        """Yield every `step`th frame from `start` to before `stop`."""
         ...
 
     def picture(self, path: str) -> Image:
-        """Return a picture of the video's size as the video shows it. Raises InputError where there is none."""
+        """Return the picture at a path, with the size and cut of the video.
+
+        Raises InputError if there is no such picture.
+        """
         ...
 
 
 class Segmenter(Protocol):
-    """Separates a person from the rest of a picture. Frames come in their order, each once.
+    """Separates a person from the rest of an image. It gets each frame once, in order.
 
-    One that compares each frame with a still background may have that picture as `background` (height, width, 3), and
-    is then checked for a person who was learned into it. One with a model of people may have, as `facing`, which way
-    the person in the latest picture faces: radians, 0 towards the camera, growing to the picture's right, NaN for none;
-    and, as `landmarks` (27, 3), the column, row and confidence, 0 to 1, of their joints, 0 for an unknown joint.
+    A segmenter may have these attributes:
+
+    - `background` (height, width, 3), the still picture that frames are compared with.
+      It is then checked for a person who was learned into it.
+    - `facing`, the direction in which the person in the latest frame faces: radians, 0
+      towards the camera, increasing to the image's right; NaN if there is nobody.
+    - `landmarks` (27, 3), the column, row and confidence of the person's joints in the
+      latest frame; the confidence is 0 to 1, and 0 for an unknown joint.
     """
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Return where the person is in an image, and where their shadow may be, both (height, width)."""
+        """Find the person in an image.
+
+        Args:
+            image: (height, width, 3) uint8.
+
+        Returns:
+            Two masks (height, width): the person, and pixels that may be their shadow.
+
+        """
         ...
 
 
-# called with a `Film`, and settings as keywords
+# takes a `Film`, and settings as keywords
 SegmenterFactory = Callable[..., Segmenter]
 
 
 @dataclass(frozen=True)
 class Still:
-    """One mean (or median) colour and one spread for each pixel. VSMM 1.1 and 1.2 are its mean form."""
+    """A still background: one colour and one spread for each pixel.
+
+    VSMM 1.1 and 1.2 use the mean colour.
+    """
 
     middle: NDArray[np.float32] = field(repr=False)  # (height, width, 3)
     spread: NDArray[np.float32] = field(repr=False)  # (height, width)
 
     @property
     def background(self) -> Image:
-        """The picture that frames are held against."""
+        """The picture that frames are compared with."""
         return self.middle.round().astype(np.uint8)
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Return where an image differs from the background, and where it is only darker."""
+        """Return where an image differs from the background, and where it is darker."""
         away = cv2.absdiff(image, self.background)
         difference = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2])
         changed = np.asarray(
             difference > np.maximum(MIN_DIFFERENCE_LEVELS, SPREADS * self.spread)
         )
-        # the rest need not be looked at
+        # only changed pixels can be shadow
         before = self.middle[changed]
         now = image[changed].astype(np.float32)
         share = (now.mean(axis=1) + 1.0) / (before.mean(axis=1) + 1.0)
@@ -102,13 +120,16 @@ class Still:
 
 
 def mean_background(images: Iterable[Image]) -> Still:
-    """Return the background that is the mean of images without a person. Raises InputError where there is none."""
+    """Return the mean of images without a person as the background.
+
+    Raises InputError if there are no images.
+    """
     count = 0
     total = np.zeros(())
     squares = np.zeros(())
     for image in images:
         values = image.astype(np.float64)
-        count = count + 1
+        count += 1
         total = total + values
         squares = squares + values**2
     if not count:
@@ -119,11 +140,11 @@ def mean_background(images: Iterable[Image]) -> Still:
 
 
 def median_background(images: Iterable[Image]) -> Still:
-    """Return the background that is the median of some images, before which a person may walk.
+    """Return the median of images as the background; a person may move in them.
 
-    All are in memory together. Raises InputError where there is none.
+    All images are in memory at once. Raises InputError if there are none.
     """
-    stack = np.stack(list(images)) if not isinstance(images, np.ndarray) else images
+    stack = images if isinstance(images, np.ndarray) else np.stack(list(images))
     if not len(stack):
         raise InputError("background must hold at least one frame, got none")
     middle = np.median(stack, axis=0).astype(np.float32)
@@ -132,7 +153,10 @@ def median_background(images: Iterable[Image]) -> Still:
 
 
 class Mixture:
-    """OpenCV's adaptive mixture of Gaussians, learned from all frames first, as in the SAPSO paper."""
+    """OpenCV's adaptive mixture of Gaussians, as in the SAPSO paper.
+
+    It learns from all frames before it segments the first one.
+    """
 
     def __init__(
         self,
@@ -150,36 +174,35 @@ class Mixture:
 
     @property
     def background(self) -> Image:
-        """The likeliest colour of each pixel."""
+        """The most probable colour of each pixel."""
         return np.asarray(self._model.getBackgroundImage(), dtype=np.uint8)
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Return what the mixture calls foreground, and what it calls shadow."""
+        """Return the mixture's foreground and its shadow."""
         label = self._model.apply(image, learningRate=0.0)
         return np.asarray(label == 255), np.asarray(label == 127)
 
 
 class GivenMasks:
-    """A segmenter of frames that are masks themselves: bright is the person."""
+    """A segmenter for frames that are masks: bright pixels are the person."""
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Return which pixels are bright, and that nothing is a shadow."""
+        """Return the bright pixels, and an empty shadow."""
         bright = np.asarray(image.max(axis=2) > BRIGHT)
         return bright, np.zeros_like(bright)
 
 
 @dataclass(frozen=True)
 class Person:
-    """One frame's mask, and how good it is."""
+    """A person's mask in one frame, and figures of its quality."""
 
     mask: Mask = field(repr=False)
-    # False where nothing is known: shadow, and what is ignored
+    # False for unknown pixels: shadow, and ignored pixels
     valid: Mask = field(repr=False)
     area: int  # pixels
-    # how many the foreground had that are large enough to be a part of a person
+    # pieces of the foreground that are large enough to be part of a person
     pieces: int
-    # the area of the largest piece that is not this person's, as a share of the
-    # person's
+    # area of the largest piece outside this person, as a share of the person's area
     rival: float
     touches_border: bool
 
@@ -190,12 +213,22 @@ def people(
     roi: tuple[int, int, int, int] | None,
     ignore: Mask | None,
 ) -> list[Person]:
-    """Return the people (height, width) of a foreground, the largest first, within `roi` x, y, width, height.
+    """Return the people in a foreground, the largest first.
 
-    There is always a first one, which is empty where no person is; others are at least a quarter as large.
+    Noise and specks are removed, gaps closed, nearby pieces joined and small holes
+    filled. Shadow between parts of the person is dark clothing, and so belongs to the
+    person; any other shadow is unknown.
 
-    Noise and specks go, gaps close, pieces near the largest one join it and small holes are filled. What looks like a
-    shadow but lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
+    Args:
+        foreground: (height, width).
+        shadow: (height, width) pixels that may be shadow.
+        roi: x, y, width, height; people are only searched for there.
+        ignore: (height, width) pixels that count as unknown.
+
+    Returns:
+        At least one person, who is empty if nobody is found. The others are at least a
+        quarter as large as the first.
+
     """
     height = foreground.shape[0]
     inside = np.ones(foreground.shape, dtype=bool)
@@ -206,16 +239,14 @@ def people(
     if ignore is not None:
         inside &= ~ignore
     known = ~shadow if ignore is None else ~shadow & ~ignore
-    changed = (
-        np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
-    )
+    smooth = cv2.medianBlur(foreground.astype(np.uint8), NOISE)
+    changed = np.asarray(smooth > 0) & inside
     largest = people_in(_cleaned(changed, height) & inside)
     if not largest:
         return [Person(np.zeros_like(changed), known, 0, 0, 0.0, False)]
     size = int(np.ptp(np.flatnonzero(largest[0].mask.any(axis=1)))) + 1
-    dark = (
-        _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
-    )
+    bridged = _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size)
+    dark = bridged & shadow & inside
     result = list[Person]()
     for part in people_in(_cleaned(changed | dark, height) & inside):
         mask = without_holes(part.mask)
@@ -226,12 +257,13 @@ def people(
 
 
 def _cleaned(mask: Mask, height: int) -> Mask:
-    return _morphed(
-        _morphed(mask, cv2.MORPH_CLOSE, GAP * height), cv2.MORPH_OPEN, SPECK * height
-    )
+    """Return a mask without gaps and specks, relative to the image's height."""
+    closed = _morphed(mask, cv2.MORPH_CLOSE, GAP * height)
+    return _morphed(closed, cv2.MORPH_OPEN, SPECK * height)
 
 
 def _morphed(mask: Mask, operation: int, size: float) -> Mask:
+    """Return a mask after a morphological operation with a disc of `size` pixels."""
     side = 2 * max(1, round(0.5 * size)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     box = padded_box(mask, side)
@@ -241,7 +273,7 @@ def _morphed(mask: Mask, operation: int, size: float) -> Mask:
 
 
 def without_holes(mask: Mask, most: float = MAX_HOLE_AREA) -> Mask:
-    """Return a mask whose holes are filled that have at most this share of its area."""
+    """Return a mask with its holes filled, up to `most` of the mask's area each."""
     box = padded_box(mask, 1)
     filled = mask.copy()
     count, labels, stats, _ = cv2.connectedComponentsWithStats(

@@ -1,6 +1,6 @@
-"""Pixels of bodies counted against silhouettes: numba loops over arrays. Shapes are checked by the callers.
+"""Pixels of bodies counted against silhouettes: numba loops over arrays.
 
-Bit images are as `rasteriser` makes them.
+Bit images have the layout of `rasteriser`. The callers check shapes.
 """
 
 from typing import NamedTuple
@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Bits, inlined, jit
-from posefit.geometry.kernels import LANES, set_rows
+from posefit.geometry.kernels import LANES, Chain, set_rows
 from posefit.silhouette.rasteriser import (
     NONE,
+    View,
     fill_pose,
     outline_poses,
-    scratch,
     set_scene,
+    work_arrays,
 )
 from posefit.silhouette.spans import STRIP_PIXELS, popcount
 
@@ -22,22 +23,22 @@ ONE_BIT = np.uint64(1)
 
 
 class Observed(NamedTuple):
-    """A silhouette as the kernel wants it."""
+    """A silhouette, in the form that the kernels take."""
 
-    person: Bits  # the bit image of the person's pixels, all of them valid
-    valid: Bits  # that of the pixels that are known
-    pixels: int  # of the person
+    person: Bits  # bit image of the person's pixels, all of them valid
+    valid: Bits  # bit image of the known pixels
+    pixels: int  # number of the person's pixels
 
 
 @inlined
 def count(image, observed, valid, box):
-    """Return the pixels of the body and of its overlap with the observed silhouette, and clear the image."""
+    """Return the body's pixels and their overlap with the person; clear the image."""
     body = NONE
     overlap = NONE
-    for strip in range(box[2], box[3] + 1):
-        words = image[strip][box[0] : box[1]]
-        person = observed[strip][box[0] : box[1]]
-        known = valid[strip][box[0] : box[1]]
+    for strip in range(box.first_strip, box.last_strip + 1):
+        words = image[strip][box.first_word : box.stop_word]
+        person = observed[strip][box.first_word : box.stop_word]
+        known = valid[strip][box.first_word : box.stop_word]
         for i in range(words.size):
             body += popcount(words[i] & known[i])
             overlap += popcount(words[i] & person[i])
@@ -48,19 +49,20 @@ def count(image, observed, valid, box):
 
 @jit
 def paint_bits(image, box, value, pixels):
-    """OR `value` into the pixels (height, width) of the body in a bit image.
+    """OR `value` into pixels (height, width) where the body in a bit image is.
 
-    Bits past the image's right border may be set and count for nothing: no pixel stands for them.
+    Bits beyond the image's right border may be set; they have no pixel and are skipped.
     """
     height, width = pixels.shape
     words = (
         image.reshape(-1).view(np.uint32).reshape(image.shape[0], 2 * image.shape[1])
     )
-    for y in range(2 * box[0], min(2 * box[1], height)):
-        for strip in range(box[2], box[3] + 1):
+    for y in range(2 * box.first_word, min(2 * box.stop_word, height)):
+        for strip in range(box.first_strip, box.last_strip + 1):
             first = STRIP_PIXELS * strip
             word = np.uint64(words[strip, y])
-            # from set bit to set bit: a branch at every pixel would be mispredicted at each border
+            # From set bit to set bit: a branch for every pixel would be mispredicted at
+            # every border.
             while word != NONE:
                 lowest = word & (~word + ONE_BIT)
                 x = first + np.intp(popcount(lowest - ONE_BIT))
@@ -73,20 +75,28 @@ def paint_bits(image, box, value, pixels):
 def count_areas(chain, radii, view, observed, images, poses, translations, areas):
     """Write the areas (n, 3) R, B, Y of poses (n, 66).
 
-    The bit images of the bodies are written to `images` (n, strips, words), where it is not empty.
+    The bodies' bit images are written to `images` (n, strips, words), unless it is
+    empty. `chain`, `view` and `observed` are plain tuples of the fields of Chain, View
+    and Observed: each NamedTuple among the arguments takes numba as long as filling
+    half a pose.
     """
+    chain = Chain(chain[0], chain[1], chain[2], chain[3])
+    view = View(view[0], view[1], view[2], view[3], view[4], view[5])
+    observed = Observed(observed[0], observed[1], observed[2])
     n = poses.shape[0]
     silhouette = np.uint64(observed.pixels)
     person = observed.person
     valid = observed.valid
     rows = np.empty(LANES, np.int64)
-    work = scratch(person.shape[0], person.shape[1])
+    work = work_arrays(person.shape[0], person.shape[1])
     set_scene(work, 0, LANES, chain.offsets, radii, view)
     for first in range(0, n, LANES):
         set_rows(rows, first, n)
-        outline_poses(chain, poses, translations, rows, view.width, view.height, work)
+        stride = outline_poses(
+            chain, poses, translations, rows, view.width, view.height, work
+        )
         for lane in range(min(LANES, n - first)):
-            image, box = fill_pose(lane, work)
+            image, box = fill_pose(lane, stride, work)
             i = first + lane
             if images.size:
                 for strip in range(image.shape[0]):

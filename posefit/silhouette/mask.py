@@ -1,22 +1,26 @@
-"""Masks, the silhouette of one view as bit images, and both smaller: every second pixel of every second row."""
+"""Masks and silhouettes, as bit images and at smaller sizes."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Bits
+from posefit.arrays import Array, Bits
 from posefit.errors import InputError
+from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.reading import quoted
 from posefit.silhouette.rasteriser import strips_and_words
 from posefit.silhouette.spans import STRIP_PIXELS
 
 Mask = NDArray[np.bool_]  # (height, width)
+Areas = NDArray[np.int64]  # (..., 3): R, B, Y
 
-# of the largest piece's pixels, ours: a smaller one is left out of the person's borders
+# share of the largest piece's pixels: the person's extent leaves out smaller pieces.
+# The value is from no paper.
 MIN_PIECE_PIXELS = 0.06
 
 
@@ -38,30 +42,36 @@ def unpack(bits: Bits, width: int, height: int) -> Mask:
 
 
 def box_of(mask: Mask) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom of a mask with pixels; the last two are the first outside."""
+    """Return left, top, right and bottom of a mask that is not empty.
+
+    Right and bottom are the first column and row outside.
+    """
     rows = np.flatnonzero(mask.any(axis=1))
     columns = np.flatnonzero(mask.any(axis=0))
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
 def touches_border(mask: Mask) -> bool:
-    """Return whether a mask touches the picture's border."""
+    """Return whether a mask touches the image's border."""
     return bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
 
 
 def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
-    """Return the rows and columns of a mask's box with a margin in pixels; the first pixel where it is empty."""
+    """Return the rows and columns of a mask's box with a margin in pixels.
+
+    For an empty mask they are those of the first pixel.
+    """
     left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))
     if not wide:
         return slice(1), slice(1)
-    return slice(max(top - margin, 0), top + tall + margin), slice(
-        max(left - margin, 0), left + wide + margin
-    )
+    rows = slice(max(top - margin, 0), top + tall + margin)
+    columns = slice(max(left - margin, 0), left + wide + margin)
+    return rows, columns
 
 
 def without_small_pieces(mask: Mask) -> Mask:
-    """Return a mask without its small pieces, which are not the person."""
-    box = padded_box(mask, 0)  # in less time than in the whole mask
+    """Return a mask without its small pieces, which are not part of the person."""
+    box = padded_box(mask, 0)  # faster than the whole mask
     count, numbers, pieces, _ = cv2.connectedComponentsWithStats(
         mask[box].astype(np.uint8), connectivity=8
     )
@@ -77,35 +87,44 @@ def without_small_pieces(mask: Mask) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """The person's pixels in one camera's image, and which pixels are known at all."""
+    """The person's pixels in one camera's image, and which pixels are known."""
 
     mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
     valid: Mask = field(repr=False)  # (height, width)
-    # every so many pixels of every so many rows of the full-size silhouette
+    # it has every `scale`th pixel of every `scale`th row of the full-size silhouette
     scale: int = 1
-    device: str = "cpu"  # where poses are drawn to be compared with it
-    # at full size, in these pixels; () where it is
+    # the device that draws and counts poses; None for the CPU
+    device: "Device | None" = None
+    # the extent at full size, in pixels of this silhouette; () if this is the full size
     full_extent: tuple[float, ...] = field(default=(), repr=False)
 
     @classmethod
     def of(
         cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None
     ) -> "Silhouette":
-        """Return the silhouette of a mask (height, width), any value but 0 being the person.
+        """Return the silhouette of a mask.
 
-        Pixels where `valid` is 0 are unknown and count for nothing. Both arrays are read-only: what a method writes
-        into them would falsify its own audit. Raises InputError where shapes differ.
+        Args:
+            mask: (height, width); any value but 0 is the person.
+            valid: (height, width); pixels where it is 0 are unknown and not counted.
+                None if all pixels are known.
+
+        Returns:
+            The silhouette. Its arrays are read-only: a method that wrote into them
+            would falsify its own audit.
+
+        Raises:
+            InputError: if the mask has another number of axes, or the shapes differ.
+
         """
         values = np.asarray(mask)
         if values.ndim != 2 or 0 in values.shape:
             raise InputError(
                 f"mask must have shape (height, width), got {values.shape}"
             )
-        known = (
-            np.ones(values.shape, dtype=bool)
-            if valid is None
-            else np.array(valid, dtype=bool)
-        )
+        known = np.ones(values.shape, dtype=bool)
+        if valid is not None:
+            known = np.array(valid, dtype=bool)
         if known.shape != values.shape:
             raise InputError(
                 f"valid must have the mask's shape {values.shape}, got {known.shape}"
@@ -127,19 +146,21 @@ class Silhouette:
 
     @cached_property
     def pixels(self) -> int:
-        """How many pixels the person has."""
+        """The number of the person's pixels."""
         return int(np.count_nonzero(self.mask))
 
     @cached_property
     def known(self) -> bool:
-        """Whether anything is known at all."""
+        """Whether any pixel is known."""
         return bool(self.valid.any())
 
     @cached_property
     def extent(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom border of the person in pixels; NaN at the image's edge, and where none is there.
+        """Left, top, right and bottom border of the person in pixels.
 
-        Small pieces that lie apart are not the person: a stray pixel would move them by half its distance.
+        A border at the image's edge is NaN, and so are all borders of an empty mask.
+        Small separate pieces are left out: a stray pixel would move the centre by half
+        its distance.
         """
         if self.full_extent:
             left, top, right, bottom = self.full_extent
@@ -156,16 +177,43 @@ class Silhouette:
         )
 
 
-def coarser_camera(camera: Camera, factor: int) -> Camera:
-    """Return the camera whose pixels are every `factor`th of every `factor`th row: their centres see the same rays.
+class Device(Protocol):
+    """Draws poses and counts their areas elsewhere than on the CPU."""
 
-    So a body drawn by it is the same body drawn at full size and looked at there, pixel for pixel. The first one is
-    number `factor // 2`. Raises InputError where that is no pixel.
+    def areas(
+        self,
+        body: Body,
+        camera: Camera,
+        silhouette: Silhouette,
+        poses: Array,
+        translations: Array,
+    ) -> Areas:
+        """Count the areas of poses.
+
+        Args:
+            body: the body.
+            camera: the camera.
+            silhouette: the silhouette in the camera's image.
+            poses: (n, 66); the caller has checked the shape.
+            translations: (n, 3) metres; the caller has checked the shape.
+
+        Returns:
+            R, B, Y (n, 3) in pixels, equal to those of `posefit.silhouette.cost.areas`
+            on a CPU.
+
+        """
+
+
+def coarser_camera(camera: Camera, factor: int) -> Camera:
+    """Return the camera that has every `factor`th pixel of every `factor`th row.
+
+    The pixels' centres see the same rays. So each pixel of a body drawn by it equals
+    the pixel at the same place of the body drawn at full size. The first pixel and row
+    are number `factor // 2`. Raises InputError if the image has no such pixel.
     """
     first = _first(factor, (camera.width, camera.height))
-    width, height = (
-        len(range(first, side, factor)) for side in (camera.width, camera.height)
-    )
+    width = len(range(first, camera.width, factor))
+    height = len(range(first, camera.height, factor))
     centre = (camera.centre - first - 0.5) / factor + 0.5
     return replace(
         camera, width=width, height=height, focal=camera.focal / factor, centre=centre
@@ -173,17 +221,16 @@ def coarser_camera(camera: Camera, factor: int) -> Camera:
 
 
 def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
-    """Return what `coarser_camera` saw of a silhouette, with the borders of the full-size one.
+    """Return a silhouette as `coarser_camera` sees it, with the full-size extent.
 
-    Areas times the square of `factor` are estimates of the full ones, and a pose that fits perfectly costs 0. The
-    majority of each block, the other way to make a mask smaller, is no picture that such a camera takes of a body.
+    Areas times the square of `factor` are estimates of the full-size areas, and a pose
+    that fits perfectly costs 0. This would not hold if each pixel were the majority of
+    a block, since no camera takes such an image of a body.
     """
     first = _first(factor, silhouette.size)
-    mask, valid = (
-        pixels[first::factor, first::factor]
-        for pixels in (silhouette.mask, silhouette.valid)
-    )
-    # the full-size borders, so that poses aligned to them stand where they stand at full size
+    mask = silhouette.mask[first::factor, first::factor]
+    valid = silhouette.valid[first::factor, first::factor]
+    # the full-size extent, so that poses are aligned as at full size
     extent = tuple((np.array(silhouette.extent) - first - 0.5) / factor + 0.5)
     scale = silhouette.scale * factor
     device = silhouette.device
@@ -193,12 +240,11 @@ def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
 
 
 def _first(factor: int, size: tuple[int, int]) -> int:
-    if (
-        isinstance(factor, bool)
-        or not isinstance(factor, int | np.integer)
-        or not 1 <= factor <= min(size)
-    ):
+    """Return the number of the first pixel that is kept."""
+    whole = isinstance(factor, int | np.integer) and not isinstance(factor, bool)
+    if not whole or not 1 <= factor <= min(size):
         raise InputError(
-            f"factor must be a whole number from 1 to the smaller side {min(size)}, got {quoted(factor)}"
+            f"factor must be a whole number from 1 to the smaller side {min(size)}, "
+            f"got {quoted(factor)}"
         )
     return int(factor) // 2

@@ -1,4 +1,4 @@
-"""Which pieces of a mask are one person, whether others made it or a segmenter did."""
+"""Which pieces of a mask are one person, in given masks and from segmenters."""
 
 from typing import Any, NamedTuple
 
@@ -8,32 +8,43 @@ from numpy.typing import NDArray
 
 from posefit.silhouette.mask import Mask, padded_box
 
-# of the taller piece's height: pieces as near as that are one person's
+# share of the taller piece's height: pieces within this distance are one person
 PIECE_REACH = 0.06
-# of the height of both: parts of a person that stand above each other are no farther
-# apart
+# share of the height of both pieces: the largest gap between two parts of a person, one
+# above the other
 ABOVE_GAP = 0.3
-MIN_PIECE_AREA = 0.05  # of the largest piece's area: smaller pieces are noise
-RIVAL_AREA = 0.25  # of the largest person's area: something smaller is no person
+MIN_PIECE_AREA = 0.05  # share of the largest piece's area: smaller pieces are noise
+# share of the largest person's area: anything smaller is not a person
+RIVAL_AREA = 0.25
 
 
 class Pieces(NamedTuple):
     """One person in a mask."""
 
     mask: Mask  # (height, width)
-    # in the mask without larger people: how many are large enough to be part of one
+    # pieces large enough to be part of a person, in the mask without larger people
     pieces: int
-    # the area of the largest of these that is not theirs, as a share of their own
+    # area of the largest other piece in that mask, as a share of the person's area
     rival: float
 
 
 def people_in(mask: Mask, known: Mask | None = None) -> list[Pieces]:
-    """Return the people in a mask (height, width), the largest first; none in an empty one.
+    """Return the people in a mask, the largest first.
 
-    Pieces near each other are one person's, and specks are that of the person whom they are near. In masks that others
-    made, with the pixels that are `known`, so are pieces with unknown pixels between them, and one above the other, as
-    a table leaves them. A segmenter, which gives none, leaves clothes and shadows out, and what is above another piece
-    is often another person.
+    Pieces near each other are one person; a speck belongs to the person next to it.
+    With `known`, pieces separated by unknown pixels are one person too, and so are two
+    pieces one above the other, as when a table hides the middle. Masks from a segmenter
+    come without `known`: segmenters miss clothes and shadows, and a piece above another
+    one is often a second person.
+
+    Args:
+        mask: (height, width).
+        known: (height, width) the known pixels of a given mask; None for a mask from a
+            segmenter.
+
+    Returns:
+        The people; an empty list for an empty mask.
+
     """
     box = padded_box(mask, 0)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(
@@ -47,18 +58,16 @@ def people_in(mask: Mask, known: Mask | None = None) -> list[Pieces]:
     if count > 2:
         owners = _owners(labels, stats, areas, None if known is None else known[box])
     totals = np.bincount(owners, areas, count)
-    order = [
-        owner
-        for owner in np.argsort(-totals, kind="stable").tolist()
-        if totals[owner] >= RIVAL_AREA * totals.max()
-    ]
+    totals[0] = 0.0  # specks near nobody, and the background
     result = list[Pieces]()
     others = areas.copy()
-    for owner in order:
+    for owner in np.argsort(-totals, kind="stable").tolist():
+        if totals[owner] < RIVAL_AREA * totals.max():
+            break
         person = np.zeros_like(mask)
         person[box] = (owners == owner)[labels]
         large = int(np.count_nonzero(others > MIN_PIECE_AREA * others.max()))
-        others[owners == owner] = 0
+        others[owners == owner] = 0  # the next people do not count this one's pieces
         result.append(Pieces(person, large, float(others.max() / totals[owner])))
     return result
 
@@ -69,11 +78,15 @@ def _owners(
     areas: NDArray[Any],
     known: Mask | None,
 ) -> NDArray[np.int64]:
-    """Return for each piece (n,) the number of its person, that of one of their large pieces; 0 for a speck alone."""
+    """Return the number (n,) of each piece's person; 0 for a speck near nobody.
+
+    The number of a person is that of one of their large pieces.
+    """
     count = len(areas)
     large = np.flatnonzero(areas > MIN_PIECE_AREA * areas.max())
     reach = PIECE_REACH * stats[large, cv2.CC_STAT_HEIGHT]
     shown = labels > 0
+    # pixels from each large piece to every piece
     distances = np.full((len(large), count), np.inf)
     for row, number in enumerate(large.tolist()):
         apart = (labels != number).astype(np.uint8)
@@ -81,6 +94,7 @@ def _owners(
         np.minimum.at(distances[row], labels[shown], away[shown])
     joined = distances[:, large] <= np.maximum(reach[:, None], reach)
     if known is not None:
+        # pieces are joined if they are one component together with the unknown pixels
         through = (shown | ~known).astype(np.uint8)
         numbers = cv2.connectedComponents(through, connectivity=8)[1]
         parts = np.zeros(count, dtype=np.int64)
@@ -91,6 +105,7 @@ def _owners(
                 joined[row, column] |= _is_above(stats[first], stats[second])
     owners = np.zeros(count, dtype=np.int64)
     owners[large] = large
+    # joining two pieces joins everything that is already joined to either
     for row, column in np.argwhere(joined).tolist():
         owners[owners == owners[large[row]]] = owners[large[column]]
     specks = np.setdiff1d(np.arange(1, count), large)
@@ -101,10 +116,9 @@ def _owners(
 
 
 def _is_above(first: NDArray[np.int32], second: NDArray[np.int32]) -> bool:
-    left, top, wide, tall = (
-        np.array([piece[k] for piece in (first, second)]) for k in range(4)
-    )
-    across = (left + wide).min() - left.max()
-    between = top.max() - (top + tall).min()
-    whole = (top + tall).max() - top.min()
-    return bool(across >= 0.5 * wide.min() and 0 <= between <= ABOVE_GAP * whole)
+    """Return whether one piece is right above the other, by their statistics."""
+    left, top, width, height = np.stack([first[:4], second[:4]], axis=1)
+    overlap = (left + width).min() - left.max()
+    gap = top.max() - (top + height).min()
+    whole = (top + height).max() - top.min()
+    return bool(overlap >= 0.5 * width.min() and 0 <= gap <= ABOVE_GAP * whole)

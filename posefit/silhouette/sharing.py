@@ -1,4 +1,4 @@
-"""Work on many poses in parts that stay in a core's cache, shared by several threads."""
+"""Work on many poses, in parts that fit a core's cache, shared by threads."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -9,25 +9,26 @@ from itertools import pairwise
 from threading import Lock
 from typing import Any
 
-PART = 384  # poses: what is decoded of them is 0.5 MB, and stays in the cache of a core
-# where several threads take parts in turn: the last one to be done is waited for
+# poses of a part: the decoded ones take 0.5 MB, which stays in the cache of a core
+PART = 384
+# poses of a part that threads take in turn: smaller, as all wait for the last part
 SHARED_PART = 128
-POOL = "posefit"  # the name of its threads, which end with the process
-# poses; a smaller share of work is not worth handing to another thread
+POOL = "posefit"  # the name of the pool's threads, which end with the process
+# poses: with fewer for each, another thread is not worth its overhead
 LEAST_SHARE = 16
 
 
 @lru_cache
 def parts_of(n: int, threads: int) -> tuple[slice, ...]:
-    """Return slices that n rows are worked through in: about as long each, so many that each thread has a share."""
+    """Return slices of n rows, of about equal length, enough for each thread."""
     shares = max(min(threads, n // LEAST_SHARE), 1)
     if shares == 1 and n <= PART:
         return (slice(0, n),)
     longest = PART if shares == 1 else SHARED_PART
-    count = shares * max(-(-n // (shares * longest)), 1)
-    return tuple(
-        slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1))
-    )
+    rounds = max(-(-n // (shares * longest)), 1)  # rounded up
+    count = shares * rounds
+    borders = [n * part // count for part in range(count + 1)]
+    return tuple(slice(first, stop) for first, stop in pairwise(borders))
 
 
 def work_through(
@@ -36,9 +37,10 @@ def work_through(
     take: Callable[[slice], Sequence[Any]],
     work: Callable[..., None],
 ) -> None:
-    """Call `work(part, *take(part))` for every part.
+    """Call `work(part, *take(part))` for every part, shared by threads.
 
-    `take` is called by one thread at a time, so that it may be anybody's code; `work` by several at once.
+    Only one thread at a time calls `take`, so it need not be safe for threads; several
+    call `work` at once.
     """
     if len(parts) == 1 or threads == 1:
         for part in parts:
@@ -56,7 +58,7 @@ def work_through(
                 taken = take(part)
             work(part, *taken)
 
-    # in a copy of this thread's context, where it is known who counts the poses
+    # in a copy of this thread's context, which holds the count of drawn poses
     others = [
         _pool(threads).submit(copy_context().run, take_turns)
         for _ in range(min(threads, len(parts)) - 1)
@@ -73,5 +75,6 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 
 
 if hasattr(os, "register_at_fork"):
-    # The threads of a pool do not live on in a forked child; without this its first call would wait for ever.
+    # A forked child has no threads of the pool: without this its first call would wait
+    # for ever.
     os.register_at_fork(after_in_child=_pool.cache_clear)

@@ -1,4 +1,7 @@
-"""The defaults of a track: `completed` fills in what a user left open, once; below it, None stands for no default."""
+"""The defaults of a track, which `completed` fills in once.
+
+The functions that it calls get complete options.
+"""
 
 from posefit.errors import InputError
 from posefit.motion import built_in, recorded
@@ -9,47 +12,55 @@ from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit.tracking.restarts import RESTARTS
 
 DEFAULT_FOOTAGE_PRIOR = "loose"
-DEFAULT_TRACKER = "exemplars"  # where it is installed
-DEFAULT_TRACKER_EVALUATIONS = 9760  # of a frame
-BODY_FRAMES = 12  # to which a build is fitted
+DEFAULT_TRACKER = "exemplars"  # if it is installed
+DEFAULT_TRACKER_EVALUATIONS = 9760  # per frame
+BODY_FRAMES = 12  # the build is fitted to this many frames
 
 
 def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
-    """Return options with every default filled in, by the known `motion` that is tracked, or None for footage.
+    """Return options with every default filled in.
 
-    The method is `exemplars`, which learns from the library of recorded motions and has a budget of its own. A built-in
-    motion, and all else for which an optimiser, a prior or settings of theirs are given, is tracked by `annealed@pca`,
-    or the optimiser that settings name; footage with the prior `loose`. These and other trackers learn from the other
-    styles of a built-in motion, or else from the built-in walks. Raises InputError for options that exclude each other.
+    The default method is `exemplars`, with the library of recorded motions and its own
+    default budget. The method is `annealed@pca` for a built-in motion, and for any
+    source if an optimiser, a prior, or settings of other plugins are given. A given
+    optimiser or prior replaces `annealed` or `pca`. For footage the default prior is
+    `loose` instead of `pca`. Methods other than `exemplars` learn from the other styles
+    of a built-in motion, or else from the built-in walks.
+
+    Args:
+        options: The options that the user chose.
+        motion: The known motion that is tracked, or None for footage.
+
+    Returns:
+        The complete options.
+
+    Raises:
+        InputError: Options exclude each other.
+
     """
     footage = motion is None
     name = motion if isinstance(motion, str) and motion in built_in.names() else None
     method = options.method
     offers = registry().offers
     set_names = {setting.partition(".")[0] for setting in options.settings}
-    if (
-        method is None
-        and name is None
-        and not set_names - {DEFAULT_TRACKER}
-        and DEFAULT_TRACKER in offers["tracker"]
-    ):
+    settings_fit = not set_names - {DEFAULT_TRACKER}
+    installed = DEFAULT_TRACKER in offers["tracker"]
+    if method is None and name is None and settings_fit and installed:
         method = DEFAULT_TRACKER
     elif method is None or isinstance(method, str):
         optimiser = next(iter(set_names & {*offers["optimiser"]}), "@")
-        method = str(
-            method_names(
-                method or optimiser, DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR
-            )
-        )
+        prior = DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR
+        method = str(method_names(method or optimiser, prior))
     by_default = method == DEFAULT_TRACKER
     styles = built_in.other_styles(name or "walk")
     body_frames = BODY_FRAMES if footage and options.asf is None else 0
     restarts = RESTARTS if footage and not offers_of(method)[0].looks_ahead else 0
+    train = [recorded.LIBRARY] if by_default else styles
+    evaluations = DEFAULT_TRACKER_EVALUATIONS if by_default else EVALUATIONS
     options = options.changed(
         method=method,
-        train=options.train or ([recorded.LIBRARY] if by_default else styles),
-        evaluations=options.evaluations
-        or (DEFAULT_TRACKER_EVALUATIONS if by_default else EVALUATIONS),
+        train=options.train or train,
+        evaluations=options.evaluations or evaluations,
         translation=options.translation or ("aligned" if footage else "known"),
         restarts=restarts if options.restarts is None else options.restarts,
         body_frames=body_frames if options.body_frames is None else options.body_frames,
@@ -57,6 +68,7 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
     )
     if options.smooth and options.translation == "known":
         raise InputError(
-            "smooth must be given where the translation is searched or aligned, got known"
+            "smooth must be given with a translation that is searched or aligned, "
+            "got known"
         )
     return options

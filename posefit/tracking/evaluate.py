@@ -1,4 +1,4 @@
-"""The last step: errors or signs of trust of a track, and what a user should know before they trust it."""
+"""The last step of a track: its errors or signs of trust, and its warnings."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,19 +32,33 @@ def evaluate(
     options: TrackOptions,
     effort: Effort,
 ) -> Track:
-    """Return a track with errors against the truth where it is known, else signs of trust.
+    """Return the track with its errors, or with signs of trust if the truth is unknown.
 
-    `frames` are those of `tracked`, smoothed. The build is that of `scene`; that of `task` is from before smoothing.
+    Args:
+        scene: The scene, with the final build.
+        frames: The frames of `tracked`, smoothed.
+        tracked: The result of tracking.
+        shape: The fitted build, or None.
+        method: The method.
+        task: The task, with the build from before smoothing.
+        options: The complete options.
+        effort: The evaluations and the time that the track took.
+
+    Returns:
+        The track.
+
     """
     skeleton = scene.body.skeleton
-    posteriors = [
-        frame.posterior
-        and _finished(scene, frame.posterior, options.height is not None)
-        for frame in frames
-    ]
+    height_known = options.height is not None
+    posteriors = []
+    for frame in frames:
+        posterior = frame.posterior
+        if posterior is not None:
+            posterior = _finished(scene, posterior, height_known)
+        posteriors.append(posterior)
     frames = [
-        replace(frame, posterior=each)
-        for frame, each in zip(frames, posteriors, strict=True)
+        replace(frame, posterior=posterior)
+        for frame, posterior in zip(frames, posteriors, strict=True)
     ]
     training = None if scene.truth is None else task.angles
     table, measures = evaluated(
@@ -79,11 +93,17 @@ def evaluate(
         fps=scene.fps,
         frames=scene.count,
     )
-    none_right = [
-        p.recalibration.none
-        for p in posteriors
-        if p is not None and p.recalibration is not None
-    ]
+    none_right = []  # the probabilities that none of a frame's modes is right
+    for posterior in posteriors:
+        if posterior is not None and posterior.recalibration is not None:
+            none_right.append(posterior.recalibration.none)
+    relocalised = []
+    for number, frame in enumerate(frames, scene.first):
+        if RELOCALISED in frame.details:
+            relocalised.append(number)
+    outside = tracked.stay
+    if outside:
+        outside = (scene.first + outside[0], scene.first + outside[1])
     log = TrackingLog(
         hypotheses=tracked.hypotheses,
         build=None if shape is None else shape.as_dict(),
@@ -92,13 +112,8 @@ def evaluate(
         none_of_modes=round(float(np.mean(none_right)), 6) if none_right else None,
         unknown_sides=_numbers(table, "unknown_sides", 1.0),
         lost_frames=_numbers(table, "lost", LOST),
-        relocalised=[
-            scene.first + k
-            for k, frame in enumerate(frames)
-            if RELOCALISED in frame.details
-        ],
-        retracked_outside=tracked.stay
-        and (scene.first + tracked.stay[0], scene.first + tracked.stay[1]),
+        relocalised=relocalised,
+        retracked_outside=outside,
         backwards_share=round(float(backwards.mean()), 6),
         warnings=warnings,
         guesses=[*scene.guesses],
@@ -110,7 +125,10 @@ def evaluate(
 
 
 def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posterior:
-    """Return a posterior with its modes, and less sure where footage leaves more open than single frames show."""
+    """Return a posterior with its modes.
+
+    For footage its uncertainty includes the errors that all frames share.
+    """
     model = posterior.recalibration
     if scene.truth is None and model is not None:
         model = in_footage(model, len(scene.cameras), height_known)
@@ -120,6 +138,9 @@ def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posteri
 
 
 def _numbers(table: Table, name: str, least: float) -> list[int] | None:
-    """Return the numbers of the frames with at least so much in a column; None where all are unknown."""
+    """Return the numbers of the frames with at least `least` in a column.
+
+    Returns None if the whole column is unknown.
+    """
     values = table[name]
     return None if np.isnan(values).all() else table["frame"][values >= least].tolist()

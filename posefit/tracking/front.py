@@ -1,4 +1,7 @@
-"""`posefit.track` and `posefit.fit`: a source becomes a scene, the options are completed, and the scene is tracked."""
+"""The functions `posefit.track` and `posefit.fit`.
+
+They complete the options, make a scene from the source, and track it.
+"""
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
@@ -37,14 +40,9 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
-_ARGUMENTS = (
-    "out",
-    "force",
-    "resume",
-    "write",
-    "progress",
-)  # of a track, besides its options
-# options that may name files, whose content counts
+# the arguments of a track that are no fields of TrackOptions
+_ARGUMENTS = ("out", "force", "resume", "write", "progress")
+# options that may name files, which are compared by content
 _FILES = ("source", "train", "asf", "camera", "extraction")
 
 
@@ -58,25 +56,40 @@ def track(
     progress: Progress | None = None,
     **options: Any,
 ) -> Track:
-    """Return the motion tracked through a source's silhouettes, with its errors where the truth is known.
+    """Track a person through a source's silhouettes.
 
-    `source` is masks, an array (T, H, W), a list of image files, a folder of them, or an .npz or .npy file; a video; a
-    list of any of these, that several cameras took at the same time, such as two lists of image files; a built-in
-    motion's name, a recorded one's, a `Motion`, an .amc or .bvh file; or a `Scene` of a known motion, as it is.
-    Other options are listed below; `posefit.tracking.defaults.completed` has the defaults that depend on the source.
+    The defaults that depend on the source are in `posefit.tracking.defaults.completed`.
 
-    With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
-    not at all. `write` chooses some of these files, such as "bvh,trc" or ["bvh", "trc"]. The frames of a track that
-    ended too early are kept, and `resume` goes on from there. Messages and bars go to `progress`, by default a terminal
-    or a notebook. Raises InputError for any mistake in the arguments or files.
+    Args:
+        source: What is tracked. Footage is masks as an array (T, H, W), a list of image
+            files, a folder of them, or an .npz or .npy file; or a video; or a list of
+            any of these, one for each of several cameras that filmed at the same time.
+            A known motion is the name of a built-in or recorded motion, a `Motion`, an
+            .amc or .bvh file, or a `Scene`, which is tracked as it is.
+        out: A new folder for poses, .amc, .bvh, .trc, .c3d, tables, a video and a
+            picture. It appears only when it is complete. By default nothing is written.
+        force: Whether earlier results in `out` are replaced.
+        resume: Whether to continue an interrupted track, whose frames were kept.
+        write: The files to write, such as "bvh,trc" or ["bvh", "trc"]; by default all.
+        progress: Receives messages and progress bars; by default they go to the
+            terminal or the notebook.
+        options: The options below.
+
+    Returns:
+        The track, with its errors if the truth is known.
+
+    Raises:
+        InputError: There is a mistake in the arguments or files.
+
     """
     _check_names("track", options, [option.name for option in fields(TrackOptions)])
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
     resolved = _resolved(source)
-    changed = [
-        name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)
-    ]
+    changed = []
+    for name in VIEW:
+        if getattr(chosen, name) != getattr(TrackOptions, name):
+            changed.append(name)
     if scene is not None and changed:
         raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
     check_used(resolved.medium, chosen.view)
@@ -85,7 +98,7 @@ def track(
     named = resolved.named[0]
     followed = named if isinstance(named, str | Path | Motion) else None
     chosen = completed(chosen, followed if known else None)
-    # before the work, as a name may be wrong
+    # before the work, because a name may be wrong
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)
     kinds = chosen_kinds(write)
     for name, value in (("resume", resume), ("force", force), ("write", len(write))):
@@ -96,19 +109,13 @@ def track(
     progress = progress or interactive()
     recorder = Recorder()
     if out is not None:
-        recorder = OutputFolder(
-            out,
-            force,
-            resume,
-            _identity(resolved, chosen, options.get("train", ())),
-            progress.log,
-            kinds,
-        )
+        identity = _identity(resolved, chosen, options.get("train", ()))
+        recorder = OutputFolder(out, force, resume, identity, progress.log, kinds)
     with recorder:
         with progress.phase("masks"):
             start = clocks()
             scene = scene or scene_of(resolved, progress, **chosen.view)
-            # a known motion is drawn frame by frame, as it is tracked
+            # a known motion is rendered during tracking, not read here
             if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
                 scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
@@ -117,7 +124,7 @@ def track(
         track = track_scene(
             scene, training, chosen, recorder=recorder, progress=progress
         )
-        # numbers of Python, whatever kind they were given as
+        # Python's numbers, even if NumPy's were given
         view_degrees = list(chosen.view_degrees) or None  # type: ignore[arg-type]
         setup = replace(
             track.setup,
@@ -137,9 +144,17 @@ def fit(
     frame: int | None = None,
     **options: Any,
 ) -> Fit:
-    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`.
+    """Estimate the pose in one frame.
 
-    The frame has its number as filmed, of a motion that after resampling; by default it is the first.
+    Args:
+        source: As for `track`, or one mask (H, W).
+        frame: The frame's number, as filmed or, for a motion, after resampling; by
+            default the first.
+        options: As for `track`, without `frames`.
+
+    Returns:
+        The pose and its track of one frame.
+
     """
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])
@@ -157,12 +172,13 @@ def _check_names(function: str, options: Iterable[str], known: Sequence[str]) ->
 
 
 def _resolved(source: Footage | Scene | Resolved | Sequence[Any]) -> Resolved:
-    """Return what a source is; of a scene, its motion."""
+    """Return the resolved source; for a scene, its motion."""
     if not isinstance(source, Scene):
         return resolve(source)
     if source.truth is None:
         raise InputError(
-            f"a scene must be of a known motion, got {source.name}, whose truth is unknown"
+            "a scene must be of a known motion, "
+            f"got {source.name}, whose truth is unknown"
         )
     return resolve(source.truth)
 
@@ -170,13 +186,14 @@ def _resolved(source: Footage | Scene | Resolved | Sequence[Any]) -> Resolved:
 def _check_for_kind(
     options: TrackOptions, known: bool, motions: Sequence[Footage]
 ) -> None:
-    """Raise InputError for an option of motions' files or of a known truth where there is no such thing."""
+    """Raise InputError for an option that does not apply to the source.
+
+    Some options need .amc files, others a `known` truth. `motions` are all motions that
+    the track reads.
+    """
     captured = any(map(_is_captured, motions))
-    folders = any(
-        Path(motion).is_dir()
-        for motion in options.train
-        if isinstance(motion, str | Path)
-    )
+    named = [motion for motion in options.train if isinstance(motion, str | Path)]
+    folders = any(Path(motion).is_dir() for motion in named)
     if options.rate is not None and not (captured or folders):
         raise InputError(
             f"rate must be given for .amc files only, got {quoted(options.rate)}"
@@ -184,7 +201,8 @@ def _check_for_kind(
     if not known:
         if options.translation == "known":
             raise InputError(
-                "translation must be searched or aligned where only masks are given, got known"
+                "translation must be searched or aligned "
+                "where only masks are given, got known"
             )
         if options.first_pose == "given":
             raise InputError(
@@ -193,7 +211,8 @@ def _check_for_kind(
         return
     if options.asf is not None and not captured:
         raise InputError(
-            f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}"
+            "asf must be given for .amc files and footage only, "
+            f"got {quoted(str(options.asf))}"
         )
 
 
@@ -205,54 +224,48 @@ def _is_captured(motion: Footage) -> TypeGuard[str | Path]:
 def _identity(
     source: Resolved, options: TrackOptions, train: Sequence[Source]
 ) -> dict[str, Digest]:
-    """Return what a track must have in common with one that it goes on with."""
-    values = {
-        option.name: getattr(options, option.name)
-        for option in fields(options)
-        if declared(option).identifies
-    }
+    """Return the digests of the arguments that a resumed track must share."""
+    values = {}
+    for option in fields(options):
+        if declared(option).identifies:
+            values[option.name] = getattr(options, option.name)
     values |= {"source": source.named, "train": train, "version": __version__}
-    # the skeleton beside an .amc counts as if it were given
-    if beside := [
-        skeleton_file(Path(motion), options.asf)
-        for motion in (*source.named, *options.train)
-        if isinstance(motion, str | Path) and _is_captured(motion)
-    ]:
-        values["asf"] = beside
-    # a folder of that name is not read
-    named = source.medium == "motion" and source.named[0] in built_in.names()
-    return {
-        name: digest_of(
-            value, files=name in _FILES and not (named and name == "source")
-        )
-        for name, value in values.items()
-    }
+    # the skeleton in the folder of an .amc counts as if it were given
+    skeletons = []
+    for motion in (*source.named, *options.train):
+        if _is_captured(motion):
+            skeletons.append(skeleton_file(Path(motion), options.asf))
+    if skeletons:
+        values["asf"] = skeletons
+    read = set(_FILES)
+    # a folder with the name of a built-in motion is not read
+    if source.medium == "motion" and source.named[0] in built_in.names():
+        read.discard("source")
+    return {name: digest_of(value, name in read) for name, value in values.items()}
 
 
 def _documented(function: Callable[..., Any]) -> None:
-    """Show the options of a track in a function's signature and docstring, as if it declared them itself."""
-    parameters = [
-        each
-        for each in inspect.signature(function).parameters.values()
-        if each.kind is not each.VAR_KEYWORD
-    ]
-    listed = [
-        option
-        for option in fields(TrackOptions)
-        if function is track or option.name != "frames"
-    ]
-    kind = inspect.Parameter.KEYWORD_ONLY
-    more = [
-        inspect.Parameter(
-            option.name, kind, default=option.default, annotation=option.type
+    """Add the options of a track to a function's signature and docstring."""
+    parameters = []
+    for parameter in inspect.signature(function).parameters.values():
+        if parameter.kind is not parameter.VAR_KEYWORD:
+            parameters.append(parameter)
+    lines = []
+    for option in fields(TrackOptions):
+        if function is fit and option.name == "frames":
+            continue
+        parameter = inspect.Parameter(
+            option.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=option.default,
+            annotation=option.type,
         )
-        for option in listed
-    ]
-    function.__signature__ = inspect.Signature([*parameters, *more])  # type: ignore[attr-defined]
-    lines = "\n".join(
-        f"    {option.name}: {declared(option).help}" for option in listed
-    )
-    function.__doc__ = f"{(function.__doc__ or '').rstrip()}\n\n    Options:\n{lines}\n"
+        parameters.append(parameter)
+        lines.append(f"    {option.name}: {declared(option).help}\n")
+    signature = inspect.Signature(parameters)
+    function.__signature__ = signature  # type: ignore[attr-defined]
+    described = (function.__doc__ or "").rstrip()
+    function.__doc__ = f"{described}\n\n    Options:\n{''.join(lines)}"
 
 
 _documented(track)

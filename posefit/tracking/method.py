@@ -1,4 +1,7 @@
-"""A method by its one string, `sapso@pca`, `cma`, `@loose` or a tracker's name: settings checked, plugins watched."""
+"""Methods by name, such as `sapso@pca`, `cma`, `@loose` or a tracker's name.
+
+Their settings are checked here, and errors are attributed to the plugin that made them.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -35,12 +38,15 @@ from posefit.tracking.options import TrackOptions
 
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR = "pca"
-DEFAULT_START = "lookup"  # what guesses the first pose, where it is installed
-BLIND = "blind"  # the name of no such guess
+DEFAULT_START = "lookup"  # guesses the first pose, if it is installed
+BLIND = "blind"  # the name for no such guess
 
 
 class MethodNames(NamedTuple):
-    """The plugins that a method names: an optimiser and a prior, or a tracker, which has neither ("")."""
+    """The names of a method's plugins: an optimiser and a prior, or a tracker.
+
+    With a tracker the other two are "".
+    """
 
     optimiser: str
     prior: str
@@ -51,7 +57,19 @@ class MethodNames(NamedTuple):
 
 
 def method_names(method: str, default_prior: str = DEFAULT_PRIOR) -> MethodNames:
-    """Return the plugins that a method such as `sapso@pca` names. Raises InputError listing those that are known."""
+    """Return the names of the plugins of a method such as `sapso@pca`.
+
+    Args:
+        method: OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker.
+        default_prior: The prior of a method that names none.
+
+    Returns:
+        The names.
+
+    Raises:
+        InputError: The name is unknown; the message lists the known ones.
+
+    """
     optimiser, at, prior = method.partition("@")
     if at:
         return MethodNames(optimiser or DEFAULT_OPTIMISER, prior or default_prior)
@@ -62,20 +80,28 @@ def method_names(method: str, default_prior: str = DEFAULT_PRIOR) -> MethodNames
     if family in offers["optimiser"]:
         return MethodNames(optimiser, default_prior)
     known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
-    hint = (
-        f"; as a prior it is @{optimiser}"
-        if family in offers["prior"]
-        else registry().hint(family, known)
-    )
+    hint = registry().hint(family, known)
+    if family in offers["prior"]:
+        hint = f"; as a prior it is @{optimiser}"
     raise InputError(
-        f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {quoted(method)}{hint}"
+        f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, "
+        f"got {quoted(method)}{hint}"
     )
 
 
 def offers_of(method: Any) -> tuple[Offer, str | Prior | None]:
-    """Return what a method of `TrackOptions` names: an optimiser and its prior, or a tracker and None.
+    """Return the plugins of a method.
 
-    Raises InputError where a name is wrong, and ImportError where a library is not installed.
+    Args:
+        method: A method as in `TrackOptions`.
+
+    Returns:
+        An optimiser and its prior, or a tracker and None.
+
+    Raises:
+        InputError: A name is unknown.
+        ImportError: A library is not installed.
+
     """
     if isinstance(method, tuple):
         return _offered("optimiser", method[0]), method[1]
@@ -89,46 +115,64 @@ def offers_of(method: Any) -> tuple[Offer, str | Prior | None]:
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A method ready to track: its prior has learned, and `follow` yields a frame for each observation of a task."""
+    """A method that is ready to track.
+
+    Attributes:
+        name: Such as `sapso@pca`.
+        prior: The fitted prior, or None for a tracker from a plugin.
+        settings: The settings by kind of plugin.
+        looks_ahead: Whether the tracker takes several observations before it yields a
+            frame.
+        relocalise_gap: The length in frames of a gap in footage after which the tracker
+            relocalises, or 0 for never.
+        audit: The violations of rules that its trackers made so far.
+        follow: Yields a frame for each observation of a task. It is
+            `posefit.fitting.driving.drive` for this method's tracker and audit.
+        start: Guesses first poses, or None for blind searches.
+
+    """
 
     name: str
-    # which has learned; None for a tracker that is a plugin itself
     prior: Latents | None
     settings: dict[str, dict[str, Any]]
-    # whether its tracker takes several observations before it yields a frame
     looks_ahead: bool
-    # frames of a gap in footage after which it relocalises, 0 for never
     relocalise_gap: int
-    audit: Audit  # what its trackers reported wrongly so far
-    # see `posefit.fitting.driving.drive`, whose tracker and audit are the method's
+    audit: Audit
     follow: Follow = field(repr=False)
-    # guesses first poses; None for blind searches
     start: InitialiserFactory | None = field(default=None, repr=False)
 
     def dimensions(self, task: Task) -> int | None:
-        """Return how many coordinates a proposal has; None for a tracker that is a plugin itself."""
+        """Return the coordinates of a proposal, or None for a tracker from a plugin."""
         if self.prior is None:
             return None
         return 3 + 3 * (task.translation == "searched") + len(self.prior.low)
 
 
 def prepare(options: TrackOptions, task: Task) -> Method:
-    """Return the method of some options, its prior learned from a task's training motions.
+    """Return the method of some options, with its prior fitted to a task's motions.
 
-    Raises InputError where a name, a setting or the budget is wrong, ImportError where a library is not installed, and
-    BrokenRuleError where a plugin does not do what its kind has to.
+    Args:
+        options: The complete options.
+        task: The task, with its training motions and its budget.
+
+    Returns:
+        The method.
+
+    Raises:
+        InputError: A name, a setting or the budget is wrong.
+        ImportError: A library is not installed.
+        BrokenRuleError: A plugin breaks the rules of its kind.
+
     """
     optimiser, prior_choice = offers_of(options.method)
     if prior_choice is None:
         return _tracker_method(optimiser, options.settings)
-    prior = (
-        registry().offer("prior", prior_choice)
-        if isinstance(prior_choice, str)
-        else None
-    )
-    plugin_settings = parsed_settings(
-        [optimiser] if prior is None else [optimiser, prior], options.settings
-    )
+    offers = [optimiser]
+    prior = None
+    if isinstance(prior_choice, str):
+        prior = registry().offer("prior", prior_choice)
+        offers.append(prior)
+    plugin_settings = parsed_settings(offers, options.settings)
     plugin_settings.setdefault("prior", {})
     stated = plugin_settings["optimiser"]
     planned = settings.planned(optimiser.factory, stated, task.evaluations)
@@ -150,17 +194,16 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         learned = Checked(learned, label)
     if task.training:
         check_prior(learned, task.angles, task.body.skeleton, label)
-    # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
-    prediction = Prediction(
-        **{
-            **({} if prior is not None else {"tilt": "box"}),
-            **plugin_settings["tracker"],
-        }
-    )
+    predicting: dict[str, Any] = {}
+    if prior is None:
+        # The motions from which a fitted prior has learned are unknown, so that a tilt
+        # that is learned from the task's motions does not fit it.
+        predicting["tilt"] = "box"
+    prediction = Prediction(**{**predicting, **plugin_settings["tracker"]})
     tilt = prediction.tilted(learned, task.training)
 
     def make(space: Space, rng: np.random.Generator, evaluations: int) -> Optimiser:
-        # schedules follow the budget
+        # schedules depend on the budget
         values = settings.planned(optimiser.factory, stated, evaluations)
         with _rules(optimiser):
             made = optimiser.factory(space, rng, **values)
@@ -189,61 +232,77 @@ def prepare(options: TrackOptions, task: Task) -> Method:
 
 
 def start_of(name: str | None = None) -> InitialiserFactory | None:
-    """Return what guesses first poses, by its name; the default one where it is installed; None for "blind"."""
+    """Return the initialiser of a name, which guesses first poses.
+
+    By default it is `DEFAULT_START`. Returns None for "blind", or if no name is given
+    and the default is not installed.
+    """
     offered = registry().offers["start"]
     one_of("start", name or BLIND, [BLIND, *sorted(offered)])
     if name == BLIND or (name is None and DEFAULT_START not in offered):
         return None
-    factory: InitialiserFactory = (
-        registry().offer("start", name or DEFAULT_START).factory
-    )
+    offer = registry().offer("start", name or DEFAULT_START)
+    factory: InitialiserFactory = offer.factory
     return factory
 
 
 def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
-    """Return the kind and the factory of each name that settings of a method begin with, by the plugins it names."""
-    places: dict[str, tuple[str, Callable[..., Any]]] = {
-        offer.name.partition(":")[0]: (offer.kind, offer.factory) for offer in offers
-    }
-    return (
-        places
-        if offers[0].kind == "tracker"
-        else places | {"tracker": ("tracker", Prediction)}
-    )
+    """Return the kind and the factory for each name with which settings may begin."""
+    places: dict[str, tuple[str, Callable[..., Any]]] = {}
+    for offer in offers:
+        places[offer.name.partition(":")[0]] = (offer.kind, offer.factory)
+    # an optimiser and a prior are used by the synthesis tracker, which has settings too
+    if offers[0].kind != "tracker":
+        places["tracker"] = ("tracker", Prediction)
+    return places
 
 
 def parsed_settings(
     offers: Sequence[Offer], values: Mapping[str, Any] | Sequence[str]
 ) -> dict[str, dict[str, Any]]:
-    """Return settings by the kind of plugin that they are of.
+    """Return checked settings by kind of plugin.
 
-    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
-    left out where it alone has such a setting. Raises InputError where a text has another form, names a plugin that is
-    not among `offers` or a setting that it does not know, or where a value does not fit.
+    Args:
+        offers: The plugins of the method.
+        values: Values by names such as `sapso.cooling`, or strings such as
+            `sapso.cooling=0.9`. The plugin's name may be left out if only one plugin
+            has such a setting.
+
+    Returns:
+        The settings of each kind of plugin.
+
+    Raises:
+        InputError: A string has another form, a plugin or a setting is unknown, or a
+            value is not valid.
+
     """
     places = places_of(offers)
     by_plugin: dict[str, dict[str, Any]] = {name: {} for name in places}
-    stated = isinstance(values, Mapping)  # else texts, whose values are to be parsed
-    items: Iterable[tuple[str, Any]] = (
-        values.items() if isinstance(values, Mapping) else map(_assignment, values)
-    )
+    # values in a mapping are checked, and values in strings are parsed
+    read: Callable[..., dict[str, Any]] = settings.parse
+    items: Iterable[tuple[str, Any]]
+    if isinstance(values, Mapping):
+        read = settings.check
+        items = values.items()
+    else:
+        items = map(_assignment, values)
     for key, value in items:
         name, setting = _owner(key, places)
         if setting in by_plugin[name]:
             raise InputError(f"a setting must be given once, got {quoted(key)} twice")
         by_plugin[name][setting] = value
-    checked = settings.check if stated else settings.parse
-    return {
-        kind: checked(name, factory, by_plugin[name])
-        for name, (kind, factory) in places.items()
-    }
+    checked = {}
+    for name, (kind, factory) in places.items():
+        checked[kind] = read(name, factory, by_plugin[name])
+    return checked
 
 
 def _assignment(text: str) -> tuple[str, str]:
     key, equals, value = text.partition("=")
     if not equals or key.endswith("."):
         raise InputError(
-            f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(text)}"
+            "a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, "
+            f"got {quoted(text)}"
         )
     return key, value
 
@@ -251,28 +310,34 @@ def _assignment(text: str) -> tuple[str, str]:
 def _owner(
     key: str, places: Mapping[str, tuple[str, Callable[..., Any]]]
 ) -> tuple[str, str]:
-    """Return the plugin and the setting that a key names; the plugin may be left out where it alone has the setting."""
+    """Return the plugin and the setting that a key names.
+
+    The plugin may be left out if only one plugin has the setting.
+    """
     plugin, dot, setting = key.partition(".")
     if dot and plugin in places:
         return plugin, setting
     if dot:
         raise InputError(
-            f"a setting must name one of {', '.join(places)}, which are in use here, got {quoted(key)}"
+            f"a setting must name one of {', '.join(places)}, "
+            f"which are in use here, got {quoted(key)}"
         )
     names = {plugin: settings.names(factory) for plugin, (_, factory) in places.items()}
     owners = [plugin for plugin in names if key in names[plugin]]
     if len(owners) != 1:
-        known = ", ".join(
-            f"{plugin}.{setting}" for plugin in names for setting in names[plugin]
+        known = []
+        for plugin, settings_of in names.items():
+            known += [f"{plugin}.{setting}" for setting in settings_of]
+        raise InputError(
+            f"a setting must be one of {', '.join(known)}, got {quoted(key)}"
         )
-        raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
     return owners[0], key
 
 
 def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> Method:
     plugin_settings = parsed_settings([offer], values)["tracker"]
     defaults = {setting.name: setting.default for setting in offer.settings}
-    # of the costs that it gives
+    # the weight in the costs that it reports
     beta = {"beta": BETA, **defaults, **plugin_settings}["beta"]
     beta = float(beta) if isinstance(beta, float | int) else BETA
 
@@ -291,7 +356,10 @@ def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> 
 
 
 def _rules(offer: Offer, what: str = "construction") -> AbstractContextManager[None]:
-    """Return a context that passes ValueErrors on, and blames the plugin for whatever else a call raises."""
+    """Return a context that attributes errors to a plugin.
+
+    ValueErrors and ImportErrors are passed on.
+    """
     return plugin_errors(offer.label, what, passed=(ValueError, ImportError))
 
 

@@ -1,7 +1,8 @@
-"""The options of a track, each declared once: `posefit.track` and the flags of the command line are made of them.
+"""The options of a track, for `posefit.track` and the flags of the command line.
 
-An option is one line of `TrackOptions`: its type and default, and with `option(...)` its help, unit and check. Nothing
-slow is imported here, as every start of the command line reads it.
+Each option is declared once, as a field of `TrackOptions`: its type and default, and
+with `option(...)` its help, unit and check. Nothing slow is imported here, because
+every start of the command line imports this module.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,43 +30,54 @@ if TYPE_CHECKING:
     from posefit.geometry.units import Unit
     from posefit.motion.clips import FileOptions, Source
 
-# of a frame: N (C + 1) with N = 40 and C = 60 of the SAPSO paper, section 5.2
+# per frame: N (C + 1) with N = 40 and C = 60 of the SAPSO paper, section 5.2
 EVALUATIONS = 2440
 LARGEST_SIDE = 16_384  # pixels of a rendered picture
 
-# of a name and a value that is not None: the value as it is used; raises InputError
+# takes the name and a value that is not None; returns the value to use, or raises
+# InputError
 Check = Callable[[str, Any], Any]
 
 
 class Option(NamedTuple):
-    """What is declared of an option beside its name, type and default."""
+    """The declaration of an option, except for its name, type and default.
+
+    Attributes:
+        help: One sentence for the user.
+        check: The check of a value, or None for no check.
+        unit: The unit or form of the value: the placeholder on the command line.
+        flag: The flag on the command line: None for the option's name, "" for no flag.
+        parse: Parses a string from the command line; `bool` makes a pair of flags.
+        repeated: Whether the flag may be given several times.
+        identifies: Whether a resumed track must have the same value.
+        heading: The heading in the help, for this option and the next ones.
+        live: Whether `posefit track --live` takes the option.
+
+    """
 
     help: str
     check: Check | None = None
-    # or the form of its text; what the command line shows as a placeholder
     unit: str = ""
-    # of the command line; None for the name itself, "" for none
     flag: str | None = None
-    # of a text of the command line; bool for a pair of flags
     parse: Callable[[str], Any] = str
-    repeated: bool = False  # whether the flag may be given several times
-    identifies: bool = True  # whether a track that goes on must have the same value
-    heading: str = ""  # in the help, of this option and those below it
-    live: bool = True  # whether `posefit track --live` takes it
+    repeated: bool = False
+    identifies: bool = True
+    heading: str = ""
+    live: bool = True
 
 
 def option(default: Any, text: str, *more: Any, **others: Any) -> Any:
-    """Return the dataclass field of an option; see `Option` for what else may be given."""
+    """Return the dataclass field of an option; the rest is as in `Option`."""
     return field(default=default, metadata={"option": Option(text, *more, **others)})
 
 
 def declared(field: "Field[Any]") -> Option:
-    """Return what is declared of a field of `TrackOptions`."""
+    """Return the declaration of a field of `TrackOptions`."""
     return field.metadata["option"]  # type: ignore[no-any-return]
 
 
 def choice(*choices: object) -> Check:
-    """Return the check of one of some values."""
+    """Return a check that a value is one of the choices."""
 
     def check(name: str, value: Any) -> Any:
         one_of(name, value, choices)
@@ -75,7 +87,7 @@ def choice(*choices: object) -> Check:
 
 
 def within(low: float, high: float, unit: str = "") -> Check:
-    """Return the check of a number in a range."""
+    """Return a check that a value is a number in a range."""
 
     def check(name: str, value: Any) -> float:
         if not low <= finite_number(name, value) <= high:
@@ -126,10 +138,9 @@ def _range(name: str, value: Any) -> tuple[int | None, int | None]:
         raise InputError(
             f"{name} must be two whole numbers or None, got {quoted(value)}"
         )
-    return (
-        None if start is None else int(start),
-        None if stop is None else int(stop),
-    )
+    first = None if start is None else int(start)
+    last = None if stop is None else int(stop)
+    return first, last
 
 
 def _person(name: str, value: Any) -> "Choice":
@@ -144,14 +155,14 @@ def _is_whole(value: Any) -> bool:
 
 
 def _device(_name: str, value: Any) -> str:
-    from posefit.silhouette.cuda.device import check_device
+    from posefit.footage.device import device_of
 
-    check_device(value)
+    device_of(value)
     return str(value)
 
 
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
-    values = value.tolist() if hasattr(value, "tolist") else value  # an array
+    values = value.tolist() if hasattr(value, "tolist") else value  # for an array
     check = within(-360.0, 360.0, " degrees")
     if not isinstance(values, Sequence) or isinstance(values, str):
         return (check(name, values),)
@@ -173,7 +184,7 @@ def _path(name: str, value: Any) -> str | Path:
 
 
 def _cameras(name: str, value: Any) -> tuple[Any, ...]:
-    """Return cameras, their calibrations and names of files."""
+    """Return cameras, calibrations or names of files as a tuple."""
     from posefit.geometry.calibration import Calibration
     from posefit.geometry.camera import Camera
 
@@ -191,19 +202,18 @@ def _extraction(name: str, value: Any) -> "Extraction":
 
     if not isinstance(value, Extraction):
         raise InputError(
-            f"{name} must be an Extraction, such as Extraction('mixture'), got {quoted(value)}"
+            f"{name} must be an Extraction, such as Extraction('mixture'), "
+            f"got {quoted(value)}"
         )
     return value
 
 
 def _method(name: str, value: Any) -> Any:
-    if not (
-        isinstance(value, str)
-        or callable(value)
-        or (isinstance(value, tuple) and len(value) == 2)
-    ):
+    is_pair = isinstance(value, tuple) and len(value) == 2
+    if not (isinstance(value, str) or callable(value) or is_pair):
         raise InputError(
-            f"{name} must be a name, a factory, or a pair of optimiser and prior, got {quoted(value)}"
+            f"{name} must be a name, a factory, or a pair of optimiser and prior, "
+            f"got {quoted(value)}"
         )
     return value
 
@@ -215,7 +225,7 @@ def _sources(name: str, value: Any) -> Sequence[Any]:
 
 
 def text_size(text: str) -> tuple[int, int]:
-    """Return the width and the height that a text WxH states. Raises InputError for any other text."""
+    """Return the width and height in a text WxH. Raises InputError for another form."""
     width, _, height = text.lower().partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise InputError(f"expected WIDTHxHEIGHT such as 320x240, got {quoted(text)}")
@@ -223,7 +233,10 @@ def text_size(text: str) -> tuple[int, int]:
 
 
 def text_range(text: str) -> tuple[int | None, int | None]:
-    """Return the ends that a text A:B states; either may be left out. Raises InputError for any other text."""
+    """Return the ends of a range from a text A:B, either of which may be left out.
+
+    Raises InputError for another form.
+    """
     start, colon, stop = text.partition(":")
     try:
         if colon:
@@ -234,17 +247,24 @@ def text_range(text: str) -> tuple[int | None, int | None]:
 
 
 def text_label(text: str) -> int:
-    """Return the number of a label such as 15, or 0x800000 for a colour. Raises InputError for any other text."""
+    """Return the number of a label such as 15, or of a colour such as 0x800000.
+
+    Raises InputError for another form.
+    """
     try:
         return int(text, 0)
     except ValueError:
         raise InputError(
-            f"expected a whole number such as 15, or a colour 0xRRGGBB, got {quoted(text)}"
+            "expected a whole number such as 15, or a colour 0xRRGGBB, "
+            f"got {quoted(text)}"
         ) from None
 
 
 def text_person(text: str) -> "Choice":
-    """Return the number of a person, for a text N, or their place, for X,Y. Raises InputError for any other text."""
+    """Return the number of a person from a text N, or a position in pixels from X,Y.
+
+    Raises InputError for another form.
+    """
     try:
         if "," not in text:
             return int(text)
@@ -258,40 +278,45 @@ def text_person(text: str) -> "Choice":
 
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions:
-    """The options of a track, checked; what is None or empty is decided by the source."""
+    """The options of a track, checked.
+
+    For an option that is None or empty, the default depends on the source.
+    """
 
     asf: str | Path | None = option(
         None,
-        "Skeleton of SOURCE; by default the only .asf beside an .amc.",
+        "Skeleton of SOURCE. Default: the only .asf in the folder of an .amc.",
         _path,
         "FILE",
-        heading="What is seen",
+        heading="Source and camera",
     )
     camera: "Camera | str | Path | Sequence[Camera | str | Path]" = option(
         (),
-        "Calibration, one a view; guessed where absent.",
+        "Calibration file, one per view. Default: guessed.",
         _cameras,
         "FILE",
         repeated=True,
     )
     up: "Up | None" = option(
         None,
-        "Axis that points up: in the calibration's world, or in that of a .bvh or .amc file; recognised where absent.",
+        "Axis that points up in the world of a calibration, or of a .bvh or .amc "
+        "file. Default: recognised.",
         choice("x", "y", "z"),
         "x|y|z",
     )
     unit: "Unit | None" = option(
         None,
-        "Unit of lengths in a calibration, or in a .bvh or .asf file; recognised where absent.",
+        "Unit of lengths in a calibration, or in a .bvh or .asf file. "
+        "Default: recognised.",
         choice(*UNITS),
         "|".join(UNITS),
     )
     rate: float | None = _float(
-        "Rate of .amc files that do not state it; by default 120.", RATES, "HZ"
+        "Frame rate of .amc files that do not state it. Default: 120.", RATES, "HZ"
     )
     view_degrees: float | Sequence[float] = option(
         (),
-        "Where a camera stands: 0 in front, 90 to the side; repeatable.",
+        "Direction of a camera: 0 in front, 90 at the side; repeatable.",
         _degrees,
         "DEGREES",
         None,
@@ -300,41 +325,43 @@ class TrackOptions:
     )
     size: tuple[int, int] | None = option(
         None,
-        "Image of a rendered motion, by default 320x240.",
+        "Image size of a rendered motion. Default: 320x240.",
         _size,
         "WxH",
         parse=text_size,
         live=False,
     )
     fps: float | None = _float(
-        "Rate to resample a motion to, or of masks; by default 30, or theirs.",
+        "Frame rate of masks, or the rate to which a motion is resampled. "
+        "Default: the masks' own rate; 30 for motions.",
         RATES,
         "HZ",
     )
     frames: "Range" = option(
         (None, None),
-        "Only these frames, (start, stop) in Python: of footage as filmed, of a motion after resampling.",
+        "Only these frames, in Python (start, stop). Footage is counted as filmed, and "
+        "a motion after resampling.",
         _range,
         "A:B",
-        "",  # `track` has it, and `fit` one frame instead
+        "",  # the command `track` adds this flag; `fit` has --frame instead
         text_range,
         live=False,
     )
     extraction: "Extraction | None" = option(
-        None, "How the person is taken out of video.", _extraction, flag=""
+        None, "How to segment the person in video.", _extraction, flag=""
     )
     height: float | None = _float(
-        "How tall the person in the footage stands.", HEIGHTS, "METRES", " metres"
+        "Height of the person in footage.", HEIGHTS, "METRES", " metres"
     )
     label: int | None = _int(
         None,
-        "Of masks: the value or the colour that the person has.",
+        "Value or colour of the person in masks.",
         0,
         parse=text_label,
         live=False,
     )
     holes: float | None = _float(
-        "Of masks: fill holes up to this share of the person; by default 0.02.",
+        "Fill holes in masks up to this share of the person. Default: 0.02.",
         (0.0, 1.0),
         "SHARE",
         ", a share of the person's area",
@@ -342,25 +369,28 @@ class TrackOptions:
     )
     person: "Choice | None" = option(
         None,
-        "Of several people: the number that the warning gives them, 1 the longest visible, or the X,Y there.",
+        "Person to track if there are several: the number in the warning (1 is visible "
+        "the longest), or the position X,Y given there.",
         _person,
         "N|X,Y",
         parse=text_person,
         live=False,
     )
-    # the options above say how a source is looked at, see `VIEW`
+    # `VIEW` has all options above this line
     method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(
         None,
-        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or annealed@pca "
-        "for a built-in motion. In Python also a tracker's factory, or a pair: an optimiser's name or factory, and a "
-        "prior's name or one that has learned.",
+        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker; see `posefit plugins`. "
+        "Default: exemplars, or annealed@pca for a built-in motion. In Python also a "
+        "tracker's factory, or a pair of an optimiser's name or factory and a prior's "
+        "name or a fitted prior.",
         _method,
         "METHOD",
         heading="Method and budget",
     )
     settings: Mapping[str, Any] | Sequence[str] = option(
         (),
-        "Of a plugin, such as sapso.cooling=0.9 or, where one alone has it, cooling=0.9; repeatable.",
+        "Setting of a plugin, such as sapso.cooling=0.9, or cooling=0.9 if only one "
+        "plugin has it; repeatable.",
         None,
         "[NAME.]SETTING=VALUE",
         "set",
@@ -368,65 +398,69 @@ class TrackOptions:
     )
     train: "Sequence[Source]" = option(
         (),
-        "What the method learns from: a motion, a folder, library, or library:16; repeatable. By default library for "
-        "exemplars, else other styles of a built-in motion, or walks.",
+        "Training motions: a motion, a folder, library, or library:16; repeatable. "
+        "Default: library for exemplars; for other methods the other styles of a "
+        "built-in motion, or walks.",
         _sources,
         "SOURCE",
         repeated=True,
     )
     evaluations: int | None = _int(
         None,
-        "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.",
+        "Budget per frame. Default: 9760 for exemplars, else N (C + 1) = 40 x 61 = "
+        "2440.",
         1,
         "POSES",
     )
     translation: "Translation | None" = option(
         None,
-        "Of the root: known (the truth), searched, or aligned.",
+        "Position of the root: known (the truth), searched, or aligned.",
         choice("known", "searched", "aligned"),
         "HOW",
-        heading="How it is followed",
+        heading="Tracking",
     )
     first_pose: Literal["searched", "given"] = option(
         "searched",
-        "searched, or given (the true one).",
+        "First pose: searched, or given (the truth).",
         choice("searched", "given"),
         "HOW",
     )
     restarts: int | None = _int(
         None,
-        "Searches of an unknown first pose, at most; by default 8, or 0 for a tracker that looks ahead.",
+        "Largest number of searches for an unknown first pose. Default: 8, or 0 for "
+        "a tracker that looks ahead.",
         0,
     )
     body_frames: int | None = _int(
         None,
-        "Frames a build is fitted to; by default 12 for footage, 0 for none.",
+        "Frames to which the build is fitted. Default: 12 for footage, else 0.",
         0,
         live=False,
     )
     hypotheses: int = _int(
         1,
-        "Tracks from different initial guesses, each at the full budget; one is kept.",
+        "Number of tracks from different initial guesses, each at the full budget. One "
+        "is kept.",
         1,
         live=False,
     )
     smooth: bool | None = option(
         None,
-        "The root moves smoothly, and feet do not slide; the default for footage.",
+        "Smooth the root, and keep feet from sliding. Default for footage.",
         _flag,
         parse=bool,
         identifies=False,
         live=False,
     )
-    seed: int = _int(0, "Of all random numbers.", 0, heading="Method and budget")
+    seed: int = _int(0, "Seed of all random numbers.", 0, heading="Method and budget")
     threads: int = _int(
-        1, "The result is the same with any number.", 1, identifies=False
+        1, "Number of threads. Does not change the result.", 1, identifies=False
     )
     device: str = option(
         "cpu",
-        "Where poses are drawn: cpu, or cuda with a GPU.",
+        "Where poses are rasterised: cpu, or a plugin's device, such as a GPU.",
         _device,
-        "cpu|cuda",
+        "NAME",
         identifies=False,
     )
 
@@ -441,20 +475,20 @@ class TrackOptions:
 
     @property
     def view(self) -> dict[str, Any]:
-        """The options that say how a source is looked at, as `posefit.footage.source.scene_of` takes them."""
+        """The options of `VIEW`, for `posefit.footage.source.scene_of`."""
         return {name: getattr(self, name) for name in VIEW}
 
     @property
     def of_files(self) -> "FileOptions":
-        """What is stated of the files that are learned from."""
+        """The options for the files of training motions."""
         from posefit.motion.clips import FileOptions
 
         return FileOptions(self.asf, rate=self.rate)
 
     def changed(self, **values: Any) -> Self:
-        """Return these options with some of them replaced, checked again."""
+        """Return these options with some replaced, and all checked again."""
         return replace(self, **values)
 
 
 _NAMES = [each.name for each in fields(TrackOptions)]
-VIEW = _NAMES[: _NAMES.index("method")]  # the options that `TrackOptions.view` holds
+VIEW = _NAMES[: _NAMES.index("method")]  # the options of the source and its cameras

@@ -22,7 +22,8 @@ from posefit.evaluation.measures import Effort
 from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.driving import clocks
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.footage.scene import Scene, on_device
+from posefit.footage.device import on_device
+from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import geodesic
 from posefit.motion.motion import Motion

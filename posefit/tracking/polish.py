@@ -1,7 +1,8 @@
-"""One frame by itself: the poses that its search left open, moved until their contours are those of the masks.
+"""Polishing of a single frame: its open poses are fitted to the contours of the masks.
 
-A search moves a pose only as its prior can. Here every joint may give way, as it does in the smoothing of a track; what
-the polished poses cost says which of them is reported, and how likely the others are.
+A search moves a pose only as its prior allows. Here every joint may move, as in the
+smoothing of a track. The cheapest polished pose is reported, and the costs of the
+others say how likely they are.
 """
 
 from dataclasses import replace
@@ -29,16 +30,19 @@ from posefit.silhouette.cost import known_views, pose_costs
 from posefit.tracking.initialise import guessed
 from posefit.uncertainty.modes import APART, Posterior, poses_apart
 
-SHARE = 0.5  # of a frame's evaluations: those of polishing
-# standard deviations that a searched pose is off: radians, and metres
+SHARE = 0.5  # the share of a frame's evaluations that is for polishing
+# standard deviations of a searched pose's errors, in radians and in metres
 TURN = np.radians(8.0)
 SHIFT = 0.05
-# at least, of these: what a look-up leaves
+# a look-up leaves at least this share of the evaluations for polishing
 LOOKED_SHARE = 0.9
 
 
 def polish_evaluations(evaluations: int) -> int:
-    """Return how many of a frame's evaluations are for polishing; none where they do not suffice for one pose."""
+    """Return the number of a frame's evaluations for polishing.
+
+    It is 0 if they do not suffice for one pose.
+    """
     share = int(SHARE * evaluations)
     return share if race_count(LOOKED_SHARE * share) else 0
 
@@ -50,10 +54,11 @@ def _library(fps: float) -> list[Motion]:
 
 
 def looked_up(task: Task, observation: Observation) -> tuple[list[Posterior], int]:
-    """Return modes of what a picture may show, the likeliest first, and the evaluations of the look-up.
+    """Return likely poses of a picture, and the evaluations of the look-up.
 
-    A built-in walk is all that a prior of built-in walks knows, but not all that people do: where nothing else is to be
-    learned from, they are looked up in the library.
+    The likeliest pose is first. A prior of built-in walks knows nothing else, but
+    people do more than walk. So if all training motions are built-in, poses are looked
+    up in the library.
     """
     modes = task.modes
     used = 0
@@ -66,17 +71,19 @@ def looked_up(task: Task, observation: Observation) -> tuple[list[Posterior], in
 def polished(
     task: Task, frame: Frame, observation: Observation, evaluations: int, beta: float
 ) -> Frame:
-    """Return a frame whose poses, and their reflections, are fitted to the contours; the cheapest is its pose.
+    """Return a frame after its poses and their reflections were fitted to the contours.
+
+    The cheapest of them becomes the frame's pose.
 
     Args:
-        task: what the search of the frame knew, and what looks poses up.
-        frame: its result, with a posterior where it left several poses open.
-        observation: the masks.
-        evaluations: the effort, see `polish_evaluations`.
-        beta: that of the cost.
+        task: The task of the search.
+        frame: The result of the search, with a posterior if several poses are open.
+        observation: The masks.
+        evaluations: The number of evaluations, from `polish_evaluations`.
+        beta: The weight `beta` of the cost.
 
     Returns:
-        The frame, with the evaluations of both.
+        The frame, with the evaluations of the search and of polishing.
 
     """
     scene = task.body, task.cameras, observation.silhouettes
@@ -84,7 +91,7 @@ def polished(
     def cost(poses: Array, places: Array) -> Array:
         return pose_costs(*scene, poses, places, beta)[0]
 
-    # of what is looked up, the poses as they are: the prior may not know them
+    # poses of the library are taken unchanged, because the prior may not know them
     modes, looking = looked_up(task, observation)
     count = race_count(evaluations - looking)
     modes = modes[: count // 2]
@@ -92,10 +99,9 @@ def polished(
     poses = np.concatenate([*(mode.poses[:1] for mode in modes), poses])[:count]
     places = np.concatenate([*(mode.translations[:1] for mode in modes), places])
     places = places[:count]
+    place = frame.translation[None]
     views = [
-        MaskContours.of(
-            camera, view, [observation], frame.translation[None], POINT_SPACING
-        )
+        MaskContours.of(camera, view, [observation], place, POINT_SPACING)
         for view, camera in enumerate(task.cameras)
     ]
     start = poses, places
@@ -119,7 +125,7 @@ def polished(
 
 
 def beyond_prior(prior: Latents, skeleton: Skeleton, pose: Array) -> str:
-    """Return what a user should know of a pose (66,) that a prior does not know; "" where it does."""
+    """Return a warning if a prior does not know a pose (66,), or ""."""
     latents = np.clip(prior.transform(pose[None, 3:]), prior.low, prior.high)
     nearest = pose[None].copy()
     nearest[:, 3:] = prior.inverse_transform(latents)
@@ -127,13 +133,14 @@ def beyond_prior(prior: Latents, skeleton: Skeleton, pose: Array) -> str:
     if off <= APART:
         return ""
     return (
-        f"the prior does not know this pose: the nearest that it knows is {1e3 * off:.0f} mm off, "
-        "so that the search had to leave it; --train names motions with such poses"
+        "the prior does not know this pose: the nearest that it knows is "
+        f"{1e3 * off:.0f} mm off, so the search had to leave the prior; "
+        "--train adds motions with such poses"
     )
 
 
 def with_one_mode(frame: Frame) -> Frame:
-    """Return a frame whose posterior is its pose alone: its search left nothing else open."""
+    """Return a frame with its pose as the only mode of its posterior."""
     poses = frame.pose[None]
     posterior = posterior_of(poses, frame.translation[None], np.array([frame.cost]))
     return replace(frame, posterior=posterior)
@@ -142,10 +149,15 @@ def with_one_mode(frame: Frame) -> Frame:
 def _open_poses(
     task: Task, frame: Frame, observation: Observation
 ) -> tuple[Array, Array]:
-    """Return the poses (n, 66) and places (n, 3) that a search left open, and others with about such a silhouette.
+    """Return the open poses of a search, and others with nearly the same silhouette.
 
-    One camera hardly shows whether a person leans towards it or away, and which leg is in front. Each pose is followed
-    by its reflections; poses whose legs or arms are exchanged come after all of these.
+    One camera hardly shows whether a person leans towards it or away, and which leg is
+    in front.
+
+    Returns:
+        Poses (n, 66) and places (n, 3). Each pose is followed by its reflections; poses
+        with exchanged legs or arms come last.
+
     """
     skeleton = task.body.skeleton
     poses = frame.pose[None]

@@ -1,11 +1,13 @@
-"""What a track gives: frames and motion, errors or signs of trust, a table, pictures and files; and one frame, a fit.
+"""The results `Track` and `Fit`.
 
-Everything but `save`, `page` and `show` is a plain value, and pickles.
+A track has frames and a motion, errors or signs of trust, a table, pictures and files.
+A fit is one frame of it. Both can be pickled.
 """
 
 import importlib
 import webbrowser
 from dataclasses import dataclass, field, fields
+from itertools import islice
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
@@ -41,18 +43,31 @@ INLINE_HEIGHT = 720  # pixels of the page in a notebook
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A tracked motion with its errors or signs of trust."""
+    """A tracked motion with its errors or signs of trust.
 
-    motion: Motion  # the estimate
-    frames: list[Frame] = field(repr=False)  # the tracker's, smoothed
-    # a column (T,) for each figure of a frame: see posefit.evaluation.errors.FRAME
+    Attributes:
+        motion: The estimate.
+        frames: The tracker's frames, smoothed.
+        table: A column (T,) for each figure of a frame, as in
+            `posefit.evaluation.errors.FRAME`.
+        measures: The figures of the whole track.
+        trust: The signs of trust, or None if the truth is known.
+        gait: The gait.
+        setup: The arguments and circumstances.
+        log: The course of the track.
+        modes: Other likely motions of the whole track, the likeliest first.
+        scene: The tracked scene.
+
+    """
+
+    motion: Motion
+    frames: list[Frame] = field(repr=False)
     table: Table = field(repr=False)
     measures: Measures = field(repr=False)
-    trust: Trust | None = field(repr=False)  # where the truth is unknown
+    trust: Trust | None = field(repr=False)
     gait: Gait = field(repr=False)
     setup: Setup = field(repr=False)
     log: TrackingLog = field(repr=False)
-    # of the whole track, the likeliest first
     modes: list[TrackMode] = field(repr=False)
     scene: Scene = field(repr=False)
 
@@ -64,56 +79,72 @@ class Track:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Everything but the frames, as `posefit track --json` prints it."""
+        """The content of `posefit track --json`: everything except the frames."""
         return self.content.summary
 
     @property
     def content(self) -> Content:
-        """What its files are made of."""
+        """The data from which the files are made."""
         return Content(
             **{each.name: getattr(self, each.name) for each in fields(Content)}
         )
 
     @property
     def truth(self) -> Motion | None:
-        """The true motion, where it is known."""
+        """The true motion, or None if it is unknown."""
         return self.scene.truth
 
     @property
     def unseen(self) -> set[int]:
-        """The frames that were held or are called lost: their numbers as filmed, as in `log.lost_frames`."""
+        """The numbers, as filmed, of the frames that were held or are lost."""
         return unseen(self.table)
 
     @property
     def joints(self) -> Array:
-        """The joints (T, 27, 3) in the world, in metres, in the order of `joint_names`."""
+        """The joints (T, 27, 3) in metres in the world, ordered as `joint_names`."""
         return self.motion.joints
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """What the 27 joints are, such as `left_knee`."""
+        """The names of the 27 joints, such as `left_knee`."""
         return PLACES
 
     @property
     def activity(self) -> list[str | None]:
-        """What the person does in each frame, such as `walk`; None where the method does not say."""
+        """The activity in each frame, such as `walk`.
+
+        It is None if the method does not report it.
+        """
         return [frame.activity for frame in self.frames]
 
     @property
     def unknown_sides(self) -> NDArray[np.bool_]:
-        """In which frames (T,) left and right are unknown; between two of these they may be exchanged as well."""
+        """Whether left and right are unknown, for each frame (T,).
+
+        Between two such frames they may be exchanged, too.
+        """
         return np.isin(self.table["frame"], self.log.unknown_sides or [])
 
     def angles(self, name: str) -> Array:
-        """Return a clinical angle (T,) such as `left_knee_flexion`, in degrees; NaN where the frame shows nothing.
+        """Return a clinical angle over time.
 
-        Where sides are unknown, see `unknown_sides`, the left one may be the right one. Raises InputError listing the
-        names where there is none of that name.
+        In frames of `unknown_sides` left and right may be exchanged.
+
+        Args:
+            name: Such as `left_knee_flexion`.
+
+        Returns:
+            Degrees (T,), NaN in `unseen` frames.
+
+        Raises:
+            InputError: The name is unknown; the message lists all names.
+
         """
         angles = self._angles()
         if name not in angles:
+            hint = suggestion(name, angles)
             raise InputError(
-                f"angle must be one of {', '.join(angles)}, got {quoted(name)}{suggestion(name, angles)}"
+                f"angle must be one of {', '.join(angles)}, got {quoted(name)}{hint}"
             )
         return angles[name]
 
@@ -121,24 +152,24 @@ class Track:
         return angle_columns(self.motion, self.unseen)
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Return a table of one row a frame: measures, joints in metres, angles in degrees.
+        """Return a table with one row per frame: measures, joints and angles.
 
-        Columns are those of frames.csv and angles.csv. Joints and angles are NaN where a frame was held or is called
-        lost; `joints` and `motion` have them there, too. Raises ImportError where pandas is not installed.
+        The columns are as in frames.csv and angles.csv: joints in metres and angles in
+        degrees. They are NaN in `unseen` frames, for which `joints` and `motion` still
+        have values. Raises ImportError if pandas is not installed.
         """
-        table: pd.DataFrame = import_pandas().DataFrame(
-            {**self.content.columns, **self._angles()}
-        )
+        columns = {**self.content.columns, **self._angles()}
+        table: pd.DataFrame = import_pandas().DataFrame(columns)
         return table
 
     def frame(self, k: int) -> "Fit":
-        """Return frame k alone. Raises InputError where there is none."""
+        """Return frame k alone. Raises InputError if there is no such frame."""
         if not -len(self) <= k < len(self):
             raise InputError(f"frame must lie in 0 to {len(self) - 1}, got {k}")
         return Fit(self, range(len(self))[k])
 
     def show(self) -> Any:
-        """Open the page of the track, in which the body turns: in a notebook inline, elsewhere in a browser."""
+        """Show the page of the track inline in a notebook, or else in a browser."""
         page = self.page()
         try:
             shell = importlib.import_module("IPython").get_ipython()
@@ -147,7 +178,10 @@ class Track:
         if shell is not None and hasattr(shell, "kernel"):
             from html import escape
 
-            frame = f'<iframe srcdoc="{escape(page)}" width="100%" height="{INLINE_HEIGHT}" style="border:0"></iframe>'
+            frame = (
+                f'<iframe srcdoc="{escape(page)}" width="100%" '
+                f'height="{INLINE_HEIGHT}" style="border:0"></iframe>'
+            )
             return importlib.import_module("IPython.display").HTML(frame)
         path = Path(mkdtemp(prefix="posefit-")) / "track.html"
         path.write_text(page, encoding="utf-8", newline="\n")
@@ -159,7 +193,16 @@ class Track:
         return page_of(self.content)
 
     def save(self, folder: str | Path, force: bool = False) -> None:
-        """Write every file of a track to a new folder, or with `force` over earlier ones."""
+        """Write every file of the track.
+
+        Args:
+            folder: A new folder, or with `force` a folder of earlier results.
+            force: Whether earlier results are replaced.
+
+        Raises:
+            InputError: The folder may not be written.
+
+        """
         with OutputFolder(folder, force, False, {}, interactive().log) as output:
             output.finish(self.content)
 
@@ -173,7 +216,7 @@ class Fit:
 
     @property
     def frame(self) -> Frame:
-        """What the tracker estimated."""
+        """The tracker's estimate."""
         return self.track.frames[self.k]
 
     @property
@@ -183,7 +226,7 @@ class Fit:
 
     @property
     def translation(self) -> Array:
-        """The root's place (3,) in metres."""
+        """The position (3,) of the root in metres."""
         return self.frame.translation
 
     @property
@@ -193,12 +236,12 @@ class Fit:
 
     @property
     def iou(self) -> float:
-        """The overlap of body and mask, the mean over the views."""
+        """The overlap (IoU) of body and mask, as the mean over the views."""
         return float(self.track.table["iou"][self.k])
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The summary of its track."""
+        """The summary of the track."""
         return self.track.summary
 
     @property
@@ -207,7 +250,15 @@ class Fit:
         return np.asarray(self.track.joints[self.k])
 
     def overlay(self, ax: Any = None) -> "Image":
-        """Return the body drawn on the masks, or on the picture; with `ax`, shown on these axes of matplotlib."""
+        """Return a picture of the body on the footage, or on the masks.
+
+        Args:
+            ax: Axes of matplotlib that show the picture, or None.
+
+        Returns:
+            The picture.
+
+        """
         from PIL import Image
 
         from posefit.output.picture import Painter
@@ -215,9 +266,7 @@ class Fit:
         scene = self.track.scene
         filmed = None
         if scene.pictures is not None:
-            filmed = next(
-                picture for k, picture in enumerate(scene.pictures()) if k == self.k
-            )
+            filmed = next(islice(scene.pictures(), self.k, None))
         painted = Painter(scene).overlay(self.frame, scene.observations[self.k], filmed)
         image = Image.fromarray(painted[..., ::-1])
         if ax is not None:

@@ -129,6 +129,10 @@ def test_a_damaged_file_is_a_miss(run: Any, tmp_path: Path) -> None:
             damage(file)
         assert run() == (12.0, ["scaled"]), (damage, pattern)
     assert run() == (12.0, [])
+    # as when a process was killed before it listed what it had saved
+    (listed,) = (tmp_path / "cache").rglob("SHA256SUMS")
+    listed.unlink()
+    assert [run(), run()] == [(12.0, ["scaled"]), (12.0, [])]
 
 
 ANNOUNCED = """
@@ -182,6 +186,9 @@ def test_without_a_place_for_the_cache_every_process_compiles(
 def test_without_room_every_process_compiles(run: Any) -> None:
     full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
     assert run(before=full) == (12.0, ["scaled"])
+    full = "import posefit.arrays.compiling as c\nc.MIN_FREE = 1 << 62\n"
+    assert run(before=full) == (12.0, ["scaled"])
+    assert run() == (12.0, ["scaled"])
 
 
 def test_two_processes_at_once_lose_nothing(run: Any) -> None:

@@ -244,18 +244,18 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
         )
     before = sorted(path.name for path in out.iterdir())
     (out / "precious.txt").write_text("mine")
-    assert "got one with precious.txt, which is none of posefit's" in error_of(
+    assert "got one with precious.txt, which posefit did not write" in error_of(
         *force, out
     )
     (out / "precious.txt").unlink()
     gait = (out / "gait.csv").rename(tmp_path / "gait.csv")
     (out / "gait.csv").mkdir()
     (out / "gait.csv" / "precious.txt").write_text("mine")
-    assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
+    assert "got one with gait.csv, which posefit did not write" in error_of(*force, out)
     assert (out / "gait.csv" / "precious.txt").read_text() == "mine"
     shutil.rmtree(out / "gait.csv")
     (out / "gait.csv").symlink_to(gait)
-    assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
+    assert "got one with gait.csv, which posefit did not write" in error_of(*force, out)
     assert (link.is_symlink(), sorted(path.name for path in out.iterdir())) == (
         True,
         before,

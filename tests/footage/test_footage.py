@@ -197,7 +197,7 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
         )
     assert not (tmp_path / "out").exists()
     assert (
-        "11 finished frames are kept: the same command with --resume goes on from there"
+        "11 finished frames are kept: the same command with --resume continues from there"
         in messages
     )
     again = posefit.track(
@@ -219,7 +219,7 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
 
 def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
     with pytest.raises(
-        ValueError, match="expected a track that was interrupted to resume, got none"
+        ValueError, match="expected an interrupted track to resume, got none"
     ):
         posefit.track("walk", resume=True, out=tmp_path / "out")
     with pytest.raises(ValueError, match="resume must be given with out"):

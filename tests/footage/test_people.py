@@ -53,6 +53,18 @@ def crossing(seed: int) -> Iterator[tuple[Any, list[Any], Any]]:
         yield image, [near, far & ~near], near | far
 
 
+@each("asked", [False, True])
+def test_specks_near_nobody_are_no_person(asked: bool) -> None:
+    mask = np.zeros((240, 320), dtype=bool)
+    mask[60:180, 20:45] = True  # 3,000 pixels
+    for k in range(28):  # 3,640 in all, each too small to be a part of a person
+        mask[10 + 30 * (k // 4) : 20 + 30 * (k // 4), 120 + 40 * (k % 4) :][:, :13] = (
+            True
+        )
+    (person,) = people_in(mask, np.ones_like(mask) if asked else None)
+    assert person.mask.sum() == 3000
+
+
 @each("seed", range(10))
 def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) -> None:
     people = People(30.0)

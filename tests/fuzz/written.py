@@ -29,7 +29,7 @@ NAME = "subject"
 
 def written(folder: Path) -> dict[str, bytes]:
     """Return a valid content for each of `readers`, which need what is left in `folder`."""
-    made = [result(cells(1)[0], 1.0).row, search_result(search_cell("sapso"), 9).row]
+    made = [result(cells(1)[0], 1.0), search_result(search_cell("sapso"), 9)]
     figures = [
         {name: value for name, value in row.items() if name not in NAMES}
         for row in made
@@ -148,7 +148,7 @@ class _ReadError(Exception):
 
 def checked_message(message: str) -> None:
     """Raise an error where a message is not one line, is too long or names no file."""
-    if message.endswith("the same command with --resume goes on from there"):
+    if message.endswith("the same command with --resume continues from there"):
         return
     if NAME not in message or "\n" in message.strip() or len(message) > 400:
         raise RuntimeError(f"a message of {len(message)} characters: {message}")

@@ -346,7 +346,7 @@ def test_a_lens_that_is_not_known_is_named(
     [
         (
             np.diag([1e8, 1e8, 1]).tolist(),
-            "focal must be in pixels, for such pictures 32 to 64000, got 1e",
+            "focal must be in pixels: 32 to 64000 for pictures of this size, got 1e",
         ),
         # millimetres
         ([[4.2, 0, 319.5], [0, 4.2, 239.5], [0, 0, 1]], "focal must be in pixels"),

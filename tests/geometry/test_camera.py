@@ -108,7 +108,8 @@ def test_a_wrong_camera_file_is_refused_in_one_line(
 
 def test_a_focal_length_in_millimetres_is_refused() -> None:
     with pytest.raises(
-        ValueError, match="fx must be in pixels, for 640 of them at least 64, got 4.2"
+        ValueError,
+        match="fx must be in pixels: at least 64 for a width of 640, got 4.2",
     ):
         Camera.pinhole(640, 480, fx=4.2)
 

@@ -502,18 +502,20 @@ def test_a_new_models_prediction_has_its_noise_as_covariance_to_the_letter() -> 
     belief = replace(
         initial(switching), log_probabilities=np.log(np.full(6, 1.0 / 6.0))
     )
-    belief = switching._only("G1", belief)
-    old = switching.active
-    both = PatentForm().joined(switching, belief, "G3")
+    belief = switching.keep_only("G1", belief)
+    union = switching.union_with("G3")
+    both = PatentForm().joined(union, belief)
     states, covariances = (
-        PatentForm().beside(switching, old).predict(both.states, both.covariances)
+        PatentForm().begun(union).predict(both.states, both.covariances)
     )
-    _, usual = switching.imm.predict(both.states, both.covariances)
-    noises = switching.models.of(switching.active).noises
-    for k, name in enumerate(switching.active):
-        expected = usual[k] if name in old else lifted(states[k : k + 1], noises[k])[0]
+    _, usual = union.filter.predict(both.states, both.covariances)
+    noises = switching.models.of(union.names).noises
+    for k, name in enumerate(union.names):
+        expected = usual[k]
+        if name not in union.old_names:
+            expected = lifted(states[k : k + 1], noises[k])[0]
         np.testing.assert_allclose(covariances[k], expected)
-        if name not in old:
+        if name not in union.old_names:
             assert np.trace(covariances[k]) < np.trace(usual[k])
 
 
@@ -648,7 +650,13 @@ def begun_literally() -> tuple[Switching, Belief]:
         switching.start(state, 0.01 * np.eye(ERROR)),
         log_probabilities=np.log([1, 6, 1]),
     )
-    return switching, PatentForm().joined(switching, normalised(belief), "G3")
+    union = switching.union_with("G3")
+    both = PatentForm().joined(union, normalised(belief))
+    # it changes nothing: that is for `Switching`
+    assert (switching.group, switching.candidate_group) == ("G1", None)
+    switching.bring_in("G3")
+    assert switching.active == union.names
+    return switching, both
 
 
 # VSMM 9
@@ -771,7 +779,7 @@ def decided(
     decisions = []
     switching.bring_in("new")
     for step in steps:
-        switching.decided(latest(*step))
+        switching.judged(latest(*step))
         decisions.append(switching.group if switching.candidate_group is None else None)
     return decisions
 

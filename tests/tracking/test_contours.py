@@ -114,7 +114,7 @@ def pulled(numbers: Array, mask: kernels.Contour, scale: float) -> tuple[Array, 
     )
     blocks = np.zeros((len(BONES), 6, 6))
     forces = np.zeros((len(BONES), 6))
-    kernels.add_pulls(BONE_STARTS, centres, radii, mask, scale, blocks, forces)
+    kernels.accumulate_borders(BONE_STARTS, centres, radii, mask, scale, blocks, forces)
     curves = np.zeros((COUNT, COUNT))
     slopes = np.zeros(COUNT)
     for b, parent in enumerate(BONE_STARTS):
@@ -356,7 +356,9 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
         mask = kernels.Contour(
             field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
         )
-        kernels.add_pulls(np.array(parents), joints, radii, mask, scale, blocks, forces)
+        kernels.accumulate_borders(
+            np.array(parents), joints, radii, mask, scale, blocks, forces
+        )
         return blocks[0], forces[0]
 
     for mine, expected in zip(

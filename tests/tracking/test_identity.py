@@ -38,7 +38,7 @@ def test_a_track_goes_on_as_if_it_had_not_ended_too_early(
         posefit.track("walk", camera=camera(0.5), progress=stopping(4), **options)
     with pytest.raises(
         ValueError,
-        match="camera must be .* as it was, to resume, got one with another content",
+        match="camera must be .*, as before, to resume, got other content",
     ):
         posefit.track("walk", camera=camera(1.5), resume=True, **options)
     # another object, the same camera
@@ -77,7 +77,7 @@ def test_a_track_does_not_go_on_with_another_skeleton(
     write_asf(skeleton, posefit.Body.of(motion.skeleton).scaled(1.2, 1.2).skeleton)
     with pytest.raises(
         ValueError,
-        match="asf must be .* as it was, to resume, got one with another content",
+        match="asf must be .*, as before, to resume, got other content",
     ):
         posefit.track(source, resume=True, **options)
     # the frames that were tracked are kept for the skeleton that they belong to

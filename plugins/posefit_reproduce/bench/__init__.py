@@ -1,5 +1,5 @@
-"""How fast the loop is: `posefit bench`.
+"""The speed of the search loop: `posefit bench`.
 
 loop.py    all figures, from one run
-kernel.py  the problem, the same costs drawn by OpenCV, timing, and the processor
+kernel.py  the problem, the same costs with OpenCV, timing, and the processor
 """

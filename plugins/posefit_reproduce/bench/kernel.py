@@ -1,4 +1,4 @@
-"""The benchmark's problem, its costs drawn by OpenCV into an image of bytes, how jobs are timed, and on what."""
+"""The benchmark's problem, its costs with OpenCV, timing, and the processor."""
 
 import platform
 import time
@@ -21,20 +21,24 @@ from posefit.testing.problem import walking_angles
 from posefit_priors.pca import COMPONENTS, PCA
 
 SIZE = (320, 240)  # pixels
-ROUNDS = 12  # of all jobs in turn; of each, the fastest run counts
-TURN = 0.05  # seconds; a job runs again until its turn is over
+ROUNDS = 12  # of all jobs in turn; the fastest run of each counts
+TURN = 0.05  # seconds: a job is repeated until its turn is over
 
 
 def fastest(jobs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
-    """Return the fastest run of each job in seconds; they take turns, so that a slow moment falls on all."""
+    """Return the seconds of the fastest run of each job.
+
+    Jobs take turns, so that a slow moment of the machine affects all of them.
+    """
     seconds = dict.fromkeys(jobs, np.inf)
+    # not timed: the first call compiles
     for job in jobs.values():
         job()
     for _ in range(ROUNDS):
         for name, job in jobs.items():
             until = time.perf_counter() + TURN
             ended = -np.inf
-            while ended < until:  # once at least, however late it is
+            while ended < until:  # at least once
                 began = time.perf_counter()
                 job()
                 ended = time.perf_counter()
@@ -43,21 +47,18 @@ def fastest(jobs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
 
 
 def processor() -> dict[str, str]:
-    """Return this machine's processor, and the one that loops are compiled for, as LLVM calls it."""
+    """Return the names of the processor and of LLVM's target for compiled loops."""
     from numba.core.registry import cpu_target
 
     listed = Path("/proc/cpuinfo")
     lines = listed.read_text().splitlines() if listed.exists() else []
-    names = [
-        line.partition(":")[2].strip()
-        for line in lines
-        if line.startswith("model name")
-    ]
+    name = platform.processor() or platform.machine()
+    for line in lines:
+        if line.startswith("model name"):
+            name = line.partition(":")[2].strip()
+            break
     _, compiled_for, _ = cpu_target.target_context.codegen().magic_tuple()
-    return {
-        "name": names[0] if names else platform.processor() or platform.machine(),
-        "compiled_for": compiled_for,
-    }
+    return {"name": name, "compiled_for": compiled_for}
 
 
 def bench_cost(
@@ -67,7 +68,20 @@ def bench_cost(
     views: int = 1,
     components: int = COMPONENTS,
 ) -> SilhouetteCost:
-    """Return the benchmark's cost: a frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
+    """Return the benchmark's cost, with a PCA prior.
+
+    The observed mask is a frame of the built-in walk that fills the image.
+
+    Args:
+        threads: The number of threads.
+        width: Pixels of the image's width; the height is three quarters of it.
+        views: The number of cameras, evenly around the person.
+        components: The number of components of the prior.
+
+    Returns:
+        The cost.
+
+    """
     motion = built_in.motion("walk", frames=1, fps=30.0)
     body = Body.of(motion.skeleton)
     prior = PCA(components=components).fit(walking_angles())
@@ -87,16 +101,16 @@ def bench_cost(
         project(body, camera, motion.poses[0], motion.translations[0])
         for camera in cameras
     ]
-    return SilhouetteCost(
-        body, cameras, [Silhouette.of(mask) for mask in masks], space, threads=threads
-    )
+    silhouettes = [Silhouette.of(mask) for mask in masks]
+    return SilhouetteCost(body, cameras, silhouettes, space, threads=threads)
 
 
 def opencv_costs(cost: SilhouetteCost, proposals: Array) -> Array:
-    """Return the costs (n,) of proposals the usual way: OpenCV draws every cone into a byte image and counts it.
+    """Return the costs (n,) of proposals, with OpenCV instead of the kernel.
 
-    Kinematics, prior and outlines are computed for all n poses at once in NumPy; drawing is two circles and a
-    quadrilateral a bone, at 1/16 pixel.
+    Kinematics, prior and outlines are computed for all n poses at once in NumPy. OpenCV
+    then draws each bone into an image of bytes, as two circles and a quadrilateral with
+    corners at 1/16 pixel, and counts the pixels.
     """
     body = cost.body
     camera = cost.cameras[0]
@@ -111,10 +125,11 @@ def opencv_costs(cost: SilhouetteCost, proposals: Array) -> Array:
     radius1 = scale[:, 1:] * body.radii[:, 1]
     axis = second - first
     square = (axis**2).sum(axis=-1)
-    along = ((radius0 - radius1) / square)[..., None]
-    across = (np.sqrt(np.maximum(square - (radius0 - radius1) ** 2, 0.0)) / square)[
-        ..., None
-    ]
+    # the outer tangents touch both circles in the directions `up` and `down`
+    taper = radius0 - radius1  # (n, 26)
+    height = np.sqrt(np.maximum(square - taper**2, 0.0))
+    along = (taper / square)[..., None]
+    across = (height / square)[..., None]
     normal = np.stack([-axis[..., 1], axis[..., 0]], axis=-1)
     up = along * axis + across * normal
     down = along * axis - across * normal
@@ -125,12 +140,10 @@ def opencv_costs(cost: SilhouetteCost, proposals: Array) -> Array:
         axis=2,
     )
     corners = np.rint((corners - 0.5) * 16).astype(np.int32)
-    starts, ends = (
-        np.rint((points - 0.5) * 16).astype(int).tolist() for points in (first, second)
-    )
-    start_radii, end_radii = (
-        np.rint(radii * 16).astype(int).tolist() for radii in (radius0, radius1)
-    )
+    starts = np.rint((first - 0.5) * 16).astype(int).tolist()
+    ends = np.rint((second - 0.5) * 16).astype(int).tolist()
+    start_radii = np.rint(radius0 * 16).astype(int).tolist()
+    end_radii = np.rint(radius1 * 16).astype(int).tolist()
     observed = silhouette.mask.view(np.uint8)
     total = cv2.countNonZero(observed)
     image = np.zeros_like(observed)

@@ -1,4 +1,7 @@
-"""How fast is the loop? All figures from one run, so that their ratios hold on any machine."""
+"""The timings of the search loop.
+
+All figures are from one run, so that their ratios can be compared between machines.
+"""
 
 import time
 from collections.abc import Callable
@@ -24,19 +27,28 @@ from posefit_reproduce.bench.kernel import (
     processor,
 )
 
-POSES = 1000  # in a call
-# of a search
+POSES = 1000  # in one call of a cost
+# the population size and the budget of a search
 PARTICLES = 40
 EVALUATIONS = 2440
-SEARCHES = 5  # of each optimiser, of which the fastest counts
-SLOW_SECONDS = 3.0  # after which an optimiser begins no other search
+SEARCHES = 5  # of each optimiser; the fastest counts
+SLOW_SECONDS = 3.0  # no further search of an optimiser begins after this time
 
 
 def loop_figures(threads: int | None = None) -> dict[str, Any]:
-    """Return the timings; `all_threads` are `threads`, by default every core that this process may use.
+    """Return the timings in microseconds, and the conditions of the run.
 
-    `opencv` is a cost function called for one pose at a time, as it is usually written; `opencv_batched` has its
-    kinematics and outlines computed for 200 poses at once, the fastest way that still draws with OpenCV.
+    The keys with `opencv` are for a cost function that is called for one pose at a
+    time, as it is usually written. With `opencv_batched`, kinematics and outlines are
+    computed for 200 poses at once, which is the fastest way to draw with OpenCV.
+
+    Args:
+        threads: The number of threads of `all_threads`; by default every core that this
+            process may use.
+
+    Returns:
+        The figures by name.
+
     """
     many = threads or cores()
     alone = bench_cost()
@@ -47,9 +59,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "one": lambda: alone(proposals),
         "all": lambda: together(proposals),
         "population": lambda: alone(proposals[:PARTICLES]),
-        "opencv": lambda: [
-            opencv_costs(alone, few[i : i + 1]) for i in range(len(few))
-        ],
+        "opencv": lambda: [opencv_costs(alone, pose[None]) for pose in few],
         "opencv_batched": lambda: opencv_costs(alone, few),
     }
     opencv_threads = cv2.getNumThreads()
@@ -72,38 +82,41 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
 
 
 def ask_and_tell(space: SearchSpace) -> dict[str, float]:
-    """Return the microseconds that each installed optimiser takes a proposal, with costs that take no time to speak of.
+    """Return the microseconds per proposal of each installed optimiser by itself.
 
-    Populations are of 40 where their size can be set. The best of several searches, on one thread.
+    The cost function is trivial. Populations have `PARTICLES` members if their size can
+    be set. The fastest of several searches counts, on one thread.
     """
     figures = {}
-    # as a track has it: BLAS is slower with more threads where matrices are small
+    # as in a track: for small matrices BLAS is slower with more threads
     with threadpool_limits(1):
         for name, offer in registry().offers["optimiser"].items():
-            if not offer.missing:
-                ended = time.perf_counter() + SLOW_SECONDS
-                seconds = [search_seconds(space, offer, 0)]
-                while len(seconds) < SEARCHES and time.perf_counter() < ended:
-                    seconds.append(search_seconds(space, offer, len(seconds)))
-                figures[name] = 1e6 * min(seconds)
+            if offer.missing:
+                continue
+            ended = time.perf_counter() + SLOW_SECONDS
+            seconds = [search_seconds(space, offer, 0)]
+            while len(seconds) < SEARCHES and time.perf_counter() < ended:
+                seconds.append(search_seconds(space, offer, len(seconds)))
+            figures[name] = 1e6 * min(seconds)
     return figures
 
 
 def search_seconds(space: SearchSpace, offer: Offer, seed: int) -> float:
-    """Return the seconds of a search, a proposal; of a filter, those of ten frames with the steps between them."""
-    sizes = {
-        setting.name: PARTICLES
-        for setting in offer.settings
-        if setting.name == "population_size"
-    }
+    """Return the seconds per proposal of one search.
+
+    For a filter, they are of ten frames, with the steps between them.
+    """
+    sizes = {}
+    if any(setting.name == "population_size" for setting in offer.settings):
+        sizes["population_size"] = PARTICLES
     carries = offer.next_frame == "carry"
-    evaluations = EVALUATIONS // 10 if carries else EVALUATIONS
-    optimiser = offer.factory(
-        space, np.random.default_rng(seed), **planned(offer.factory, sizes, evaluations)
-    )
+    frames = 10 if carries else 1
+    evaluations = EVALUATIONS // frames
+    values = planned(offer.factory, sizes, evaluations)
+    optimiser = offer.factory(space, np.random.default_rng(seed), **values)
     count = 0
     began = time.perf_counter()
-    for _ in range(10 if carries else 1):
+    for _ in range(frames):
         problem = minimise(Problem(_cost, space, evaluations), optimiser)
         count += problem.evaluations
         if carries:

@@ -1,18 +1,19 @@
-"""The page of one track, `track.html`: one file that any browser opens from disk, without any network request.
+"""The page of one track, `track.html`: one file that needs no network.
 
 | looking for | file |
 |---|---|
 | the document and its colours | this file |
-| the data of the page, and joints and angles as the scripts read them | content.py |
-| small pictures of footage and masks, as many as there is room for | stills.py |
-| the places of everything, empty; how it looks | track.html, track.css |
-| bodies of tapered cones on a canvas, seen by any camera; a view that can be turned | body.js |
-| a clock that plays frames; mouse, touch and keys that turn a view | play.js |
+| the data of the page, as the scripts read them | content.py |
+| small pictures of footage and masks, within a limited size | stills.py |
+| the empty layout and its style | track.html, track.css |
+| bodies of tapered cones on a canvas; a view that can be turned | body.js |
+| the clock that plays frames; mouse, touch and keys | play.js |
 | a camera's picture with the body on it; the body in 3D | panels.js |
 | curves with intervals, and rows of marks | curves.js |
-| the player, the keys, and the words above and below | main.js |
+| the player, its keys, and the text above and below it | main.js |
 
-The constant `D` is the data that content.py returns; `posefit.page` has what all pages share.
+The constant `D` is the data that content.py returns. `posefit.page` has the parts that
+all pages share.
 """
 
 from typing import Any

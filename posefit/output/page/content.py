@@ -1,4 +1,4 @@
-"""The data of a track's page: bodies, figures, intervals, and words."""
+"""The data of a track's page: bodies, figures, intervals and text."""
 
 import base64
 import time
@@ -29,7 +29,12 @@ from posefit.version import __version__
 TENTH = 0.1  # degrees: the unit of angles in a page
 UNIT = np.radians(TENTH)
 MAX_16_BITS = 32_767
-COLUMN = ("label", "unit", "digits", "factor")  # of a figure, as the page has it
+COLUMN = (
+    "label",
+    "unit",
+    "digits",
+    "factor",
+)  # the fields of a figure that the page uses
 CURVES = (
     "mpjpe_mm",
     "error_degrees",
@@ -58,8 +63,9 @@ ANGLE_NAMES = (
 def track_data(content: Content, stills: Stills) -> dict[str, Any]:
     """Return the data of the page.
 
-    Joints are millimetres from the first position of the root and angles tenths of a degree, in 16 bits each. A long
-    track has every `step`-th frame; a frame is marked if one of those that it stands for is.
+    Joints are in millimetres from the first position of the root, and angles in tenths
+    of a degree, with 16 bits per number. Of a long track every `step`-th frame is
+    shown. A frame is marked if it or a frame left out after it is marked.
     """
     scene = content.scene
     frames = content.frames
@@ -72,14 +78,30 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
     origin = np.round(joints[0, 0], 3)
     truth = scene.truth
     free = estimate.skeleton.free
-    true = None if truth is None else truth.joints[::step]
     angles = unwrapped(estimate.poses)[::step]
-    worth = "" if truth is None else f": {brief(content)[0]}"
+    true_joints = None
+    true_angles = None
+    true_clinical = None
+    if truth is not None:
+        true_joints = in_16_bits(truth.joints[::step] - origin)
+        # within half a turn of the estimate, so that both curves can be compared
+        near = angles - wrapped(angles - truth.poses[::step])
+        true_angles = in_16_bits(near[:, free], UNIT)
+        true_clinical = in_16_bits(_clinical(truth, step), TENTH)
+    shown_intervals = None
+    if intervals:
+        shown_intervals = {
+            "levels": [round(100 * level) for level in intervals["levels"].tolist()],
+            "joints": in_16_bits(intervals["joint_radii"][::step]),
+            "angles": in_16_bits(intervals["angle_halves"][::step, :, free], UNIT),
+        }
+    quality = "" if truth is None else f": {brief(content)[0]}"
+    day = time.strftime("%d %B %Y")
     curves = [name for name in CURVES if name in table]
     return {
         "version": __version__,
         "title": setup.motion,
-        "made": f"Tracked by {setup.method}, written on {time.strftime('%d %B %Y')}{worth}.",
+        "made": f"Tracked by {setup.method}, written on {day}{quality}.",
         "verdict": _verdict(content),
         "notes": [*filter(None, [held_frames(content)]), *content.log.warnings],
         "facts": _facts(content),
@@ -95,7 +117,7 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         "cameras": [camera_from_origin(camera, origin) for camera in scene.cameras],
         **stills.as_dict(),
         "estimate": in_16_bits(joints - origin),
-        "truth": None if true is None else in_16_bits(true - origin),
+        "truth": true_joints,
         "others": _others(scene, frames[::step], origin),
         "columns": {
             name: {key: getattr(FRAME[name], key) for key in COLUMN} for name in curves
@@ -111,31 +133,22 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
                 name for name, is_free in zip(ANGLE_NAMES, free, strict=True) if is_free
             ],
             "values": in_16_bits(angles[:, free], UNIT),
-            "truth": None
-            if truth is None
-            else in_16_bits(
-                (angles - wrapped(angles - truth.poses[::step]))[:, free], UNIT
-            ),
+            "truth": true_angles,
         },
         "clinical": {
             "names": [name.replace("_", " ") for name in COLUMNS],
             "values": in_16_bits(_clinical(estimate, step), TENTH),
-            "truth": None
-            if truth is None
-            else in_16_bits(_clinical(truth, step), TENTH),
+            "truth": true_clinical,
         },
-        "intervals": {
-            "levels": [round(100 * level) for level in intervals["levels"].tolist()],
-            "joints": in_16_bits(intervals["joint_radii"][::step]),
-            "angles": in_16_bits(intervals["angle_halves"][::step, :, free], UNIT),
-        }
-        if intervals
-        else None,
+        "intervals": shown_intervals,
     }
 
 
 def _verdict(content: Content) -> str:
-    """Return whether the track can be trusted, if the truth is unknown, and what was not determined."""
+    """Return what was not determined, preceded by the trust in the track.
+
+    If the truth is known, no trust is reported.
+    """
     trust = "" if content.trust is None else f"{content.trust.sentence} "
     if not_determined := undetermined(content):
         return f"{trust}Not determined: {not_determined}."
@@ -143,23 +156,23 @@ def _verdict(content: Content) -> str:
         (content.log.unknown_sides, "which side is left"),
         (content.log.lost_frames, "which frames are lost"),
     )
-    unreported = " or ".join(
-        words for reported, words in certainties if reported is None
-    )
+    missing = [words for reported, words in certainties if reported is None]
+    unreported = " or ".join(missing)
     if unreported:
-        return f"{trust}The method does not report {unreported}: frames without a mark may be wrong too."
-    return f"{trust}The method reports no frame as lost, and left and right as known in every frame."
+        return (
+            f"{trust}The method does not report {unreported}: "
+            "frames without a mark may be wrong too."
+        )
+    return (
+        f"{trust}The method reports no frame as lost, "
+        "and left and right as known in every frame."
+    )
 
 
 def _facts(content: Content) -> list[list[str]]:
     setup = content.setup
     measures = content.measures
-    return [
-        *(
-            []
-            if measures.mpjpe_mm is None
-            else [["MPJPE", f"{measures.mpjpe_mm:.0f} mm"]]
-        ),
+    facts = [
         ["method", setup.method],
         ["seed", str(setup.seed)],
         ["cameras", f"{setup.views}, {setup.camera}"],
@@ -167,10 +180,13 @@ def _facts(content: Content) -> list[list[str]]:
         ["IoU", f"{measures.iou:.3f}"],
         ["posefit", setup.version],
     ]
+    if measures.mpjpe_mm is not None:
+        facts.insert(0, ["MPJPE", f"{measures.mpjpe_mm:.0f} mm"])
+    return facts
 
 
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
-    """Return the other likely poses of frames: their numbers among those shown, weights and joints."""
+    """Return the other likely poses: numbers of frames, weights and joints."""
     skeleton = scene.body.skeleton
     modes = [
         other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
@@ -189,22 +205,26 @@ def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, A
 
 
 def _gait(content: Content) -> dict[str, Any]:
-    """Return the gait in words and by side, and how the knees bend over a stride, the mean and a standard deviation."""
+    """Return the gait as text and by side, and the flexion of the knees over a stride.
+
+    The flexion has its mean, and the mean minus and plus a standard deviation.
+    """
     gait = content.gait.as_dict()
     knees = {}
     if gait["walk"]:
-        for side, curves in stride_curves(
-            content.motion, content.gait, "knee_flexion"
-        ).items():
-            mean, spread = (
-                (curves.mean(axis=0), curves.std(axis=0))
-                if len(curves)
-                else (np.empty(0), 0.0)
-            )
-            lines = {"mean": mean, "low": mean - spread, "high": mean + spread}
+        flexions = stride_curves(content.motion, content.gait, "knee_flexion")
+        for side, curves in flexions.items():
+            mean = np.empty(0)
+            spread = np.empty(0)
+            if len(curves):
+                mean = curves.mean(axis=0)
+                spread = curves.std(axis=0)
             knees[side] = {
-                name: np.round(line, 1).tolist() for name, line in lines.items()
-            } | {"strides": len(curves)}
+                "mean": np.round(mean, 1).tolist(),
+                "low": np.round(mean - spread, 1).tolist(),
+                "high": np.round(mean + spread, 1).tolist(),
+                "strides": len(curves),
+            }
     rows = gait_rows(gait) if gait["walk"] else []
     return {"text": gait_line(gait, by_side=False), "rows": rows, "knees": knees}
 
@@ -216,25 +236,24 @@ def _clinical(motion: Motion, step: int) -> Array:
 
 
 def in_16_bits(values: Array, unit: float = 1e-3) -> str:
-    """Return numbers in 16 bits each, little-endian in base 64, as multiples of a unit: a millimetre, if in metres.
+    """Return numbers as 16-bit multiples of a unit, little-endian in base 64.
 
-    Larger values are clipped to 32,767 units; NaN is -32,768.
+    The default unit turns metres into millimetres. Larger values are clipped to 32,767
+    units; NaN is -32,768.
     """
-    units = np.clip(
-        np.round(np.asarray(values, dtype=np.float64) / unit), -MAX_16_BITS, MAX_16_BITS
-    )
+    units = np.round(np.asarray(values, dtype=np.float64) / unit)
+    units = np.clip(units, -MAX_16_BITS, MAX_16_BITS)
     whole = np.where(np.isnan(units), -MAX_16_BITS - 1, units).astype("<i2")
     return base64.b64encode(whole.tobytes()).decode()
 
 
 def camera_from_origin(camera: Camera, origin: Array) -> dict[str, Any]:
-    """Return a camera for points in metres from the origin."""
+    """Return a camera for the page, for points relative to an origin."""
+    translation = camera.translation + camera.rotation @ origin
     return {
         "size": [camera.width, camera.height],
         "focal": np.round(camera.focal, 3).tolist(),
         "centre": np.round(camera.centre, 3).tolist(),
         "rotation": np.round(camera.rotation, 6).tolist(),
-        "translation": np.round(
-            camera.translation + camera.rotation @ origin, 6
-        ).tolist(),
+        "translation": np.round(translation, 6).tolist(),
     }

@@ -1,10 +1,12 @@
-"""Small pictures of footage and masks for a page, as many and as fine as there is room for.
+"""Small pictures of footage and masks for a page of limited size.
 
-A frame of footage has two: the part around the person, and all of it, coarse.
+Each frame of footage has two pictures: the part around the person, and the whole frame
+at a coarser resolution.
 """
 
 import base64
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import cv2
@@ -18,56 +20,63 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 from posefit.silhouette.rasteriser import NEAR
 
-MAX_FRAMES = 1_200  # of a track; longer ones show every second, fourth, ... frame
-# characters of all frames of footage, and of all cameras' masks together
+MAX_FRAMES = 1_200  # longer tracks show every second, fourth, ... frame
+# characters for all frames of footage, and for the masks of all cameras
 MAX_FILM = 4_500_000
 MAX_MASKS = 1_200_000
-SPARE = 0.2  # of the room for footage, as later frames may need more than the first
+SPARE = 0.2  # this share is kept free: later frames may be larger than the first
 MAX_HEIGHT = 360  # pixels of a picture
-# pixels of height and quality of JPEG, 0 to 100, of the part around the person and of the whole frame, finest first
+# height in pixels and JPEG quality, 0 to 100, of the part around the person and of the
+# whole frame, finest first
 FINENESS = (
     ((MAX_HEIGHT, 75), (200, 50)),
     ((MAX_HEIGHT, 50), (200, 50)),
     ((288, 40), (180, 35)),
     ((216, 35), (120, 30)),
 )
-MARGIN = 0.25  # of the larger side of a person's box, to each side
+MARGIN = 0.25  # on each side, as a share of the larger side of a person's box
 
 Fineness = tuple[tuple[int, int], tuple[int, int]]
-Box = tuple[int, int, int, int]  # left, top, width and height in pixels of a camera
+Box = tuple[int, int, int, int]  # left, top, width and height in a camera's pixels
 
 
 class Strip:
-    """Pictures of every frame, or of every second, fourth, ... once there is no more room."""
+    """Pictures of every frame, or of every second, fourth, ... to limit their size."""
 
     def __init__(self, room: int, every: int) -> None:
-        self.pictures: list[tuple[Any, ...]] = []  # a box, and the pictures
+        self.pictures: list[tuple[Any, ...]] = []  # a box and its pictures
         self.every = every
         self._room = room
         self._count = 0
 
     def add(self, box: Box, pictures: Callable[[], list[str]]) -> None:
-        """Take the next frame, whose `pictures` are made if they are needed; the first is of the box."""
+        """Take the next frame.
+
+        `pictures` makes its pictures, of which the first shows the box. It is called
+        only if the frame is kept.
+        """
         if self._count % self.every == 0:
             self.pictures.append((box, *pictures()))
-            while (
-                len(self.pictures) > 1
-                and sum(len(text) for _, *each in self.pictures for text in each)
-                > self._room
-            ):
+            # every second picture is dropped until the rest fit
+            while len(self.pictures) > 1 and self._size() > self._room:
                 self.pictures = self.pictures[::2]
                 self.every *= 2
         self._count += 1
 
+    def _size(self) -> int:
+        """Return the characters of all pictures."""
+        return sum(len(text) for _, *texts in self.pictures for text in texts)
+
     def as_dict(self) -> dict[str, Any]:
-        """Return the pictures, and the number of frames that each of them stands for."""
+        """Return the pictures, and the number of frames that each represents."""
         return {"every": self.every, "pictures": self.pictures}
 
 
 class Stills:
-    """Pictures of the first camera's footage, if there is any, and the masks of all cameras, frame by frame.
+    """Pictures of the first camera's footage, if any, and of all cameras' masks.
 
-    The page shows every `step`-th frame, a power of two: every picture is of one of them.
+    The page shows every `step`-th frame, where `step` is a power of two, so that every
+    picture belongs to a frame that the page shows.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -93,16 +102,11 @@ class Stills:
         if self._film is not None and filmed is not None:
             if self._fineness is None:
                 each = int((1.0 - SPARE) * MAX_FILM / self._wanted)
-                small = (
-                    step
-                    for step in FINENESS
-                    if sum(map(len, _photographs(filmed, boxes[0], step))) <= each
-                )
-                self._fineness = next(small, FINENESS[-1])
+                self._fineness = _finest(filmed, boxes[0], each)
             fineness = self._fineness
             self._film.add(boxes[0], lambda: _photographs(filmed, boxes[0], fineness))
         for strip, mask, box in zip(self._masks, masks, boxes, strict=True):
-            strip.add(box, lambda mask=mask, box=box: [_png(mask, box)])  # type: ignore[misc]
+            strip.add(box, partial(_mask_picture, mask, box))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the pictures as a page's scripts read them."""
@@ -112,8 +116,16 @@ class Stills:
         }
 
 
+def _finest(filmed: Image, box: Box, room: int) -> Fineness:
+    """Return the finest setting whose pictures of a frame fit, else the coarsest."""
+    for fineness in FINENESS:
+        if sum(map(len, _photographs(filmed, box, fineness))) <= room:
+            return fineness
+    return FINENESS[-1]
+
+
 def _box(mask: Mask, body: Body, camera: Camera, frame: Frame) -> Box:
-    """Return the part of a picture that holds the mask and the body, with a margin."""
+    """Return the box around the mask and the body, with a margin."""
     pixels, depths = camera.project(body.skeleton.joints(frame.pose, frame.translation))
     left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
     points = [pixels[depths > NEAR]]
@@ -137,22 +149,24 @@ def _cut(image: Image, box: Box) -> Image:
 
 
 def _photographs(image: Image, box: Box, fineness: Fineness) -> list[str]:
-    return [
-        _encoded(".jpg", _small(picture, height), [cv2.IMWRITE_JPEG_QUALITY, quality])
-        for picture, (height, quality) in zip(
-            (_cut(image, box), image), fineness, strict=True
-        )
-    ]
+    """Return the part in a box and the whole image, each as a JPEG for a page."""
+    texts = []
+    for picture, (height, quality) in zip(
+        (_cut(image, box), image), fineness, strict=True
+    ):
+        parameters = [cv2.IMWRITE_JPEG_QUALITY, quality]
+        texts.append(_encoded(".jpg", _small(picture, height), parameters))
+    return texts
 
 
-def _png(mask: Mask, box: Box) -> str:
-    """Return a part of a mask as a picture of one bit a pixel, white where the mask is."""
+def _mask_picture(mask: Mask, box: Box) -> list[str]:
+    """Return one picture: a part of a mask as a PNG of one bit per pixel."""
     small = 255 * _small(_cut(mask.astype(np.uint8), box), MAX_HEIGHT)
-    return _encoded(".png", small, [cv2.IMWRITE_PNG_BILEVEL, 1])
+    return [_encoded(".png", small, [cv2.IMWRITE_PNG_BILEVEL, 1])]
 
 
 def _small(image: Image, highest: int) -> Image:
-    """Return a picture of at most that height, and at most twice as wide."""
+    """Return a picture scaled down to `highest` in height and twice that in width."""
     height, width = image.shape[:2]
     factor = max(height / highest, width / (2 * highest))
     if factor <= 1.0:
@@ -164,4 +178,6 @@ def _small(image: Image, highest: int) -> Image:
 def _encoded(suffix: str, image: Any, parameters: list[int]) -> str:
     done, content = cv2.imencode(suffix, image, parameters)
     assert done
-    return f"data:image/{suffix[1:].replace('jpg', 'jpeg')};base64,{base64.b64encode(content.tobytes()).decode()}"
+    kind = suffix[1:].replace("jpg", "jpeg")
+    text = base64.b64encode(content.tobytes()).decode()
+    return f"data:image/{kind};base64,{text}"

@@ -1,6 +1,7 @@
-"""The areas of thousands of poses, counted on a device in parts: while one part is counted, the next one is copied.
+"""The areas of thousands of poses, counted on a device in parts.
 
-Bodies, cameras and silhouettes are copied to the device once, and stay there as long as they live.
+While one part is counted, the next one is copied. Bodies, cameras and silhouettes are
+copied to the device once, and stay there as long as the objects live.
 """
 
 from collections import deque
@@ -10,17 +11,16 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba import cuda
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import Chain
-from posefit.silhouette.cuda.launch import THREADS, count_on_device
-from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.mask import Areas, Silhouette
+from posefit_cuda.launch import THREADS, count_on_device
 
 _held: WeakKeyDictionary[Any, Sequence[Any]] = WeakKeyDictionary()
-# poses: 35 MB; two parts at a time are on the device, however many there are
+# poses of a part: 35 MB. At most two parts are on the device at once.
 PART = 65_536
 
 
@@ -30,16 +30,16 @@ def areas_on_device(
     silhouette: Silhouette,
     poses: Array,
     translations: Array,
-) -> NDArray[np.int64]:
-    """Return R, B, Y (n, 3) in pixels of poses (n, 66) at translations (n, 3), counted on the device.
+) -> Areas:
+    """Return R, B, Y (n, 3) in pixels of poses (n, 66) at translations (n, 3).
 
-    Shapes are checked by the callers.
+    The device counts. The callers check shapes.
     """
     out = np.empty((len(poses), 3), dtype=np.int64)
     drawing = drawing_on_device(body, camera, silhouette)
     streams = (cuda.stream(), cuda.stream())
     waiting = deque[tuple[slice, Any, Any]]()
-    cuda.synchronize()  # what the drawing is made of has arrived
+    cuda.synchronize()  # wait until the arrays of the drawing have been copied
 
     def collect() -> None:
         part, areas, stream = waiting.popleft()
@@ -48,12 +48,10 @@ def areas_on_device(
     for k, first in enumerate(range(0, len(poses), PART)):
         part = slice(first, first + PART)
         stream = streams[k % 2]
-        there, where = (
-            cuda.to_device(values[part], stream=stream)
-            for values in (poses, translations)
-        )
-        areas = cuda.device_array((len(there), 3), np.int32, stream=stream)
-        count_on_device[len(there), THREADS, stream](*drawing, there, where, areas)
+        moved = cuda.to_device(poses[part], stream=stream)
+        places = cuda.to_device(translations[part], stream=stream)
+        areas = cuda.device_array((len(moved), 3), np.int32, stream=stream)
+        count_on_device[len(moved), THREADS, stream](*drawing, moved, places, areas)
         waiting.append((part, areas, stream))
         if len(waiting) == len(streams):
             collect()
@@ -70,20 +68,18 @@ def drawing_on_device(
     view = (camera.rotation.ravel(), camera.translation, camera.focal, camera.centre)
     *bones, radii = _there(body, lambda: (*chain, body.radii))
     seen_by = _there(camera, lambda: (np.concatenate(view),))
-    words = _there(
-        silhouette,
-        lambda: (
-            *(bits.view(np.uint32) for bits in silhouette.bits),
-            [silhouette.pixels],
-        ),
-    )
+
+    def words_of_silhouette() -> Sequence[Any]:
+        person, valid = silhouette.bits
+        return person.view(np.uint32), valid.view(np.uint32), [silhouette.pixels]
+
+    words = _there(silhouette, words_of_silhouette)
     return Chain(*bones), radii, *seen_by, (camera.width, camera.height), tuple(words)
 
 
 def _there(owner: Any, arrays: Callable[[], Sequence[Any]]) -> Sequence[Any]:
-    """Return the arrays of an owner on the device, given to it at the first call."""
+    """Return an owner's arrays on the device; the first call copies them."""
     if owner not in _held:
-        _held[owner] = tuple(
-            cuda.to_device(np.array(array, order="C")) for array in arrays()
-        )
+        copies = [cuda.to_device(np.array(array, order="C")) for array in arrays()]
+        _held[owner] = tuple(copies)
     return _held[owner]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from posefit import Body, Camera, Silhouette, areas, moved_to, project
+from posefit.motion.built_in import average_skeleton
 from posefit.plugin import Array, draw_population
 from posefit.silhouette.drawn import PoseCount
 from posefit.testing.problem import pose_problem
@@ -20,6 +21,11 @@ pytestmark = [
     # a body far off the image has coordinates that no float32 holds: on a device as on a CPU these are infinite
     pytest.mark.filterwarnings("ignore::RuntimeWarning"),
 ]
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.of(average_skeleton())
 
 
 def assert_equals_the_cpu(
@@ -81,7 +87,7 @@ def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the
 def test_parts_on_their_way_are_put_together_in_order(
     body: Body, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posefit.silhouette.cuda.areas.PART", 3)
+    monkeypatch.setattr("posefit_cuda.areas.PART", 3)
     rng = np.random.default_rng(6)
     camera = Camera.around(np.zeros(3), 0.4, 3.0, (24, 20))
     assert_equals_the_cpu(

@@ -1,8 +1,9 @@
-"""One pose a block of threads: kinematics, cones, bits and their count, in one launch.
+"""One launch per call and one block of threads per pose: from angles to areas.
 
-The steps are those of `posefit.geometry.kernels` and `posefit.silhouette.rasteriser`: a thread for each world axis of
-the frames, for a joint, a bone, or some words of a row. What a device says in one instruction and Python in several
-stands first: each as plain Python, which numba's simulator runs, and below it as numba compiles it for a device.
+The steps follow `posefit.geometry.kernels` and `posefit.silhouette.rasteriser`. A
+thread takes one world axis of the frames, then joints, bones, and some words of a row.
+First come functions that a device has as one instruction: each in plain Python for
+numba's simulator, followed by the code that numba compiles for a device.
 """
 
 import math
@@ -19,19 +20,20 @@ from posefit.silhouette.spans import BLOCK
 from posefit.silhouette.spans import STRIP_PIXELS as STRIP
 
 THREADS = 64  # of a block
-WORDS = 4  # of a row that a thread fills at a time
+WORDS = 4  # words of a row that a thread fills together
 _ANGLES = ANGLES
 _BONES = len(BONES)
 _JOINTS = len(JOINTS)
-U, V, METRE = range(3)  # rows of `ends`, a column a joint
-# rows of `lines`, a column a bone
+U, V, METRE = range(3)  # rows of `ends`, with a column per joint
+# rows of `lines`, with a column per bone
 X0, Y0, S0, X1, Y1, S1, XP, MP, PA, PB, XQ, MQ, QA, QB, LINES = range(15)
-# rows of `bounds`: those drawn, strips, and the cone's own first row
+# rows of `bounds`: first and stop row of the blocks, first and last strip, and the
+# cone's first row
 ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)
 
 
 def on_device(function):
-    """Return a function of numbers, which is compiled for CPUs, as it is compiled for a device."""
+    """Return a function that is compiled for CPUs, compiled for a device instead."""
     return cuda.jit(device=True)(getattr(function, "py_func", function))
 
 
@@ -40,7 +42,7 @@ rotated = on_device(kernels.rotated)
 
 
 def fused(factor, by, addend):
-    """Return factor * by + addend of float32 numbers, rounded once: as compiled loops have it on a CPU with FMA."""
+    """Return factor * by + addend in float32, rounded once, as on a CPU with FMA."""
     return np.float32(float(factor) * float(by) + float(addend))
 
 
@@ -50,7 +52,7 @@ def _fused_compiled(factor, by, addend):  # noqa: ARG001
 
 
 def single_root(square):
-    """Return the square root of a float32 of 0 or more, as one."""
+    """Return the square root of a float32 that is at least 0, as float32."""
     return np.float32(math.sqrt(square))
 
 
@@ -60,7 +62,10 @@ def _single_root_compiled(square):  # noqa: ARG001
 
 
 def spanned(first, stop):
-    """Return a word of 32 bits, those from `first` on set that come before `stop`; both are cut to 0 to 32."""
+    """Return a uint32 with the bits from `first` to before `stop` set.
+
+    Both are clipped to 0 to 32.
+    """
     bits = (1 << min(max(int(stop), 0), 32)) - (1 << min(max(int(first), 0), 32))
     return np.uint32(max(bits, 0))
 
@@ -70,17 +75,15 @@ def _spanned_compiled(first, stop):  # noqa: ARG001
     def compiled(first, stop):
         a = np.uint64(min(max(first, 0), 32))
         b = np.uint64(min(max(stop, 0), 32))
-        return (
-            np.uint32((np.uint64(1) << b) - (np.uint64(1) << a))
-            if b > a
-            else np.uint32(0)
-        )
+        if b <= a:
+            return np.uint32(0)
+        return np.uint32((np.uint64(1) << b) - (np.uint64(1) << a))
 
     return compiled
 
 
 def floored(number):
-    """Return the largest whole number that is not above a number, as one of its own kind; infinity stays."""
+    """Return a number rounded down, in its own type; infinity stays infinity."""
     return np.floor(number)
 
 
@@ -90,7 +93,7 @@ def _floored_compiled(number):  # noqa: ARG001
 
 
 def ceiled(number):
-    """Return the least whole number that is not below a number, as one of its own kind; infinity stays."""
+    """Return a number rounded up, in its own type; infinity stays infinity."""
     return np.ceil(number)
 
 
@@ -101,16 +104,17 @@ def _ceiled_compiled(number):  # noqa: ARG001
 
 @cuda.jit(device=True)
 def write_sine(i, angle, sines, cosines):
-    """Write the sine and cosine of one angle, by the polynomials of a CPU."""
+    """Write the sine and cosine of one angle, with the same polynomials as on a CPU."""
     turns = floored(angle * (1.0 / PI_HIGH) + 0.5)
     sign = 1.0 - 2.0 * (turns - 2.0 * floored(0.5 * turns))
     sine, cosine = sine_cosine_near_zero((angle - turns * PI_HIGH) - turns * PI_LOW)
-    sines[i], cosines[i] = sign * sine, sign * cosine
+    sines[i] = sign * sine
+    cosines[i] = sign * cosine
 
 
 @cuda.jit(device=True)
 def place_root(i, place, sines, cosines, frames):
-    """Write world coordinate i of the root's three axes and of its place."""
+    """Write world coordinate i of the root's three axes and of its position."""
     sy = sines[0]
     sp = sines[1]
     sr = sines[2]
@@ -134,7 +138,10 @@ def place_root(i, place, sines, cosines, frames):
 
 @cuda.jit(device=True)
 def place_bones(i, chain, sines, cosines, frames):
-    """Write world coordinate i of all frames (27, 4, 3) beyond the root's: no axis asks for another one."""
+    """Write world coordinate i of all frames (27, 4, 3) except the root's.
+
+    The world axes do not depend on each other, so that each has a thread.
+    """
     starts, angles, turns, offsets = chain
     for b in range(starts.size):
         p = starts[b]
@@ -149,7 +156,9 @@ def place_bones(i, chain, sines, cosines, frames):
             u, v = rotated(u, v, sines[a + 2], cosines[a + 2])
             w, u = rotated(w, u, sines[a + 1], cosines[a + 1])
             v, w = rotated(v, w, sines[a], cosines[a])
-        frames[b + 1, 0, i], frames[b + 1, 1, i], frames[b + 1, 2, i] = u, v, w
+        frames[b + 1, 0, i] = u
+        frames[b + 1, 1, i] = v
+        frames[b + 1, 2, i] = w
         frames[b + 1, 3, i] = (
             frames[p, 3, i] + u * offsets[b, 0] + v * offsets[b, 1] + w * offsets[b, 2]
         )
@@ -157,7 +166,10 @@ def place_bones(i, chain, sines, cosines, frames):
 
 @cuda.jit(device=True)
 def project_joint(j, frames, view, ends):
-    """Write the projection of joint j, in pixels, and the pixels of a metre there: 0 where it is not to be drawn."""
+    """Write the projection of joint j in pixels, and the pixels per metre there.
+
+    All are 0 if the joint is not drawn.
+    """
     a = frames[j, 3, 0]
     b = frames[j, 3, 1]
     c = frames[j, 3, 2]
@@ -174,11 +186,14 @@ def project_joint(j, frames, view, ends):
 
 @cuda.jit(device=True)
 def write_segment(k, row, normal, gap, first, last, lines):
-    """Write one tangent segment of cone k, from row `row` of `lines` on: its line, and the rows that it crosses.
+    """Write a tangent segment of cone k into four rows of `lines`, from `row` on.
 
-    It lies in the direction `normal` from the middles (u, v, radius) of both discs.
+    They are its column, its slope, and the first and last row that it crosses. It
+    touches both discs (u, v, radius) in the direction `normal`.
     """
-    (x, y), (u0, v0, r0), (_, v1, r1) = normal, first, last
+    x, y = normal
+    u0, v0, r0 = first
+    _, v1, r1 = last
     a = v0 + r0 * y
     b = v1 + r1 * y
     crosses = abs(x) > FLAT and gap > 0.0
@@ -191,7 +206,10 @@ def write_segment(k, row, normal, gap, first, last, lines):
 
 @cuda.jit(device=True)
 def write_cone(k, start, radii, ends, size, lines, bounds):
-    """Write the bounds of cone k, and the discs and tangent segments that border it; no rows where it is invisible."""
+    """Write the bounds, the discs and the tangent segments of cone k.
+
+    Its rows are empty if it is invisible.
+    """
     strips, width, height = size
     bounds[ROW, k] = bounds[STOP, k] = 0
     u0 = ends[U, start]
@@ -220,7 +238,8 @@ def write_cone(k, start, radii, ends, size, lines, bounds):
     dr = r0 - r1
     dd = dx * dx + dy * dy
     gap = dd - dr * dr
-    # the two unit normals n with n . (c1 - c0) = r0 - r1: along the axis, plus or minus across it
+    # the two unit normals n with n . (c1 - c0) = r0 - r1: along the axis, plus or minus
+    # across it
     along = dr / max(dd, 1e-30)
     across = math.sqrt(max(gap, 0.0)) / max(dd, 1e-30)
     px = along * dx - across * dy
@@ -229,17 +248,22 @@ def write_cone(k, start, radii, ends, size, lines, bounds):
     qy = along * dy - across * dx
     v0 -= top
     v1 -= top
-    lines[X0, k], lines[Y0, k], lines[S0, k] = u0, v0, r0 * r0
-    lines[X1, k], lines[Y1, k], lines[S1, k] = u1, v1, r1 * r1
+    lines[X0, k] = u0
+    lines[Y0, k] = v0
+    lines[S0, k] = r0 * r0
+    lines[X1, k] = u1
+    lines[Y1, k] = v1
+    lines[S1, k] = r1 * r1
     write_segment(k, XP, (px, py), gap, (u0, v0, r0), (u1, v1, r1), lines)
     write_segment(k, XQ, (qx, qy), gap, (u0, v0, r0), (u1, v1, r1), lines)
 
 
 @cuda.jit(device=True)
 def crossing(k, y, lines):
-    """Return from where to where cone k spans row y, counted from its own first; a huge column first where it does not.
+    """Return the first and last column of cone k in row y, counted from its first row.
 
-    All are float32, as on a CPU.
+    If the cone does not cross the row, the first column is HUGE. All numbers are
+    float32, as on a CPU.
     """
     low = HUGE
     high = -HUGE
@@ -267,10 +291,10 @@ def crossing(k, y, lines):
 
 @cuda.jit(device=True)
 def word_of(low, high, strip, first, last, start):
-    """Return the bits of a span in one strip, of a cone that has the strips from `first` to `last`.
+    """Return the bits of a span in one strip; the cone has strips `first` to `last`.
 
-    They are counted, as on a CPU, from the first pixel of the window of two strips that begins at strip `start`: so
-    both round the same way.
+    Columns are counted from the first pixel of the window of two strips that begins at
+    strip `start`. A CPU does the same, so that both round in the same way.
     """
     if strip < first or strip > last:
         return np.uint32(0)
@@ -284,7 +308,7 @@ def word_of(low, high, strip, first, last, start):
 
 @cuda.jit(device=True)
 def fill(row, strip, strips, lines, bounds, words):
-    """Write `WORDS` words of a row of pixels, from a strip on: those of every cone together."""
+    """Write `WORDS` words of a row of pixels, from a strip on, filled by all cones."""
     for k in range(WORDS):
         words[k] = np.uint32(0)
     for b in range(_BONES):
@@ -310,7 +334,7 @@ def fill(row, strip, strips, lines, bounds, words):
 
 @cuda.jit(device=True)
 def bound(b, bounds, box):
-    """Widen the rows and strips of the whole body by those of cone b, if it is drawn."""
+    """Widen the body's box of rows and strips by cone b, if it is drawn."""
     if bounds[ROW, b] < bounds[STOP, b]:
         cuda.atomic.min(box, 0, bounds[ROW, b])
         cuda.atomic.max(box, 1, bounds[STOP, b])
@@ -320,7 +344,7 @@ def bound(b, bounds, box):
 
 @cuda.jit(device=True)
 def add_counts(row, strip, strips, words, observed, valid, counts):
-    """Add how many pixels of some words of a row are known, and how many are the person's."""
+    """Count the known pixels and the person's pixels in some words of a row."""
     body = np.int32(0)
     overlap = np.int32(0)
     for k in range(WORDS):
@@ -336,13 +360,24 @@ def add_counts(row, strip, strips, words, observed, valid, counts):
 
 @cuda.jit
 def count_on_device(chain, radii, view, size, observed, poses, translations, areas):
-    """Write the areas (n, 3) R, B, Y of poses (n, 66), one a block.
+    """Write the areas R, B, Y of poses, one pose per block.
 
-    First come a `Chain` and radii, then a view (16,): rotation, translation, focal lengths, centre; and its width and
-    height. `observed` are the bit images (strips, rows) of the person and of valid pixels as `rasteriser` makes them,
-    in 32-bit words, and how many pixels are the person's (1,).
+    Args:
+        chain: a `Chain`.
+        radii: (26, 2) metres.
+        view: (16,): rotation, translation, focal lengths, centre.
+        size: width and height in pixels.
+        observed: the bit images (strips, rows) of the person and of valid pixels, as
+            32-bit words in the layout of `rasteriser`, and the number of the person's
+            pixels (1,).
+        poses: (n, 66).
+        translations: (n, 3) metres.
+        areas: (n, 3), the output.
+
     """
-    (width, height), (person, valid, pixels), starts = size, observed, chain[0]
+    width, height = size
+    person, valid, pixels = observed
+    starts = chain[0]
     sines = cuda.shared.array(_ANGLES, float64)
     cosines = cuda.shared.array(_ANGLES, float64)
     frames = cuda.shared.array((_JOINTS, 4, 3), float64)
@@ -360,8 +395,12 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
     for a in range(thread, _ANGLES, threads):
         write_sine(a, poses[i, a], sines, cosines)
     if thread == 0:
-        counts[0] = counts[1] = 0
-        box[0], box[1], box[2], box[3] = height, 0, strips, -1
+        counts[0] = 0
+        counts[1] = 0
+        box[0] = height
+        box[1] = 0
+        box[2] = strips
+        box[3] = -1
     cuda.syncthreads()
     if thread < 3:
         place_root(thread, translations[i, thread], sines, cosines, frames)
