@@ -389,7 +389,7 @@ def disagreement(miss: float, tall: Array, stature: float) -> str | None:
     )
     if miss > APART * stature:
         return (
-            "expected cameras that see one person, got views that pass each other by "
+            "expected cameras that see one person, got views that disagree by "
             f"{miss:.1f} m: {reasons}"
         )
     wrong = np.flatnonzero((tall < SHORT * stature) | (tall > TALL * stature))

@@ -432,7 +432,7 @@ def _marks(
             yield marks
         if remaining:
             raise InputError(
-                f"{file}: expected an image ({FORMATS}), got a file that is none"
+                f"{file}: expected an image ({FORMATS}), got another or a damaged file"
             )
 
 

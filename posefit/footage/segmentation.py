@@ -813,6 +813,7 @@ def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
     image = read_image(path, grey=True)
     if image is None:
         raise InputError(
-            f"{path}: expected an image of what to ignore, got a file that is none"
+            f"{path}: expected an image of what to ignore, got another or a damaged "
+            "file"
         )
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > BRIGHT)

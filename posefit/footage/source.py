@@ -564,7 +564,7 @@ def _of_films(
     if best is first:
         return best.scene
     reason, _, _ = first.doubt.partition(";")
-    warning = f"{best.name} took the person out, instead of {first.name}: {reason}"
+    warning = f"segmented by {best.name} instead of {first.name}: {reason}"
     return replace(best.scene, warnings=[*best.scene.warnings, warning])
 
 
@@ -579,7 +579,7 @@ def _taken_out(
     """
     views = list[View]()
     for k, part in enumerate(parts):
-        progress.log(f"taking the person out of {part.video.path} by {part.how.name}")
+        progress.log(f"segmenting {part.video.path} by {part.how.name}")
         choose = None
         if views:
             choose = partial(
@@ -700,7 +700,7 @@ def _are_films(files: Sequence[Path]) -> bool:
     if min(pages) == 1:
         raise InputError(
             "source must be images of one page each, or a file of several pages for "
-            f"each camera, got {files[pages.index(1)]} beside such a file"
+            f"each camera, got {files[pages.index(1)]} with only one page"
         )
     return True
 

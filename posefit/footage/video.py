@@ -220,7 +220,7 @@ def _picture(source: tuple[Path, int] | Image) -> Image:
     file, page = source
     image = read_image(file, grey=False, page=page)
     if image is None:
-        raise InputError(f"{file}: expected a picture, got a file that is none")
+        raise InputError(f"{file}: expected a picture, got another or a damaged file")
     return image
 
 
