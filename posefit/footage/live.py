@@ -238,13 +238,13 @@ def _view(
     stream: Stream, live: LiveImage, mask: Mask, valid: Mask, usable: bool
 ) -> View:
     return View(
-        stream.name,
-        np.array([live.number]),
-        np.array([live.arrived]),
-        np.packbits(mask)[None],
-        np.packbits(valid)[None],
-        np.array([usable]),
-        (mask.shape[1], mask.shape[0]),
+        name=stream.name,
+        numbers=np.array([live.number]),
+        times=np.array([live.arrived]),
+        bits=np.packbits(mask)[None],
+        known=np.packbits(valid)[None],
+        usable=np.array([usable]),
+        size=(mask.shape[1], mask.shape[0]),
         fps=stream.rate,
     )
 

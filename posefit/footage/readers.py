@@ -390,13 +390,13 @@ def read_images(
         known[~there] = 0
     numbers = np.arange(start, stop)
     return View(
-        name,
-        numbers,
-        times_of(numbers, fps),
-        bits,
-        known,
-        there,
-        size,
+        name=name,
+        numbers=numbers,
+        times=times_of(numbers, fps),
+        bits=bits,
+        known=known,
+        usable=there,
+        size=size,
         fps=fps,
         guesses=[*images.numbered.guesses, *kind],
     )
@@ -494,13 +494,13 @@ def _packed(
     fps = rate or fps
     numbers = first + np.arange(start, stop)
     return View(
-        name,
-        numbers,
-        times_of(numbers, fps),
-        masks,
-        valid,
-        usable[start:stop].copy(),
-        size,
+        name=name,
+        numbers=numbers,
+        times=times_of(numbers, fps),
+        bits=masks,
+        known=valid,
+        usable=usable[start:stop].copy(),
+        size=size,
         fps=fps,
         counted="first" in arrays,
         landmarks=landmarks,

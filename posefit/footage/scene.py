@@ -167,13 +167,13 @@ def observed_views(scene: Scene) -> list[View]:
     for k, camera in enumerate(scene.cameras):
         seen = [each.silhouettes[k] for each in observations]
         view = View(
-            scene.name,
-            numbers,
-            times_of(numbers, scene.fps),
-            np.array([np.packbits(silhouette.mask) for silhouette in seen]),
-            np.array([np.packbits(silhouette.valid) for silhouette in seen]),
-            usable,
-            (camera.width, camera.height),
+            name=scene.name,
+            numbers=numbers,
+            times=times_of(numbers, scene.fps),
+            bits=np.array([np.packbits(silhouette.mask) for silhouette in seen]),
+            known=np.array([np.packbits(silhouette.valid) for silhouette in seen]),
+            usable=usable,
+            size=(camera.width, camera.height),
             fps=scene.fps,
             counted=True,
             warnings=scene.warnings,

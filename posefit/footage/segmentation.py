@@ -505,13 +505,13 @@ class Segmentation:
         count = len(blanks)  # the file may break off
         numbers = np.arange(self.start, self.start + count)
         view = View(
-            str(self.video.path),
-            numbers,
-            times_of(numbers, self.video.fps),
-            masks[:count],
-            valid[:count],
-            np.array([row["usable"] for row in largest], dtype=bool),
-            self.size,
+            name=str(self.video.path),
+            numbers=numbers,
+            times=times_of(numbers, self.video.fps),
+            bits=masks[:count],
+            known=valid[:count],
+            usable=np.array([row["usable"] for row in largest], dtype=bool),
+            size=self.size,
             fps=self.video.fps,
             filmed=self.video.size,
             landmarks=np.array(landmarks),
