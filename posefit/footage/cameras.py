@@ -114,19 +114,16 @@ def combined(
     apparent = apparent_sizes(observations, cameras) if len(views) > 1 else None
     if apparent is not None:
         miss, tall = apparent
-        scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
-        unit_is_open = unit is None and bool(scales - {"metres"})
-        if unit_is_open and np.median(tall) > 0.0:
-            any_unit = "free" in scales
-            fitted = _by_height(miss, tall, metres, body.stature, any_unit=any_unit)
-            if fitted.guess:
-                of_cameras["unit"] = fitted.guess
+        if unit is None:
+            factor, guess = _by_height(miss, tall, known, metres, body.stature)
+            if guess:
+                of_cameras["unit"] = guess
             cameras = [
-                replace(camera, translation=fitted.factor * camera.translation)
+                replace(camera, translation=factor * camera.translation)
                 for camera in cameras
             ]
-            miss = fitted.factor * miss
-            tall = fitted.factor * tall
+            miss = factor * miss
+            tall = factor * tall
         if wrong := disagreement(miss, tall, body.stature):
             raise NoPersonError(f"{name}: {wrong}")
     first = observations[observations.first]
@@ -162,22 +159,32 @@ class _Fitted(NamedTuple):
 
 
 def _by_height(
-    miss: float, tall: Array, metres: float, stature: float, *, any_unit: bool
+    miss: float,
+    tall: Array,
+    known: Sequence[Camera | Calibration],
+    metres: float,
+    stature: float,
 ) -> _Fitted:
     """Return the unit in which the person's height is about right.
 
     Args:
         miss: By how much rays miss each other, see `apparent_sizes`.
         tall: The person's height in each view, in the unit guessed before.
-        metres: That unit in metres.
+        known: The cameras. A calibration may state that it is in metres, or that its
+            unit may be any length if no usual one fits.
+        metres: The unit guessed before, in metres.
         stature: The person's height in metres.
-        any_unit: Whether the unit may be any length, if no usual one fits.
 
     """
+    scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
     height = float(np.median(tall))
+    # a person behind the cameras says nothing about the unit
+    unit_is_open = bool(scales - {"metres"})
+    if not (unit_is_open and height > 0.0):
+        return _Fitted(1.0, "")
     unit = unit_of_heights(height / metres / stature)
     factor = METRES[unit] / metres
-    if any_unit and disagreement(factor * miss, factor * tall, stature):
+    if "free" in scales and disagreement(factor * miss, factor * tall, stature):
         factor = stature / height
         length = f"{factor * metres:.4g} m"
         guess = f"the calibration's unit is {length}, by the person's height"
