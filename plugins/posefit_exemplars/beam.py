@@ -169,6 +169,8 @@ def next_states(
     scale = 1.0 / (2.0 * step.pose**2)
     costs = continued.displacement_costs
     bins = yaw_bins(continued.yaws)
+    places = len(exemplars.tiles.states)
+    room = np.full(places, np.inf), np.empty(places, int), np.empty(places, int)
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
         rows = np.flatnonzero(bins == number)
@@ -179,6 +181,7 @@ def next_states(
             rows,
             groups,
             exemplars.tiles,
+            room,
             scale,
             limit,
         )

@@ -315,7 +315,13 @@ class HypothesisFilter:
                 evaluations += used + len(poses)
             else:
                 fresh = fitted(
-                    self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES
+                    self._task.body,
+                    contours,
+                    fresh,
+                    fresh[0],
+                    weights,
+                    FRESH_REACHES,
+                    self._task.threads,
                 )
                 evaluations += len(fresh[0]) * FRESH_EVALUATIONS
             evaluations += len(rows) * CONTINUED_EVALUATIONS
@@ -332,6 +338,7 @@ class HypothesisFilter:
                     means,
                     pulls,
                     CONTINUED_REACHES,
+                    self._task.threads,
                 )
         poses, places = (
             np.concatenate(arrays) for arrays in zip(fresh, continued, strict=True)

@@ -9,18 +9,34 @@ import numpy as np
 from posefit.arrays import inlined, jit
 
 DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
+# that are compared first
+FIRST_DIMENSIONS = 6
 LANES = 32
 
 
 @inlined
-def lower_distances(distances, start, code, tile):
-    """Lower `distances` (LANES,) to `start` and the squared distances of the codes of a tile (DIMENSIONS, LANES)."""
+def lower_distances(distances, start, code, tile, partial):
+    """Lower `distances` (LANES,) to `start` and the squared distances of the codes of a tile (DIMENSIONS, LANES).
+
+    Returns whether any may be lower: codes are principal components, and the first few tell of most tiles that all
+    their codes are farther away. `partial` (LANES,) is room for these.
+    """
+    near = False
     for lane in range(LANES):
         total = start
-        for d in range(DIMENSIONS):
+        for d in range(FIRST_DIMENSIONS):
             difference = tile[d, lane] - code[d]
             total += difference * difference
-        distances[lane] = min(distances[lane], total)
+        partial[lane] = total
+        near |= total < distances[lane]
+    if near:
+        for lane in range(LANES):
+            total = partial[lane]
+            for d in range(FIRST_DIMENSIONS, DIMENSIONS):
+                difference = tile[d, lane] - code[d]
+                total += difference * difference
+            distances[lane] = min(distances[lane], total)
+    return near
 
 
 @jit
@@ -46,13 +62,18 @@ def nearest_codes(codes, groups, tiles, count):
     squares = np.full((len(codes), count), np.inf, np.float32)
     states = np.zeros((len(codes), count), np.int64)
     distances = np.empty(LANES, np.float32)
+    partial = np.empty(LANES, np.float32)
+    last = count - 1
     for i in range(len(codes)):
         for group in groups[i]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
-                distances[:] = np.inf
-                lower_distances(distances, np.float32(0.0), codes[i], tiles.codes[t])
+                distances[:] = squares[i, last]
+                if not lower_distances(
+                    distances, np.float32(0.0), codes[i], tiles.codes[t], partial
+                ):
+                    continue
                 for lane in range(LANES):
-                    rank = count - 1
+                    rank = last
                     if distances[lane] < squares[i, rank]:
                         while rank > 0 and distances[lane] < squares[i, rank - 1]:
                             squares[i, rank], states[i, rank] = (
@@ -68,16 +89,16 @@ def nearest_codes(codes, groups, tiles, count):
 
 
 @jit
-def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit):
+def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, room, scale, limit):
     """Return the states that some `rows` of a beam continue to, the row of each one's cheapest step, and its total.
 
     Row i continues at `codes` (speeds, n, D), which cost `start_costs` (speeds, n); a step to a state in its `groups`
     (n, g) costs the squared distance times `scale`, at the cheapest speed. Totals (n,) with a step are below `limit`.
+    `room` holds three arrays of a number for each place in the tiles; the first one is inf before and afterwards.
     """
-    best = np.full(len(tiles.states), np.inf)
-    parents = np.empty(len(best), np.int64)
-    reached = np.empty(len(best), np.int64)
+    best, parents, reached = room
     distances = np.empty(LANES, np.float32)
+    partial = np.empty(LANES, np.float32)
     count = 0
     for row in rows:
         if totals[row] >= limit:
@@ -86,9 +107,14 @@ def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit
         for group in groups[row]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
                 distances[:] = farthest
+                near = False
                 for speed in range(len(codes)):
                     start = np.float32(start_costs[speed, row] / scale)
-                    lower_distances(distances, start, codes[speed, row], tiles.codes[t])
+                    near |= lower_distances(
+                        distances, start, codes[speed, row], tiles.codes[t], partial
+                    )
+                if not near:
+                    continue
                 for lane in range(LANES):
                     if distances[lane] < farthest:
                         total = totals[row] + scale * distances[lane]
@@ -98,5 +124,7 @@ def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit
                                 reached[count] = place
                                 count += 1
                             best[place], parents[place] = total, row
-    reached = reached[:count]
-    return tiles.states[reached], parents[reached], best[reached]
+    places = reached[:count].copy()
+    steps = tiles.states[places], parents[places], best[places]
+    best[places] = np.inf
+    return steps

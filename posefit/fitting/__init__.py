@@ -16,6 +16,7 @@
 | checks of what optimisers and priors return | validation.py |
 | the loop that drives a tracker, and the audit of its frames | driving.py |
 | the build of one person, fitted with the poses | shape.py |
+| what many bodies cost in many frames, in one compiled call | bodies.py, body_kernels.py |
 | one frame fitted to the contours of its masks | contours.py, contour_kernels.py |
 | CMA-ES | cma.py |
 | aligning and decoding, compiled | kernels.py |

@@ -4,12 +4,15 @@ docs/background/contour-fit.md derives the method; its equations have numbers, w
 `# contour (3)`. In short:
 
 - A bone is drawn as a tapered cone, which six numbers place in the picture: two joints (u, v) and two radii. A distance
-  between the borders is one residual; its derivatives by these numbers are a row of six (1) to (4).
-- The residuals of a bone are summed up to a 6 x 6 Hessian and a gradient (5) by a weight that bounds outliers (6).
+  between the borders is one residual. It changes with the disc at one share of the bone, and by that share with the
+  discs at both ends (1) to (4).
+- The residuals of a bone are summed up to a 6 x 6 Hessian and a gradient (5) by a weight that bounds outliers (6). Both
+  consist of 24 sums of products, which are expanded once all residuals are added.
 - A twist, velocity and rotation, moves a bone. The chain rule makes of both a spatial Hessian and a spatial force over
   twists (7) to (9), as a rigid body has a spatial inertia.
 - An angle turns everything beyond its joint. So it meets the sum over these bones, which the composite-rigid-body
   algorithm forms from the ends of the limbs to the root (10) to (13).
+- A step of one frame is the solution of the normal equations with a prior, by elimination (15), (16).
 
 Shapes are checked by the callers.
 """
@@ -21,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
+from posefit.geometry.kernels import place_frames
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
@@ -38,6 +42,7 @@ TINY = 1e-9
 # columns of a row of `cones`: the first disc; by how much the last one is off it, and its radius is less; the length of
 # the bone, and that of the cone's sides, which is 0 if one of its discs covers the other
 X0, Y0, R0, DX, DY, TAPER, LENGTH, SIDE = range(8)
+PRODUCTS = 24  # of a bone's residuals, see `accumulate`
 
 
 class Contour(NamedTuple):
@@ -48,6 +53,8 @@ class Contour(NamedTuple):
     size: NDArray[np.int64]  # (2,) rows and columns of the field
     points: Array  # (n, 2) pixels of the border
     step: float  # pixels of the border that a point represents
+    # (n,) the bone nearest to each point in the step before, -1 at first; overwritten
+    owners: NDArray[np.int64]
 
 
 class Contours(NamedTuple):
@@ -59,6 +66,29 @@ class Contours(NamedTuple):
     points: Array  # (n, 2) frame after frame
     starts: NDArray[np.int64]  # (T + 1,)
     step: float
+
+
+class Views(NamedTuple):
+    """The borders of one frame's masks in V views, and the cameras."""
+
+    rotations: Array  # (V, 3, 3) camera_from_world
+    translations: Array  # (V, 3)
+    focals: Array  # (V, 2) pixels
+    centres: Array  # (V, 2) pixels
+    fields: NDArray[np.float32]  # (V, h, w)
+    corners: NDArray[np.int64]  # (V, 2)
+    sizes: NDArray[np.int64]  # (V, 2)
+    points: Array  # (n, 2) view after view
+    starts: NDArray[np.int64]  # (V + 1,)
+    steps: Array  # (V,) pixels of the border that a point represents
+
+
+class Prior(NamedTuple):
+    """What is known before a fit of the m numbers of n places and poses that may change."""
+
+    free: NDArray[np.int64]  # (m,) which of the 69 numbers they are
+    means: Array  # (n, m)
+    precisions: Array  # (m,)
 
 
 class Bones(NamedTuple):
@@ -139,50 +169,69 @@ def cone_distance(x, y, cone):
 
 
 @inlined
-def jacobian_row(share, across, down, radius_change):
-    """Return the derivatives of a residual by a bone's six numbers: u and v of both joints, and both radii.
+def accumulate(products, share, slope, residual, weight):
+    """Add the products of a residual and its derivatives to those of a bone (24,). contour (5).
 
-    They are shared out among the ends of a bone by where the point is, from 0 at its start to 1 at its end. There the
-    residual changes by (across, down) a pixel that the axis moves, and by `radius_change` a pixel of radius.
+    The residual changes by `slope` with the column, the row and the radius of the disc at a `share` of the bone, from
+    0 at its start to 1 at its end. It changes by 1 - share of that with the first disc, and by share with the last.
     """
     rest = 1.0 - share
-    return (  # contour (2) and (4)
-        across * rest,
-        down * rest,
-        across * share,
-        down * share,
-        radius_change * rest,
-        radius_change * share,
-    )
+    near = rest * rest
+    both = rest * share
+    far = share * share
+    k = 0
+    for i in range(3):
+        weighted = weight * slope[i]
+        for j in range(i, 3):
+            product = weighted * slope[j]
+            products[k] += product * near
+            products[6 + k] += product * both
+            products[12 + k] += product * far
+            k += 1
+        products[18 + i] += weighted * residual * rest
+        products[21 + i] += weighted * residual * share
 
 
 @inlined
-def accumulate(hessian, gradient, row, residual, weight):
-    """Add a residual with its derivatives by six numbers to a bone's Hessian and gradient, halved. contour (5)."""
-    for i in range(6):
-        gradient[i] += weight * residual * row[i]
-        for j in range(6):
-            hessian[i, j] += weight * row[i] * row[j]
+def expand(products, hessians, gradients):
+    """Add the products of bones (B, 24) to their Hessians (B, 6, 6) and gradients (B, 6), halved. contour (5)."""
+    # the numbers of each end: column, row and radius
+    numbers = np.empty((2, 3), np.int64)
+    for end in range(2):
+        numbers[end, 0] = 2 * end
+        numbers[end, 1] = 2 * end + 1
+        numbers[end, 2] = 4 + end
+    for bone in range(products.shape[0]):
+        for end in range(2):
+            for i in range(3):
+                row = numbers[end, i]
+                gradients[bone, row] += products[bone, 18 + 3 * end + i]
+                for other in range(2):
+                    for j in range(3):
+                        low = min(i, j)
+                        pair = low * (5 - low) // 2 + max(i, j)
+                        product = products[bone, 6 * (end + other) + pair]
+                        hessians[bone, row, numbers[other, j]] += product
 
 
-@jit
+@inlined
 def _nearest_bone(x, y, first, cones, discs):
     """Return the bone whose border is nearest to a point; begin with `first`."""
-    least = np.inf
+    least = cone_distance(x, y, cones[first])[0]
     bone = first
-    for k in range(-1, discs.shape[0]):
-        b = first if k < 0 else k
+    for b in range(discs.shape[0]):
         reach = least + discs[b, 2]
-        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 >= reach * reach:
-            continue
-        off = cone_distance(x, y, cones[b])[0]
-        if off < least:
-            least = off
-            bone = b
+        dx = x - discs[b, 0]
+        dy = y - discs[b, 1]
+        if b != first and dx * dx + dy * dy < reach * reach:
+            off = cone_distance(x, y, cones[b])[0]
+            if off < least:
+                least = off
+                bone = b
     return bone
 
 
-@jit
+@inlined
 def _write_neighbours(bone, discs, neighbours):
     """Write the other bones whose discs meet that of a bone, and return how many they are."""
     count = 0
@@ -195,18 +244,20 @@ def _write_neighbours(bone, discs, neighbours):
     return count
 
 
-@jit
+@inlined
 def visible(x, y, bones):
     """Return whether a point of a bone's border is not covered by one of its neighbours."""
     cones = bones.cones
     discs = bones.discs
+    shown = True
     for b in bones.neighbours:
         dx = x - discs[b, 0]
         dy = y - discs[b, 1]
-        near = dx**2 + dy**2 < discs[b, 2] * discs[b, 2]
+        near = dx * dx + dy * dy < discs[b, 2] * discs[b, 2]
         if near and cone_distance(x, y, cones[b])[0] < -COVERED:
-            return False
-    return True
+            shown = False
+            break
+    return shown
 
 
 @jit
@@ -214,106 +265,113 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     """Add the squared distances of the mask's border from the body's, and of the body's border from the mask's.
 
     Each bone gets its own, as half a Hessian (B, 6, 6) and half a gradient (B, 6) by the column and row of its two
-    joints, and by both radii. Distances beyond `scale` pixels count less.
+    joints, and by both radii. Distances beyond `scale` pixels count less. The owners of the contour's points are
+    replaced by the bones that are nearest now.
     """
     count = parents.size
     cones = np.empty((count, 8))
     discs = np.empty((count, 3))
     write_cones(parents, centres, radii, cones, discs)
-    _accumulate_mask_border(contour, scale, cones, discs, hessians, gradients)
+    products = np.zeros((count, PRODUCTS))
+    _accumulate_mask_border(contour, scale, cones, discs, products)
     neighbours = np.empty(count, np.int64)
     for b in range(count):
         # else one of its discs covers the other
         if cones[b, LENGTH] > abs(cones[b, TAPER]) + TINY:
             others = neighbours[: _write_neighbours(b, discs, neighbours)]
             bones = Bones(cones, discs, others)
-            axis = centres[parents[b]], centres[b + 1]
-            _accumulate_bone_border(
-                axis, radii[b], contour, scale, bones, hessians[b], gradients[b]
-            )
+            side_points(cones[b], contour, scale, bones, products[b])
+            cap_points(cones[b], contour, scale, bones, products[b])
+    expand(products, hessians, gradients)
 
 
 @inlined
-def _accumulate_mask_border(contour, scale, cones, discs, hessians, gradients):
-    """Add the squared distances of the mask's border from the nearest bones."""
+def _accumulate_mask_border(contour, scale, cones, discs, products):
+    """Add the squared distances of the mask's border from the nearest bones.
+
+    The bone that was nearest in the step before most often still is, and a search that begins with it is short.
+    """
+    owners = contour.owners
     bone = 0
     for i in range(contour.points.shape[0]):
         x = contour.points[i, 0]
         y = contour.points[i, 1]
-        bone = _nearest_bone(x, y, bone, cones, discs)
+        first = owners[i] if owners[i] >= 0 else bone
+        bone = _nearest_bone(x, y, first, cones, discs)
+        owners[i] = bone
         distance, share, nx, ny = cone_distance(x, y, cones[bone])
         weight = contour.step / (1.0 + (distance / scale) ** 2)  # contour (6)
-        row = jacobian_row(share, -nx, -ny, -1.0)
-        accumulate(hessians[bone], gradients[bone], row, distance, weight)
+        slope = -nx, -ny, -1.0  # contour (2)
+        accumulate(products[bone], share, slope, distance, weight)
 
 
 @inlined
-def _write_pair(points, first, share, along, across, length):
-    """Write a point of the border and its mirror image beyond the bone's axis.
+def _accumulate_point(disc, normal, length, contour, scale, bones, products):
+    """Add the squared distance of a point of a bone's border from the mask's, if it is visible.
 
-    A point is the share of the bone that it is at, its normal along the axis and across it, and its pixels of border.
+    The point is where the `normal` meets the border of a disc: its share of the bone, its centre and radius. It
+    represents a `length` of border, in pixels.
     """
-    for k in range(2):
-        points[first + k, 0] = share
-        points[first + k, 1] = along
-        points[first + k, 2] = across if k == 0 else -across
-        points[first + k, 3] = length
+    share, u, v, radius = disc
+    nx, ny = normal
+    x = u + radius * nx  # contour (3)
+    y = v + radius * ny
+    known, distance, slope_x, slope_y = field_distance(x, y, contour)
+    if known and visible(x, y, bones):
+        weight = length / (1.0 + (distance / scale) ** 2)  # contour (6)
+        slope = slope_x, slope_y, slope_x * nx + slope_y * ny  # contour (4)
+        accumulate(products, share, slope, distance, weight)
 
 
 @inlined
-def side_points(points, sides, length, cosine, sine):
-    """Write the points (n, 4) of both sides of a bone's border, its tangent segments; return how many there are."""
-    for i in range(sides + 1):
-        # the first and the last one have a neighbour on one side only
-        piece = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
-        _write_pair(points, 2 * i, i / sides, cosine, sine, piece)
-    return 2 * (sides + 1)
-
-
-@inlined
-def cap_points(points, first, share, radius, start, arc):
-    """Write points of both arcs of a disc, from the angle `start` to the axis on; return the number after them."""
-    for i in range(CAP):
-        angle = start + arc * (i + 0.5) / CAP
-        along = math.cos(angle)
-        across = math.sin(angle)
-        _write_pair(points, first + 2 * i, share, along, across, radius * arc / CAP)
-    return first + 2 * CAP
-
-
-@inlined
-def _accumulate_bone_border(axis, radii, contour, scale, bones, hessian, gradient):
-    """Add the squared distances of a bone's visible border, both sides and both ends, from the mask's."""
-    start, end = axis
-    dx = end[0] - start[0]
-    dy = end[1] - start[1]
-    r0 = radii[0]
-    r1 = radii[1]
-    length = math.sqrt(dx * dx + dy * dy)
-    dx = dx / length
-    dy = dy / length
-    cosine = (r0 - r1) / length
+def side_points(cone, contour, scale, bones, products):
+    """Add the squared distances of points of both sides of a bone's border, its tangent segments."""
+    length = cone[LENGTH]
+    dx = cone[DX] / length
+    dy = cone[DY] / length
+    cosine = cone[TAPER] / length
     sine = math.sqrt(1.0 - cosine * cosine)
-    tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
-    sides = max(int(length / (2.0 * contour.step)) + 1, 2)
-    points = np.empty((2 * (sides + 1 + 2 * CAP), 4))
-    count = side_points(points, sides, length, cosine, sine)
-    count = cap_points(points, count, 1.0, r1, 0.0, tilt)
-    count = cap_points(points, count, 0.0, r0, tilt, math.pi - tilt)
-    for i in range(count):
-        share = points[i, 0]
-        along = points[i, 1]
-        across = points[i, 2]
-        nx = along * dx - across * dy
-        ny = along * dy + across * dx
-        radius = r0 + share * (r1 - r0)
-        x = start[0] + share * length * dx + radius * nx  # contour (3)
-        y = start[1] + share * length * dy + radius * ny
-        known, distance, slope_x, slope_y = field_distance(x, y, contour)
-        if known and visible(x, y, bones):
-            weight = points[i, 3] / (1.0 + (distance / scale) ** 2)  # contour (6)
-            row = jacobian_row(share, slope_x, slope_y, slope_x * nx + slope_y * ny)
-            accumulate(hessian, gradient, row, distance, weight)
+    pieces = max(int(length / (2.0 * contour.step)) + 1, 2)
+    for i in range(pieces + 1):
+        share = i / pieces
+        # the first and the last point have a neighbour on one side only
+        piece = length * sine / pieces * (0.5 if i in (0, pieces) else 1.0)
+        radius = cone[R0] - share * cone[TAPER]
+        u = cone[X0] + share * cone[DX]
+        v = cone[Y0] + share * cone[DY]
+        disc = share, u, v, radius
+        for k in range(2):
+            across = sine if k == 0 else -sine
+            normal = cosine * dx - across * dy, cosine * dy + across * dx
+            _accumulate_point(disc, normal, piece, contour, scale, bones, products)
+
+
+@inlined
+def cap_points(cone, contour, scale, bones, products):
+    """Add the squared distances of points of the arcs of both discs of a bone's border."""
+    length = cone[LENGTH]
+    dx = cone[DX] / length
+    dy = cone[DY] / length
+    # from the axis to the normal of the cone's side
+    tilt = math.acos(cone[TAPER] / length)
+    for i in range(2 * CAP):
+        # the last disc, then the first
+        last = i < CAP
+        share = 1.0 if last else 0.0
+        start = 0.0 if last else tilt
+        arc = tilt if last else math.pi - tilt
+        angle = start + arc * ((i % CAP + 0.5) / CAP)
+        along = math.cos(angle)
+        sine = math.sin(angle)
+        radius = cone[R0] - share * cone[TAPER]
+        piece = radius * arc / CAP
+        u = cone[X0] + share * cone[DX]
+        v = cone[Y0] + share * cone[DY]
+        disc = share, u, v, radius
+        for k in range(2):
+            across = sine if k == 0 else -sine
+            normal = along * dx - across * dy, along * dy + across * dx
+            _accumulate_point(disc, normal, piece, contour, scale, bones, products)
 
 
 @inlined
@@ -416,10 +474,10 @@ def _accumulate_twists(rows, drawn, worth, work, hessian, force):
     block, gradient = drawn
     for i in range(6):
         for j in range(6):
-            total = 0.0
-            for k in range(6):
-                total += block[i, k] * rows[k, j]
-            work[i, j] = total
+            work[i, j] = 0.0
+        for k in range(6):
+            for j in range(6):
+                work[i, j] += block[i, k] * rows[k, j]
     for i in range(6):
         total = 0.0
         for k in range(6):
@@ -610,10 +668,126 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
                 contours.sizes[k],
                 points,
                 contours.step,
+                np.full(len(points), -1),
             )
             grows = Growth(grown.joints[i], grown.radii, grown.squares)
             bones = BoneSquares(sums.hessians[i], sums.forces[i])
             add_view(parents, radii, camera, frames[i], contour, reach, grows, bones)
+
+
+@jit
+def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
+    """Move poses (n, 66) and places (n, 3) to the contours of one frame, a step for each of `reaches`, metres.
+
+    Each is a Gauss-Newton step, with a `prior`. No angle turns farther than `max_turn`, radians, in one.
+    """
+    free = prior.free
+    count = poses.shape[0]
+    joints = chain.parents.size + 1
+    frames = np.empty((count, joints, 4, 3))
+    sines = np.empty((count, ANGLES))
+    cosines = np.empty((count, ANGLES))
+    owners = np.full((count, len(views.points)), -1)
+    bones = BoneSquares(np.empty((joints, 6, 6)), np.empty((joints, 6, 1)))
+    all_screws = np.empty((NUMBERS, 6))
+    screws = np.zeros((NUMBERS, 6))
+    hessian = np.empty((NUMBERS, NUMBERS))
+    gradient = np.empty((NUMBERS, 1))
+    matrix = np.empty((free.size, free.size))
+    step = np.empty(free.size)
+    for reach in reaches:
+        place_frames(chain, poses, places, sines, cosines, frames)
+        for i in range(count):
+            _add_views(chain.parents, radii, views, frames[i], owners[i], reach, bones)
+            write_screws(chain, frames[i], sines[i], cosines[i], all_screws)
+            for a in free:
+                screws[a] = all_screws[a]
+            composite_hessian(
+                chain, screws, bones.hessians, bones.forces, hessian, gradient
+            )
+            numbers = places[i], poses[i]
+            derivatives = hessian, gradient
+            _write_equations(numbers, prior, prior.means[i], derivatives, matrix, step)
+            solve_symmetric(matrix, step)
+            _subtract(numbers, free, step, max_turn)
+
+
+@inlined
+def _add_views(parents, radii, views, frames, owners, reach, bones):
+    """Write the squares of one frame's views to those of the bones, see `add_view`. `owners` (n,) are of all points."""
+    bones.hessians[:] = 0.0
+    bones.forces[:] = 0.0
+    joints = parents.size + 1
+    grown = Growth(
+        np.empty((0, joints, 3)), np.empty((0, parents.size, 2)), np.zeros((1, 1))
+    )
+    for v in range(len(views.steps)):
+        first = views.starts[v]
+        stop = views.starts[v + 1]
+        if first < stop:
+            camera = (
+                views.rotations[v],
+                views.translations[v],
+                views.focals[v],
+                views.centres[v],
+            )
+            contour = Contour(
+                views.fields[v],
+                views.corners[v],
+                views.sizes[v],
+                views.points[first:stop],
+                views.steps[v],
+                owners[first:stop],
+            )
+            add_view(parents, radii, camera, frames, contour, reach, grown, bones)
+
+
+@inlined
+def _write_equations(numbers, prior, means, derivatives, matrix, right):
+    """Write the normal equations of a step (m, m), the upper half, and (m,). contour (15)."""
+    place, pose = numbers
+    hessian, gradient = derivatives
+    free = prior.free
+    for a in range(free.size):
+        number = free[a]
+        value = place[number] if number < 3 else pose[number - 3]
+        precision = prior.precisions[a]
+        right[a] = gradient[number, 0] + precision * (value - means[a])
+        for b in range(a + 1):
+            matrix[b, a] = hessian[number, free[b]]
+        matrix[a, a] += precision
+
+
+@inlined
+def _subtract(numbers, free, step, max_turn):
+    """Subtract a step (m,) from the free numbers of a place and a pose."""
+    place, pose = numbers
+    for a in range(free.size):
+        number = free[a]
+        if number < 3:
+            place[number] -= step[a]
+        else:
+            pose[number - 3] -= min(max(step[a], -max_turn), max_turn)
+
+
+@jit
+def solve_symmetric(matrix, right):
+    """Solve for a vector (m,), in its place, by elimination in the upper half of a positive definite matrix (m, m).
+
+    Both are overwritten. contour (16).
+    """
+    m = right.size
+    for k in range(m):
+        for i in range(k + 1, m):
+            factor = matrix[k, i] / matrix[k, k]
+            for j in range(i, m):
+                matrix[i, j] -= factor * matrix[k, j]
+            right[i] -= factor * right[k]
+    for k in range(m - 1, -1, -1):
+        total = right[k]
+        for j in range(k + 1, m):
+            total -= matrix[k, j] * right[j]
+        right[k] = total / matrix[k, k]
 
 
 @jit

@@ -21,6 +21,7 @@ from posefit.silhouette.mask import (
     padded_box,
     without_small_pieces,
 )
+from posefit.silhouette.sharing import shares_of, work_through
 
 # pixels of a metre; of finer masks only every second pixel, third, ... is used
 FINE_PIXELS = 80.0
@@ -36,7 +37,7 @@ class MaskContours:
 
     camera: Camera  # whose pixels these are: of fine masks a coarser one than theirs
     metres: Array  # (T,) pixels of a metre where the person is
-    step: float  # pixels of the border that a point stands for
+    step: float  # pixels of the border that a point represents
     # (T, h, w) pixels outside the mask, below 0 within; 0 where it is unknown
     fields: Distances = field(repr=False)
     # (T, 2) column and row of each field's first pixel
@@ -232,27 +233,57 @@ def fitted(
     means: Array,
     precisions: Array,
     scales: Sequence[float],
+    threads: int = 1,
 ) -> tuple[Array, Array]:
     """Return poses (n, 66) and places (n, 3) after a step to the contours of one frame for each of `scales`.
 
     Angles are pulled to `means` (n, 66), places to where they `start`, with `precisions` (69,) of places and angles.
-    Contours farther off than a scale, metres, count less.
+    Contours farther off than a scale, metres, count less. The result is the same with any number of `threads`.
     """
-    angles = np.flatnonzero(body.skeleton.free)
-    poses = start[0].copy()
-    places = start[1].copy()
-    weights = precisions[np.append([0, 1, 2], 3 + angles)]
-    for scale in scales:
-        count_poses(STEP_EVALUATIONS * len(views) * len(poses))
-        hessians, gradients, *_ = contour_squares(body, views, poses, places, scale)
-        off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
-        np.einsum("nii->ni", hessians)[:] += weights  # on the diagonals
-        steps = np.linalg.solve(hessians, (gradients + weights * off)[..., None])[
-            ..., 0
-        ]
-        places -= steps[:, :3]
-        poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
+    free = np.flatnonzero(np.append([True] * 3, body.skeleton.free))
+    poses = writeable(start[0].copy())
+    places = writeable(start[1].copy())
+    count_poses(STEP_EVALUATIONS * len(views) * len(poses) * len(scales))
+    targets = np.concatenate([start[1], means], axis=1)[:, free]
+    stacked = _stacked(views)
+    reaches = np.array(scales, dtype=np.float64)
+
+    def fit(part: slice) -> None:
+        kernels.fit_poses(
+            body.skeleton.chain,
+            body.radii,
+            stacked,
+            kernels.Prior(free, targets[part], precisions[free]),
+            reaches,
+            MAX_ANGLE_STEP,
+            poses[part],
+            places[part],
+        )
+
+    work_through(shares_of(len(poses), threads), threads, lambda _: (), fit)
     return poses, places
+
+
+def _stacked(views: Sequence[MaskContours]) -> kernels.Views:
+    """Return the borders of one frame's masks, as its kernel wants them."""
+    cameras = [view.camera for view in views]
+    size = np.max([view.fields.shape[1:] for view in views], axis=0)
+    fields = np.zeros((len(views), *size), dtype=np.float32)
+    for whole, view in zip(fields, views, strict=True):
+        part = view.fields[0]
+        whole[: part.shape[0], : part.shape[1]] = part
+    return kernels.Views(
+        np.array([camera.rotation for camera in cameras]),
+        np.array([camera.translation for camera in cameras]),
+        np.array([camera.focal for camera in cameras]),
+        np.array([camera.centre for camera in cameras]),
+        fields,
+        np.concatenate([view.corners for view in views]),
+        np.concatenate([view.sizes for view in views]),
+        np.concatenate([view.points for view in views]),
+        np.cumsum([0, *(len(view.points) for view in views)]),
+        np.array([view.step for view in views]),
+    )
 
 
 # the steps of each round of a race, by their scales, and the share of the poses that

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.bodies import HeldFrames, scaled_bodies
 from posefit.fitting.box import Start
 from posefit.fitting.cma import CMAES, default_population_size
-from posefit.fitting.cost import align
 from posefit.fitting.problem import Problem, minimise
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES, kind
-from posefit.silhouette.cost import BETA, pose_costs
+from posefit.silhouette.cost import BETA
 
 LENGTHS = {
     "hips": ("hipjoint",),
@@ -129,14 +129,19 @@ def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
 
     With a `height` in metres the result is scaled to it.
     """
-    lengths = factors[0] * np.exp(_LENGTHS @ np.log(factors[1 : 1 + len(LENGTHS)]))
-    girths = factors[0] * np.exp(_GIRTHS @ np.log(factors[1 + len(LENGTHS) :]))
-    scaled = body.scaled(lengths, girths)
-    return (
-        scaled
-        if height is None
-        else scaled.scaled(height / scaled.stature, height / scaled.stature)
-    )
+    lengths, girths = _scales(factors[None])
+    scaled = body.scaled(lengths[0], girths[0])
+    if height is None:
+        return scaled
+    factor = height / scaled.stature
+    return scaled.scaled(factor, factor)
+
+
+def _scales(factors: Array) -> tuple[Array, Array]:
+    """Return the scales of bones' lengths and of their girths (m, 26) by factors (m, 17)."""
+    scale = factors[:, :1]
+    lengths, girths = np.split(np.log(factors[:, 1:]), [len(LENGTHS)], axis=1)
+    return scale * np.exp(lengths @ _LENGTHS.T), scale * np.exp(girths @ _GIRTHS.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,34 +180,28 @@ def fit_shape(
     height: float | None = None,
     aligned: bool = True,
     beta: float = BETA,
+    threads: int = 1,
 ) -> Shape:
     """Return the shape that fits all observations best, fitted in turns with their poses.
 
     `follow` tracks the observations with a body. With a `height` in metres the person is so tall; one camera alone
     cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. `beta`
-    is that of the cost. How uncertain the factors are is not known yet: their `spread` is that of all people.
+    is that of the cost, and any number of `threads` gives the same shape. How uncertain the factors are is not known
+    yet: their `spread` is that of all people.
     """
 
-    def cost(factors: Array) -> float:
-        """Return the mean cost of the frames, whose poses are held."""
-        tried = shaped(body, factors, height)
-        total = 0.0
-        for frame, observation in zip(frames, observations, strict=True):
-            pose = frame.pose[None]
-            translation = frame.translation[None]
-            silhouettes = observation.silhouettes
-            if aligned:
-                translation = align(tried, cameras, silhouettes, pose, translation)
-            total += float(
-                pose_costs(tried, cameras, silhouettes, pose, translation, beta)[0][0]
-            )
-        return total / len(observations)
+    def cost(factors: Array) -> Array:
+        """Return the mean costs (m,) of the frames, whose poses are held, for factors (m, 17)."""
+        offsets, radii = scaled_bodies(body, *_scales(factors), height)
+        return held.costs(offsets, radii, aligned, beta, threads)
 
     factors = np.ones(len(NAMES))
     for width, generations in ROUNDS:
         frames = follow(shaped(body, factors, height))
+        held = HeldFrames.of(body, cameras, observations, frames)
         factors = _search(cost, factors, rng, width, generations)
-    return Shape(shaped(body, factors, height), factors, SPREAD, cost(factors), height)
+    fitted = shaped(body, factors, height)
+    return Shape(fitted, factors, SPREAD, float(cost(factors[None])[0]), height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,22 +220,22 @@ class FactorBox:
 
 
 def _search(
-    cost: Callable[[Array], float],
+    cost: Callable[[Array], Array],
     start: Array,
     rng: np.random.Generator,
     width: float,
     generations: int,
 ) -> Array:
-    """Return the factors (17,) of least cost, by CMA-ES from the factors `start` (17,)."""
+    """Return the factors (17,) of least cost, by CMA-ES from the factors `start` (17,).
+
+    `cost` returns the costs (m,) of factors (m, 17).
+    """
 
     def evaluate(proposals: Array) -> Array:
         points = REACH * proposals  # in spreads of people
-        return np.array(
-            [
-                cost(np.exp(_ROOT @ point)) + PULL * float(point @ point)
-                for point in points
-            ]
-        )
+        logs = np.array([_ROOT @ point for point in points])
+        pulls = np.array([PULL * float(point @ point) for point in points])
+        return np.asarray(cost(np.exp(logs)) + pulls)
 
     mean = np.clip(np.linalg.solve(_ROOT, np.log(start)) / REACH, -1.0, 1.0)
     box = FactorBox(

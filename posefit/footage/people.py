@@ -323,15 +323,20 @@ def _owners(
     """
     if not tracklets or not blobs:
         return {}
-    # takes a tenth of a second to import
-    from scipy.optimize import linear_sum_assignment
-
     distances = np.array(
         [[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets]
     )
-    rows, columns = linear_sum_assignment(np.minimum(distances, UNREACHABLE))
+    if 1 in distances.shape:
+        # one person or one blob: the nearest pair is the assignment
+        pairs = [divmod(int(distances.argmin()), len(blobs))]
+    else:
+        # takes a third of a second to import
+        from scipy.optimize import linear_sum_assignment
+
+        rows, columns = linear_sum_assignment(np.minimum(distances, UNREACHABLE))
+        pairs = list(zip(rows.tolist(), columns.tolist(), strict=True))
     owners = dict[int, Tracklet]()
-    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+    for row, column in pairs:
         if np.isfinite(distances[row, column]):
             owners[column] = tracklets[row]
     return owners

@@ -7,6 +7,7 @@ loops over lanes in registers. For rows at unknown offsets it would compare the
 addresses first, and would do so only for loops of 16 and more.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -340,3 +341,18 @@ def joint_positions(chain, poses, places):
         for lane in range(min(LANES, n - first)):
             read_joints(lanes, lane, joints[first + lane])
     return joints
+
+
+@jit
+def write_mean_distances(joints, targets, distances):
+    """Write the mean distances (n, K) of the joints (n, 27, 3) of some bodies from those of others (K, 27, 3)."""
+    count = joints.shape[1]
+    for i in range(joints.shape[0]):
+        for k in range(targets.shape[0]):
+            total = 0.0
+            for j in range(count):
+                x = joints[i, j, 0] - targets[k, j, 0]
+                y = joints[i, j, 1] - targets[k, j, 1]
+                z = joints[i, j, 2] - targets[k, j, 2]
+                total += math.sqrt(x * x + y * y + z * z)
+            distances[i, k] = total / count

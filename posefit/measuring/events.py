@@ -110,13 +110,28 @@ def _tops(series: Array) -> Array:
     """
     lowest, highest = np.percentile(series, [2, 98])
     step = max(MIN_FOOT_SWING, MIN_SWING_SHARE * float(highest - lowest))
-    if np.ptp(series) < step:
-        return np.empty(0)
-    # imported here because the import takes a tenth of a second
-    from scipy.signal import find_peaks
+    tops = [k for k, prominence in _peaks(series) if prominence >= step]
+    return np.array([_between(series, k) for k in tops])
 
-    peaks = find_peaks(series, prominence=step)[0]
-    return np.array([_between(series, int(k)) for k in peaks])
+
+def _peaks(series: Array) -> list[tuple[int, float]]:
+    """Return where a series is higher than beside, and by how much it falls from there before it is higher again.
+
+    Of several equal highest values side by side the middle one counts. The fall is the lesser of both sides'.
+    """
+    starts = np.flatnonzero(np.append(True, np.diff(series) != 0.0))
+    values = series[starts]
+    ends = np.append(starts[1:], len(series))
+    higher = (values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])
+    peaks = []
+    for k in (np.flatnonzero(higher) + 1).tolist():
+        above = np.flatnonzero(values > values[k])
+        first = above[above < k].max(initial=-1) + 1
+        stop = above[above > k].min(initial=len(values))
+        lowest = max(values[first:k].min(), values[k + 1 : stop].min())
+        middle = int(starts[k] + ends[k] - 1) // 2
+        peaks.append((middle, float(values[k] - lowest)))
+    return peaks
 
 
 def _between(series: Array, k: int) -> float:

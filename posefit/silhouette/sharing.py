@@ -31,6 +31,15 @@ def parts_of(n: int, threads: int) -> tuple[slice, ...]:
     return tuple(slice(first, stop) for first, stop in pairwise(borders))
 
 
+@lru_cache
+def shares_of(n: int, threads: int) -> tuple[slice, ...]:
+    """Return slices of n rows, each of which takes long: one a thread."""
+    count = max(min(threads, n), 1)
+    return tuple(
+        slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1))
+    )
+
+
 def work_through(
     parts: Sequence[slice],
     threads: int,

@@ -195,6 +195,7 @@ def fitted_build(
         height=height,
         aligned=aligned,
         beta=beta,
+        threads=task.threads,
     )
     return shape, task.cameras
 

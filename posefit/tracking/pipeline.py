@@ -123,6 +123,9 @@ def track_scene(
     for warning in scene.warnings:
         progress.warn(warning)
     task = task_of(scene, options, training)
+    if options.smooth:
+        # it brings a BLAS of its own, and only one that is loaded can be limited
+        import scipy.linalg  # noqa: F401
     # an optimiser's matrices are small: BLAS is slower with more threads
     with threadpool_limits(1):
         method = prepare(options, task)

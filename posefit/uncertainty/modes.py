@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
+from posefit.geometry import kernels
 from posefit.geometry.skeleton import (
     ANGLES,
     JOINTS,
@@ -220,20 +221,11 @@ def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
 
     A distance is the mean over joints, with both roots at one point.
     """
-    total = np.zeros((len(poses), len(others)))
-    squares = np.empty_like(total)
-    pairs = zip(
-        skeleton.joints(poses).transpose(1, 2, 0),
-        skeleton.joints(others).transpose(1, 2, 0),
-        strict=True,
-    )
-    # joint by joint, as all joints together would take much memory
-    for joints, targets in pairs:
-        squares[:] = 0.0
-        for axis, target in zip(joints, targets, strict=True):
-            squares += np.subtract.outer(axis, target) ** 2
-        total += np.sqrt(squares, out=squares)
-    return total / len(JOINTS)
+    joints = skeleton.joints(poses)
+    targets = skeleton.joints(others)
+    distances = np.empty((len(joints), len(targets)))
+    kernels.write_mean_distances(joints, targets, distances)
+    return distances
 
 
 def track_modes(

@@ -7,6 +7,7 @@ import pytest
 
 from posefit import Camera, Frame, Observation, Silhouette, pose_costs, project
 from posefit.fitting import shape
+from posefit.fitting.bodies import HeldFrames, scaled_bodies
 from posefit.fitting.cost import align
 from posefit.fitting.shape import (
     COVARIANCE,
@@ -72,8 +73,8 @@ def test_a_length_that_is_measured_moves_those_that_go_with_it() -> None:
     weight = 2000.0
     log_length = 0.08
 
-    def cost(factors: np.ndarray) -> float:
-        return float(weight * (np.log(factors[thighs]) - log_length) ** 2)
+    def cost(factors: np.ndarray) -> np.ndarray:
+        return weight * (np.log(factors[:, thighs]) - log_length) ** 2
 
     estimate = np.log(
         shape._search(cost, np.ones(len(NAMES)), np.random.default_rng(0), 0.5, 400)
@@ -87,6 +88,41 @@ def test_a_length_that_is_measured_moves_those_that_go_with_it() -> None:
     # the least of the cost and the pull, by hand
     np.testing.assert_allclose(estimate, expected, atol=2e-3)
     assert estimate[NAMES.index("torso length")] < -0.03
+
+
+@pytest.mark.parametrize("height", [None, 1.6])
+@pytest.mark.parametrize("aligned", [True, False])
+def test_many_bodies_cost_in_one_call_what_each_costs_alone(
+    height: float | None, aligned: bool
+) -> None:
+    cameras = [
+        Camera.around(WALK.translations.mean(axis=0), azimuth, 3.5, (160, 120))
+        for azimuth in (0.0, np.pi / 2)
+    ]
+    observations = observed(AVERAGE, cameras)
+    # a camera that knows nothing of one frame
+    blind = Silhouette.of(*np.zeros((2, 120, 160), dtype=bool))
+    observations[3] = Observation([blind, observations[3].silhouettes[1]])
+    frames = frames_at(PLACES)
+    factors = np.exp(0.05 * np.random.default_rng(4).standard_normal((5, len(NAMES))))
+    held = HeldFrames.of(AVERAGE, cameras, observations, frames)
+    bodies = scaled_bodies(AVERAGE, *shape._scales(factors), height)
+
+    def alone(body: Body) -> float:
+        total = 0.0
+        for frame, observation in zip(frames, observations, strict=True):
+            pose = frame.pose[None]
+            place = frame.translation[None]
+            views = body, cameras, observation.silhouettes
+            if aligned:
+                place = align(*views, pose, place)
+            total += float(pose_costs(*views, pose, place, 0.4)[0][0])
+        return total / len(frames)
+
+    expected = [alone(shaped(AVERAGE, row, height)) for row in factors]
+    for threads in (1, 3):
+        costs = held.costs(*bodies, aligned, 0.4, threads)
+        np.testing.assert_allclose(costs, expected, rtol=1e-12)
 
 
 def test_varied_people_are_symmetric_and_within_their_percentage() -> None:

@@ -8,7 +8,13 @@ from scipy.spatial import ConvexHull
 
 from posefit.arrays import Array
 from posefit.fitting import contour_kernels as kernels
-from posefit.fitting.contours import MaskContours, contour_squares, distances_outside
+from posefit.fitting.contours import (
+    MaskContours,
+    contour_squares,
+    distances_outside,
+    precisions,
+)
+from posefit.fitting.contours import fitted as fitted_to_frame
 from posefit.fitting.shape import NAMES, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
@@ -140,7 +146,12 @@ def pull_of_view(
     root = view.metres[k]
     points = np.ascontiguousarray(view.points[view.starts[k] : view.starts[k + 1]])
     mask = kernels.Contour(
-        view.fields[k], view.corners[k], view.sizes[k], points, view.step
+        view.fields[k],
+        view.corners[k],
+        view.sizes[k],
+        points,
+        view.step,
+        np.full(len(points), -1),
     )
     curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
     deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
@@ -289,6 +300,7 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
         np.ones(2, np.int64),
         points,
         1.0,
+        np.full(len(points), -1),
     )
 
     def half_sum(numbers: np.ndarray) -> float:
@@ -354,7 +366,12 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
         blocks = np.zeros((len(parents), 6, 6))
         forces = np.zeros((len(parents), 6))
         mask = kernels.Contour(
-            field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
+            field,
+            np.zeros(2, int),
+            np.array(field.shape),
+            np.zeros((0, 2)),
+            0.25,
+            np.zeros(0, int),
         )
         kernels.accumulate_borders(
             np.array(parents), joints, radii, mask, scale, blocks, forces
@@ -536,3 +553,35 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     )
     apart = estimate.translations[1] - estimate.translations[0]
     np.testing.assert_allclose(moved.translations[1] - both[0].translation, apart)
+
+
+@pytest.mark.parametrize("views", [(90.0,), (0.0, 90.0)])
+def test_poses_of_a_frame_are_fitted_alike_alone_together_and_by_several_threads(
+    views: tuple[float, ...],
+) -> None:
+    motion = built_in.motion("walk", frames=6)
+    scene = synthetic(motion, views, (160, 120), [], (None, None))
+    rng = np.random.default_rng(3)
+    poses = motion.poses + 0.1 * rng.standard_normal(motion.poses.shape)
+    poses = np.where(scene.body.skeleton.free, poses, 0.0)
+    places = np.repeat(motion.translations[2:3], len(poses), axis=0)
+    borders = [
+        MaskContours.of(camera, view, [scene.observations[2]], places[:1], 0.04)
+        for view, camera in enumerate(scene.cameras)
+    ]
+    aims = poses, precisions(0.1, 0.01), (0.09, 0.045)
+
+    def moved(rows: slice, threads: int) -> list[Array]:
+        start = poses[rows], places[rows]
+        return [
+            *fitted_to_frame(
+                scene.body, borders, start, aims[0][rows], *aims[1:], threads
+            )
+        ]
+
+    together = moved(slice(None), 1)
+    assert np.abs(together[0] - poses).max() > 0.01
+    for part, whole in zip(moved(slice(None), 3), together, strict=True):
+        np.testing.assert_array_equal(part, whole)
+    for part, whole in zip(moved(slice(4, 5), 1), together, strict=True):
+        np.testing.assert_array_equal(part[0], whole[4])

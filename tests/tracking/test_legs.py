@@ -12,7 +12,12 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.symmetry import exchanged_limbs
 from posefit.silhouette.cost import BETA
-from posefit.tracking.smoothing.legs import doubtful, legs_exchanged, with_cheapest_legs
+from posefit.tracking.smoothing.legs import (
+    doubtful,
+    in_doubt,
+    legs_exchanged,
+    with_cheapest_legs,
+)
 from posefit.tracking.smoothing.smooth import smooth
 from posefit.tracking.trajectory import cheapest_sequence
 from posefit.uncertainty.calibration import Recalibration
@@ -44,6 +49,11 @@ def exchanged(scene: Scene, frames: list[Frame], which: range) -> list[Frame]:
         replace(frame, pose=poses[k]) if k in which else frame
         for k, frame in enumerate(frames)
     ]
+
+
+def found(scene: Scene, frames: list[Frame]) -> NDArray[np.bool_]:
+    """Return in which frames (T,) legs should be exchanged."""
+    return legs_exchanged(smooth(scene, frames, None, BETA), frames, ALL, BETA)
 
 
 def changes(flags: NDArray[np.bool_]) -> list[int]:
@@ -87,14 +97,25 @@ def test_legs_that_went_back_pass(
 ) -> None:
     """Which of the two goes ahead is not known from the side: all may be exchanged. Where they pass is, to a frame."""
     scene, frames = film
-    found = legs_exchanged(scene, exchanged(scene, frames, wrong), ALL, BETA)
+    which = found(scene, exchanged(scene, frames, wrong))
     expected = np.isin(np.arange(FRAMES), wrong)
-    assert changes(found) == pytest.approx(changes(expected), abs=1)
+    assert changes(which) == pytest.approx(changes(expected), abs=1)
 
 
 def test_right_legs_stay(film: tuple[Scene, list[Frame]]) -> None:
     scene, frames = film
-    assert not changes(legs_exchanged(scene, frames, ALL, BETA))
+    assert not changes(found(scene, frames))
+
+
+def test_only_stretches_that_may_cost_less_are_in_doubt() -> None:
+    costs = np.ones(12)
+    costs[4] = 3.0
+    added = np.full(12, 1.0)
+    every = np.ones(12, dtype=bool)
+    # two frames with exchanged legs cost as much as the frame that costs more
+    assert in_doubt([4, 6, 10], 1, costs, added, every) == ([], False)
+    added[5] = 0.5
+    assert in_doubt([4, 6, 10], 1, costs, added, every) == ([4, 6], True)
 
 
 def test_landmarks_say_which_leg_is_the_left_one(
@@ -110,10 +131,8 @@ def test_landmarks_say_which_leg_is_the_left_one(
         for k, observation in enumerate(scene.observations)
     ]
     scene = replace(scene, observations=observations)
-    assert not legs_exchanged(scene, frames, ALL, BETA).any()
-    assert legs_exchanged(
-        scene, exchanged(scene, frames, range(FRAMES)), ALL, BETA
-    ).all()
+    assert not found(scene, frames).any()
+    assert found(scene, exchanged(scene, frames, range(FRAMES))).all()
 
 
 def uncertain(frames: list[Frame]) -> list[Frame]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.bodies import ObservedFrames
 from posefit.fitting.contours import (
     MAX_ANGLE_STEP,
     ROBUST_SCALES,
@@ -28,14 +29,13 @@ from posefit.fitting.shape import (
     Shape,
     shaped,
 )
-from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import BONES
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import BETA, pose_costs
+from posefit.silhouette.cost import BETA
 from posefit.tracking.smoothing.path import (
     Squares,
     Visibility,
@@ -102,12 +102,14 @@ def fit_contours(
     visibility: Visibility,
     shape: Shape | None,
     beta: float = BETA,
+    scales: Sequence[float] = ROBUST_SCALES,
 ) -> tuple[Scene, Motion, Shape | None]:
     """Return a steady motion fitted to the borders of a scene's masks, with the scene's cameras and the build.
 
     The build stays as it is where it was not fitted before (`shape` is None): it is then known. Several cameras are
-    turned a little from their calibrations. Both are fitted in the window of a long track with most usable frames. A
-    result that costs more than its start is discarded. A motion of fewer than 3 frames is returned as it is.
+    turned a little from their calibrations. Both are fitted in the window of a long track with most usable frames.
+    `scales` has the reach of each step in metres. A result that costs more than its start is discarded. A motion of
+    fewer than 3 frames is returned as it is.
     """
     if len(motion) < 3 or not visibility.usable.any():
         return scene, motion, shape
@@ -116,7 +118,7 @@ def fit_contours(
     if shape is not None or scene.cameras_turn:
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
         part = fitted[best] = _fitted(
-            scene, motion, visibility, parts[best][0], shape, beta, turned=True
+            scene, motion, visibility, parts[best][0], shape, beta, scales, turned=True
         )
         # else no build fits better, and only poses are fitted
         if shape is not None and part.body is not scene.body:
@@ -128,7 +130,9 @@ def fit_contours(
     poses = motion.poses.copy()
     places = motion.translations.copy()
     for k, (rows, inner) in enumerate(parts):
-        part = fitted.get(k) or _fitted(scene, motion, visibility, rows, None, beta)
+        part = fitted.get(k) or _fitted(
+            scene, motion, visibility, rows, None, beta, scales
+        )
         poses[rows[inner]], places[rows[inner]] = (
             part.fitted.poses[inner],
             part.fitted.translations[inner],
@@ -147,6 +151,7 @@ def _fitted(
     rows: NDArray[np.int64],
     shape: Shape | None,
     beta: float,
+    scales: Sequence[float],
     turned: bool = False,
 ) -> _Part:
     """Return some frames of a motion as the best step fits them, with the build where there is a shape to fit."""
@@ -181,27 +186,26 @@ def _fitted(
         turns,
     )
     best = part
-    least = _mean_cost(part, observations, beta)
-    for scale in ROBUST_SCALES:
+    usable = ObservedFrames.of(each for each in observations if each.usable)
+    least = _mean_cost(part, usable, beta)
+    for scale in scales:
         part = _stepped(part, borders, scale)
-        if (cost := _mean_cost(part, observations, beta)) < least:
+        if (cost := _mean_cost(part, usable, beta)) < least:
             best = part
             least = cost
     return best
 
 
-def _mean_cost(part: _Part, observations: Sequence[Observation], beta: float) -> float:
+def _mean_cost(part: _Part, usable: ObservedFrames, beta: float) -> float:
     """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
-    costs = []
-    for k in np.flatnonzero(part.visibility.usable).tolist():
-        pose = part.fitted.poses[k : k + 1]
-        place = part.fitted.translations[k : k + 1]
-        costs.append(
-            pose_costs(
-                part.body, part.cameras, observations[k].silhouettes, pose, place, beta
-            )[0][0]
-        )
-    return float(np.mean(costs)) if costs else np.inf
+    rows = part.visibility.usable
+    if not rows.any():
+        return np.inf
+    fitted = part.fitted
+    costs = usable.costs_of(
+        part.body, part.cameras, fitted.poses[rows], fitted.translations[rows], beta
+    )
+    return float(np.mean(costs))
 
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:

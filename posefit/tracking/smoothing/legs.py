@@ -3,7 +3,8 @@
 From the side, two legs that pass each other look like two that meet and go back, and a track takes the one for the
 other. But a body whose legs go back, or are exchanged in the middle of a stride, does not stay on the masks once its
 motion is smooth. So legs are exchanged, for a trial, from each doubtful frame on. The costs of these trials, and of
-each stretch between them as it is and exchanged, give the cheapest sequence of exchanges.
+each stretch between them as it is and exchanged, give the cheapest sequence of exchanges. Most films need no trial:
+exchanged legs cost more everywhere than all that could be saved.
 """
 
 from collections.abc import Sequence
@@ -13,19 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.bodies import ObservedFrames
+from posefit.fitting.contours import ROBUST_SCALES
 from posefit.fitting.landmarks import LEGS, landmark_likelihoods, side_odds
-from posefit.fitting.tracker import Frame, Observation
+from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import pose_costs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
 
 ROUNDS = 3  # at most: what is exchanged in one shows the next what else is doubtful
 TRIAL_SECONDS = 0.3  # before, and after, a frame from which legs are exchanged
+# the same, of frames that a wrong exchange makes cost more
+DOUBT_SECONDS = 0.1
 # metres, rms: exchanged legs that are so near to those of the frame before may be
 # theirs
 PASSING = 0.16
@@ -36,6 +40,8 @@ AROUND_SECONDS = 0.08  # in which one frame stands for all
 # of landmarks: of the logarithm of the odds that legs are as they are, as errors last
 # for frames
 ODDS_COST = 0.5
+# metres: the steps of a first look, fewer than `ROBUST_SCALES`
+QUICK_SCALES = (0.065, 0.045, 0.033, 0.033)
 LEG_JOINTS = [
     JOINTS.index(joint) for side in ("left", "right") for joint in LIMBS[f"{side} leg"]
 ]
@@ -54,13 +60,15 @@ def with_cheapest_legs(
     usable = np.array([observation.usable for observation in scene.observations])
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
-        exchanged = legs_exchanged(smoothed.scene, tracked, usable, beta)
+        exchanged = legs_exchanged(smoothed, tracked, usable, beta)
         pairs = zip(tracked, exchanged, strict=True)
         frames = [
             _exchanged(smoothed.scene, frame) if other else frame
             for frame, other in pairs
         ]
-        again = smooth(scene, frames, shape, beta) if exchanged.any() else smoothed
+        if not exchanged.any():
+            break
+        again = smooth(scene, frames, shape, beta)
         if mean_cost(again.frames, usable) >= mean_cost(smoothed.frames, usable):
             break
         tracked = frames
@@ -73,16 +81,32 @@ def with_cheapest_legs(
 
 
 def legs_exchanged(
-    scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float
+    smoothed: Smoothed, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float
 ) -> NDArray[np.bool_]:
-    """Return in which frames (T,) legs should be exchanged, as that is cheaper. `usable` frames (T,) show enough."""
+    """Return in which frames (T,) legs should be exchanged, as that is cheaper.
+
+    Args:
+        smoothed: the frames once they are smoothed.
+        frames: as they were tracked.
+        usable: (T,) which of them show enough.
+        beta: that of the cost.
+
+    """
+    scene = smoothed.scene
+    costs = np.array([frame.cost for frame in smoothed.frames]) * usable
     pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
     here, there = (scene.motion(each) for each in pairs)
-    costs = _smoothed_costs(scene, here, beta)
-    added = _smoothed_costs(scene, there, beta) - costs
     edges = doubtful(here, there, costs, usable)
-    exchanged = np.zeros(len(frames), dtype=np.int64)
+    odds = _odds(scene, here)
     reach = max(round(TRIAL_SECONDS * scene.fps), 2)
+    # a few steps are enough to see where nothing is in doubt
+    quick = _smoothed_costs(scene, there, beta, QUICK_SCALES)
+    near = max(round(DOUBT_SECONDS * scene.fps), 1)
+    edges, anything = in_doubt(edges, near, costs, quick - costs + odds, usable)
+    if not anything:
+        return np.zeros(len(frames), dtype=bool)
+    added = _smoothed_costs(scene, there, beta) - _smoothed_costs(scene, here, beta)
+    exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
     for edge in edges:  # in the order of time: two that are near each other may be one
         rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
@@ -103,15 +127,43 @@ def legs_exchanged(
         exchanged ^= later & (switch < 0.0)
     starts = [0, *edges]
     stops = [*edges, len(frames)]
-    stretches = np.add.reduceat(
-        np.where(exchanged, -1.0, 1.0) * (added + _odds(scene, here)), starts
-    )
+    stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + odds), starts)
     steps = np.reshape(switches, (-1, 1, 1)) * (1.0 - np.eye(2))
     others = cheapest_sequence(
         np.column_stack([np.zeros(len(starts)), stretches]), steps
     )
     others = np.repeat(others, np.subtract(stops, starts))
     return np.asarray(exchanged != others)
+
+
+def in_doubt(
+    edges: Sequence[int],
+    reach: int,
+    costs: Array,
+    added: Array,
+    usable: NDArray[np.bool_],
+) -> tuple[list[int], bool]:
+    """Return the edges of the stretches that may be better with exchanged legs, and whether any stretch may be.
+
+    To exchange the legs between two edges adds `added` (T,) to the cost of each frame there. All that it can save is
+    what frames near these edges, closer than `reach`, cost more than others, where they do clearly: `costs` (T,) are
+    those of smoothed frames.
+    """
+    typical = np.median(costs[usable])
+    excess = np.where(usable & (costs > HIGH_COST * typical), costs - typical, 0.0)
+    ends = [0, *edges, len(costs)]
+    near = [np.zeros(len(costs), dtype=bool) for _ in ends]
+    for edge, rows in zip(edges, near[1:-1], strict=True):
+        rows[max(edge - reach, 0) : edge + reach] = True
+    kept = set[int]()
+    anything = False
+    for first, start in enumerate(ends[:-1]):
+        for last in range(first + 1, len(ends)):
+            saved = excess[near[first] | near[last]].sum()
+            if added[start : ends[last]].sum() < saved:
+                anything = True
+                kept |= {start, ends[last]}
+    return [edge for edge in edges if edge in kept], anything
 
 
 def doubtful(
@@ -187,34 +239,23 @@ def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
     return replace(frame, posterior=both)
 
 
-def _smoothed_costs(scene: Scene, motion: Motion, beta: float) -> Array:
+def _smoothed_costs(
+    scene: Scene, motion: Motion, beta: float, scales: Sequence[float] = ROBUST_SCALES
+) -> Array:
     """Return the costs (T,) of a motion's frames once it is smoothed; 0 for those that show too little."""
-    scene, motion, _ = smoothed_motion(scene, motion, None, beta)
-    return np.array(
-        [
-            _cost(scene, *each, beta)
-            for each in zip(
-                scene.observations, motion.poses, motion.translations, strict=True
-            )
-        ]
-    )
-
-
-def _cost(
-    scene: Scene, observation: Observation, pose: Array, place: Array, beta: float
-) -> float:
-    if not observation.usable:
-        return 0.0
-    return float(
-        pose_costs(
+    scene, motion, _ = smoothed_motion(scene, motion, None, beta, scales)
+    usable = np.array([observation.usable for observation in scene.observations])
+    costs = np.zeros(len(motion))
+    if usable.any():
+        seen = ObservedFrames.of(each for each in scene.observations if each.usable)
+        costs[usable] = seen.costs_of(
             scene.body,
             scene.cameras,
-            observation.silhouettes,
-            pose[None],
-            place[None],
+            motion.poses[usable],
+            motion.translations[usable],
             beta,
-        )[0][0]
-    )
+        )
+    return costs
 
 
 def _odds(scene: Scene, motion: Motion) -> Array:

@@ -82,18 +82,19 @@ class Squares:
         _, count, numbers, _ = self.hessians.shape
         band = (BAND_REACH + 1) * numbers
         # scipy's upper form: lines[band - 1 + row - column, column]
-        lines = np.zeros((band, count * numbers))
+        lines = np.zeros((band, count, numbers))
+        rows, columns = np.indices((numbers, numbers)).reshape(2, -1)
         for apart in range(BAND_REACH + 1):
-            for row in range(numbers):
-                for column in range(numbers):
-                    off = apart * numbers + column - row
-                    if off >= 0:
-                        values = self.hessians[apart, : count - apart, row, column]
-                        lines[band - 1 - off, apart * numbers + column :: numbers] = (
-                            values
-                        )
+            off = apart * numbers + columns - rows
+            upper = off >= 0
+            row = rows[upper]
+            column = columns[upper]
+            values = self.hessians[apart, : count - apart, row, column]
+            lines[band - 1 - off[upper], apart:, column] = values
         steps = solveh_banded(
-            lines, gradients.reshape(count * numbers, -1), check_finite=False
+            lines.reshape(band, -1),
+            gradients.reshape(count * numbers, -1),
+            check_finite=False,
         )
         return np.asarray(steps).reshape(gradients.shape)
 

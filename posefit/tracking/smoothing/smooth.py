@@ -6,12 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from posefit.arrays import Array
+from posefit.fitting.bodies import ObservedFrames
+from posefit.fitting.contours import ROBUST_SCALES
 from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import pose_costs
+from posefit.silhouette.mask import Areas
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import mean_cost
@@ -38,16 +41,29 @@ def smooth(
     visibility = Visibility.of(scene)
     scene, motion, shape = smoothed_motion(scene, scene.motion(frames), shape, beta)
     motion = smooth_path(motion, visibility)  # contours pull at standing feet
-    smoothed = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
+    seen = ObservedFrames.of(scene.observations)
+    areas = seen.areas_of(scene.body, scene.cameras, motion.poses, motion.translations)
+    costs = seen.costs(areas[:, None], beta)[0].tolist()
+    smoothed = [
+        _moved(frame, motion.poses[k], motion.translations[k], costs[k], areas[:, k])
+        for k, frame in enumerate(frames)
+    ]
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smoothed, visibility.usable))
     return Smoothed(scene, smoothed, shape)
 
 
 def smoothed_motion(
-    scene: Scene, motion: Motion, shape: Shape | None, beta: float
+    scene: Scene,
+    motion: Motion,
+    shape: Shape | None,
+    beta: float,
+    scales: Sequence[float] = ROBUST_SCALES,
 ) -> tuple[Scene, Motion, Shape | None]:
-    """Return a scene's motion, smoothed and fitted to the contours, with the scene and the build that it fits."""
+    """Return a scene's motion, smoothed and fitted to the contours, with the scene and the build that it fits.
+
+    `scales` has the reach of each step in metres.
+    """
     visibility = Visibility.of(scene)
     return fit_contours(
         scene,
@@ -55,6 +71,7 @@ def smoothed_motion(
         visibility,
         shape,
         beta,
+        scales,
     )
 
 
@@ -77,14 +94,8 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
     )
 
 
-def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
-    """Return a frame at the pose that a motion has in frame k."""
-    pose = motion.poses[k]
-    place = motion.translations[k]
-    silhouettes = scene.observations[k].silhouettes
-    costs, counts = pose_costs(
-        scene.body, scene.cameras, silhouettes, pose[None], place[None], beta
-    )
+def _moved(frame: Frame, pose: Array, place: Array, cost: float, areas: Areas) -> Frame:
+    """Return a frame at another pose and place, with what it costs there."""
     posterior = frame.posterior
     if posterior is not None:
         poses = posterior.poses + wrapped(pose - frame.pose)
@@ -94,7 +105,7 @@ def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> F
         frame,
         pose=pose,
         translation=place,
-        cost=float(costs[0]),
-        areas=counts[:, 0],
+        cost=cost,
+        areas=areas,
         posterior=posterior,
     )
