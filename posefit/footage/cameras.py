@@ -1,11 +1,11 @@
-"""The scene of real cameras: their masks or videos, with their calibrations."""
+"""Combine the views of real cameras with their calibrations into a `Scene`."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -39,16 +39,21 @@ from posefit.reading import cut, quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
-AROUND = 0.5  # seconds before and after a frame whose facings are averaged
-# the mean of unit vectors is at least so long: facings may not contradict each other
+AROUND = 0.5  # seconds before and after a frame over which facings are averaged
+# least length of the mean of unit vectors: shorter means that facings contradict
 AGREEMENT = 0.6
 GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
-# of a camera from its world's origin: no metres, and no centimetres either
+# distance of a camera from its world's origin, in the calibration's unit. Above FAR the
+# unit cannot be metres, and above FARTHER not even centimetres
 FAR = 100.0
 FARTHER = 1000.0
-# metres: the origin is on the floor as a rule, or in the first camera
+# metres: a camera lower than this is probably a mistake, because the world's origin is
+# usually on the floor or in the first camera
 BELOW = 1.0
-SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
+SAME_SHAPE = 0.01  # share by which aspect ratios of masks and calibration may differ
+Pairing = tuple[int, ...]  # for each source, the index of its camera
+# a height of 0 or less, of a person behind a camera, would have no logarithm
+LEAST_HEIGHT = 1e-9
 
 
 def combined(
@@ -61,11 +66,26 @@ def combined(
     fps: float | None = None,
     unit: Unit | None = None,
 ) -> Scene:
-    """Return the scene of what cameras, those of `calibrated`, saw at the same times; true poses are unknown.
+    """Return the scene of what cameras saw at the same times.
 
-    One view without a camera gets a guess: level, 40 degrees across. The person is first searched where the rays
-    through the middles of the masks meet; with a single camera, as far away as their size in the image implies. Raises
-    InputError where views and cameras do not fit each other, or several cameras cannot see one person of this size.
+    The person is first searched where the rays through the middles of the masks meet.
+    With a single camera, the distance follows from the person's size in the image.
+
+    Args:
+        views: What each camera saw.
+        name: Name of the scene.
+        body: The person's body.
+        known: The cameras of `calibrated`. Empty for one view without a camera, which
+            gets a guess: level, 40 degrees across.
+        view_degrees: Which way the person faces at first, relative to the first camera.
+        up: Which axis of the calibrations points up; None to guess it.
+        fps: Frames per second; None for what the views state.
+        unit: Unit of the calibrations; None to guess it.
+
+    Raises:
+        InputError: Views and cameras do not fit each other.
+        NoPersonError: Several cameras cannot all see one person of this size.
+
     """
     rate, stated = _rate(views, fps)
     guesses = [guess for view in views for guess in view.guesses]
@@ -76,36 +96,28 @@ def combined(
             "a level camera, 40 degrees across: distances and sizes are as good as that"
         )
     world, metres, of_cameras = world_of(known, up, unit)
-    scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
-    unit_is_open = unit is None and bool(scales - {"metres"})
     if known:
-        cameras, views, said = map(
-            list,
-            zip(*map(partial(_straight, world, metres), known, views), strict=True),
-        )
-        guesses += [sentence for sentences in said for sentence in sentences]
+        cameras = []
+        straight = []
+        for camera, view in zip(known, views, strict=True):
+            without_distortion = _straight(world, metres, camera, view)
+            cameras.append(without_distortion.camera)
+            straight.append(without_distortion.view)
+            guesses += without_distortion.said
+        views = straight
     else:
         cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)]
     # several cameras distinguish front and back themselves
     facings = views[0].facings if len(views) == 1 else None
     yaws = yaws_of(() if facings is None else facings, cameras[0], rate)
     observations = Observations(views, yaws)
-    if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
+    apparent = apparent_sizes(observations, cameras) if len(views) > 1 else None
+    if apparent is not None:
         miss, tall = apparent
-        if unit_is_open and np.median(tall) > 0.0:
-            likely_unit = unit_of_heights(
-                float(np.median(tall)) / metres / body.stature
-            )
-            if METRES[likely_unit] != metres:
-                of_cameras["unit"] = f"the calibration is in {UNIT_NAMES[likely_unit]}"
-            factor = METRES[likely_unit] / metres
-            if "free" in scales and disagreement(
-                factor * miss, factor * tall, body.stature
-            ):
-                factor = body.stature / float(np.median(tall))
-                of_cameras["unit"] = (
-                    f"the calibration's unit is {factor * metres:.4g} m, by the person's height"
-                )
+        if unit is None:
+            factor, guess = _by_height(miss, tall, known, metres, body.stature)
+            if guess:
+                of_cameras["unit"] = guess
             cameras = [
                 replace(camera, translation=factor * camera.translation)
                 for camera in cameras
@@ -119,6 +131,7 @@ def combined(
     if view_degrees is not None:
         to_camera = -cameras[0].rotation[2]
         yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
+    warnings = [warning for view in views for warning in view.warnings]
     return Scene(
         name=name,
         body=body,
@@ -130,8 +143,7 @@ def combined(
         truth=None,
         observations=observations,
         placing="given" if known else "guessed",
-        warnings=[warning for view in views for warning in view.warnings]
-        + _unequal(views),
+        warnings=[*warnings, *_unequal(views)],
         guesses=[*guesses, *of_cameras.values()],
         pictures=views[0].pictures,
         first=int(views[0].numbers[0]),
@@ -139,25 +151,70 @@ def combined(
     )
 
 
+class _Fitted(NamedTuple):
+    """The unit of calibrations that fits the person's height."""
+
+    factor: float  # to multiply lengths with
+    guess: str  # what to say about it; "" if the unit guessed before fits
+
+
+def _by_height(
+    miss: float,
+    tall: Array,
+    known: Sequence[Camera | Calibration],
+    metres: float,
+    stature: float,
+) -> _Fitted:
+    """Return the unit in which the person's height is about right.
+
+    Args:
+        miss: By how much rays miss each other, see `apparent_sizes`.
+        tall: The person's height in each view, in the unit guessed before.
+        known: The cameras. A calibration may state that it is in metres, or that its
+            unit may be any length if no usual one fits.
+        metres: The unit guessed before, in metres.
+        stature: The person's height in metres.
+
+    """
+    scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
+    height = float(np.median(tall))
+    # a person behind the cameras says nothing about the unit
+    unit_is_open = bool(scales - {"metres"})
+    if not (unit_is_open and height > 0.0):
+        return _Fitted(1.0, "")
+    unit = unit_of_heights(height / metres / stature)
+    factor = METRES[unit] / metres
+    if "free" in scales and disagreement(factor * miss, factor * tall, stature):
+        factor = stature / height
+        length = f"{factor * metres:.4g} m"
+        guess = f"the calibration's unit is {length}, by the person's height"
+        return _Fitted(factor, guess)
+    if METRES[unit] == metres:
+        return _Fitted(factor, "")
+    return _Fitted(factor, f"the calibration is in {UNIT_NAMES[unit]}")
+
+
 @dataclass(frozen=True, eq=False)
 class Straightening:
-    """How what a camera saw becomes what one without distortion sees, whose pixels are square."""
+    """Turns a camera's views into those of a camera without distortion.
 
-    camera: Camera
-    lens: Calibration
-    maps: tuple[Any, Any]
+    That camera has square pixels, which the rasteriser needs.
+    """
+
+    camera: Camera  # the camera without distortion
+    lens: Calibration  # the real camera
+    maps: tuple[Any, Any]  # OpenCV's maps from the one to the other
 
     def of(self, view: View) -> View:
-        """Return a view of the straight camera."""
+        """Return what the camera without distortion would have seen."""
         pictures = view.pictures and partial(self._pictures, view.pictures)
         straight = undistorted(view, self.lens, self.maps, self.camera)
         return replace(straight, pictures=pictures)
 
     def _pictures(self, pictures: Callable[[], Iterator[Image]]) -> Iterator[Image]:
         for image in pictures():
-            yield np.asarray(
-                cv2.remap(image, *self.maps, cv2.INTER_LINEAR), dtype=np.uint8
-            )
+            straight = cv2.remap(image, *self.maps, cv2.INTER_LINEAR)
+            yield np.asarray(straight, dtype=np.uint8)
 
 
 def straightening(
@@ -167,23 +224,23 @@ def straightening(
     world: Array | None = None,
     metres: float = 1.0,
 ) -> tuple[Camera, Straightening | None, list[str]]:
-    """Return the camera of masks, how they are straightened for it, and what is to be said of that.
+    """Return a camera without distortion, and how to turn masks into what it sees.
 
-    This is the one place where a lens' distortion is taken off, and where pixels that are not square become square.
+    This is the only place that removes distortion and makes pixels square.
 
     Args:
         known: The camera, or its calibration.
         size: Width and height of the masks.
-        filmed: Width and height of the video that they were taken from.
+        filmed: Width and height of the video that they were segmented from.
         world: Rotation (3, 3) that turns the calibration's world so that +y is up.
-        metres: Of the calibration's unit.
+        metres: The calibration's unit in metres.
 
     Returns:
-        The camera without distortion, of square pixels; how masks and pictures become its own, None where they are;
-        sentences.
+        The camera without distortion, with square pixels; the straightening, or None if
+        the masks fit this camera already; sentences for the user.
 
     Raises:
-        InputError: The masks are not of this camera.
+        InputError: The masks are not from this camera.
 
     """
     said = list[str]()
@@ -193,7 +250,7 @@ def straightening(
     else:
         stated = lens.size
         lens = _fitting(lens, filmed or size, scaled=filmed is None)
-        # a camera's world is upright, and in metres
+        # the world of a `Camera` is upright already
         if world is None or isinstance(known, Camera):
             world = np.eye(3)
         camera = lens.in_metres(metres).camera(size, world)
@@ -212,24 +269,31 @@ def straightening(
 
 
 def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:
-    """Return what is said of pictures of another size than their calibration's."""
+    """Return the sentence about pictures that differ in size from their calibration."""
     calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
     width, height = calibration.size or size
-    change = (
-        f"is scaled to {size[0]}x{size[1]}"
-        if calibration.padded(size) is None
-        else f"holds for {size[0]}x{size[1]}, with rows or columns more or less at the end"
-    )
+    came = f"{size[0]}x{size[1]}"
+    change = f"is scaled to {came}"
+    if calibration.padded(size) is not None:
+        change = f"holds for {came}, with rows or columns more or less at the end"
     name = f" {quoted(calibration.name)}" if calibration.name else ""
     return f"the calibration{name} of {width}x{height} {change}"
 
 
+class _Straight(NamedTuple):
+    """A camera without distortion, and what it saw."""
+
+    camera: Camera
+    view: View
+    said: list[str]  # sentences for the user
+
+
 def _straight(
     world: Array, metres: float, known: Camera | Calibration, view: View
-) -> tuple[Camera, View, list[str]]:
-    """Return the camera of a view, the view as that camera has it, and what is to be said of it."""
+) -> _Straight:
+    """Return a view without distortion, and its camera, see `straightening`."""
     camera, how, said = straightening(known, view.size, view.filmed, world, metres)
-    return camera, view if how is None else how.of(view), said
+    return _Straight(camera, view if how is None else how.of(view), said)
 
 
 def same_person(
@@ -239,47 +303,66 @@ def same_person(
     persons: Persons,
     filmed: tuple[int, int] | None = None,
 ) -> int:
-    """Return the number of the person in another view who is followed in the first one.
+    """Return the number of the person in another view whom the first view follows.
 
-    It is the one whose rays meet those of the first view in a person who keeps one height, in both views and all
-    frames: rays of level cameras meet anyhow. `known` are the cameras of both, and `persons` are the people in the
-    other's masks, which have a `size` and were taken from a video of the size `filmed`.
+    For this person, the rays of both cameras meet, and the height is the same in both
+    views and all frames. The height counts because the rays of level cameras always
+    meet.
+
+    Args:
+        known: The cameras of both views.
+        first: The first view, in which one person is followed.
+        size: Width and height of the other view's masks.
+        persons: The people in the other view.
+        filmed: Width and height of the video that those masks were segmented from.
+
     """
-    sizes = (first.size, size)
-    blank = np.zeros(size[::-1], dtype=bool)
-    fitted = [
-        camera
-        if isinstance(camera, Camera)
-        else _fitting(camera, film or pixels, scaled=film is None)
-        for camera, pixels, film in zip(
-            known, sizes, (first.filmed, filmed), strict=True
-        )
-    ]
-    cameras = [
-        camera if isinstance(camera, Camera) else camera.camera(pixels, np.eye(3))
-        for camera, pixels in zip(fitted, sizes, strict=True)
-    ]
+    fitted = list[Camera | Calibration]()
+    cameras = list[Camera]()
+    films = zip(known, (first.size, size), (first.filmed, filmed), strict=True)
+    for camera, pixels, film in films:
+        if isinstance(camera, Calibration):
+            camera = _fitting(camera, film or pixels, scaled=film is None)
+            cameras.append(camera.camera(pixels, np.eye(3)))
+        else:
+            cameras.append(camera)
+        fitted.append(camera)
     differences = list[float]()
     for person in persons:
-        # by how much rays miss each other, and the heights in both views
-        pairs = list[tuple[float, Array]]()
+        misses = list[float]()  # by how much rays miss each other
+        heights = list[Array]()  # (2,) of the person in both views
         for k in np.flatnonzero(first.usable).tolist():
             part = part_at(person, k)
-            if part is not None and part.detections[k][1] is None:
-                paste(part.detections[k][0], mask := blank.copy())
-                views = first.silhouette(k), Silhouette.of(mask)
-                pairs.append(apparent_size(cameras, [*map(_extent, fitted, views)]))
-        heights = np.array([np.maximum(tall, 1e-9) for _, tall in pairs])
-        misses = [miss / float(np.median(heights)) for miss, _ in pairs]
-        differences.append(
-            float(np.median(misses) + np.std(np.log(heights))) if pairs else np.inf
-        )
+            if part is None:
+                continue
+            shown, hidden = part.detections[k]
+            # a person behind another has no reliable height
+            if hidden is not None:
+                continue
+            mask = np.zeros(size[::-1], dtype=bool)
+            paste(shown, mask)
+            silhouettes = (first.silhouette(k), Silhouette.of(mask))
+            extents = [*map(_extent, fitted, silhouettes)]
+            miss, tall = apparent_size(cameras, extents)
+            misses.append(miss)
+            heights.append(np.maximum(tall, LEAST_HEIGHT))
+        if not misses:
+            differences.append(np.inf)
+            continue
+        height = float(np.median(heights))
+        relative = [miss / height for miss in misses]
+        spread = np.std(np.log(np.array(heights)))
+        differences.append(float(np.median(relative) + spread))
     return 1 + int(np.argmin(differences))
 
 
 def _extent(known: Camera | Calibration, silhouette: Silhouette) -> tuple[Array, float]:
-    """Return the middle (2,) of a silhouette as a pinhole camera has it, and its height in pixels."""
-    (middle, tall), (height, width) = extent_of(silhouette), silhouette.mask.shape
+    """Return the middle (2,) of a silhouette without distortion, and its height.
+
+    Both are in pixels.
+    """
+    middle, tall = extent_of(silhouette)
+    height, width = silhouette.mask.shape
     if not isinstance(known, Camera):
         middle = known.straightened(np.array([*middle, 0.0]), (width, height))[:2]
     return middle, tall
@@ -288,30 +371,37 @@ def _extent(known: Camera | Calibration, silhouette: Silhouette) -> tuple[Array,
 def world_of(
     known: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
 ) -> tuple[Array, float, dict[str, str]]:
-    """Return how the world of calibrations is turned upright, their unit in metres, and what is guessed of both."""
+    """Return the axes and the unit of the cameras' world.
+
+    Args:
+        known: The cameras. A `Camera` is upright and in metres already.
+        up: Which axis of the calibrations points up; None to guess it.
+        unit: The calibrations' unit; None to guess it from their distances.
+
+    Returns:
+        The rotation (3, 3) that turns calibrations upright, their unit in metres, and
+        the guesses by what they are about.
+
+    Raises:
+        InputError: A unit is given for a file that states another one.
+
+    """
     calibrations = [camera for camera in known if isinstance(camera, Calibration)]
-    guesses = (
-        {"up": guess} if up is None and (guess := guessed_up(calibrations)) else {}
-    )
+    guesses = dict[str, str]()
+    if up is None and (guess := guessed_up(calibrations)):
+        guesses["up"] = guess
+    distances = list[float]()
     for calibration in calibrations:
-        if unit not in (None, "m") and calibration.scale == "metres":
-            raise InputError(
-                f"unit must be left out for {quoted(calibration.name)}, whose file states it, got {quoted(unit)}"
-            )
-    distances = [
-        float(np.linalg.norm(place))
-        for calibration in calibrations
-        if (place := calibration.translation) is not None
-        and calibration.scale != "metres"
-    ]
+        if calibration.scale == "metres":
+            if unit not in (None, "m"):
+                raise InputError(
+                    f"unit must be left out for {quoted(calibration.name)}, whose file "
+                    f"states it, got {quoted(unit)}"
+                )
+        elif calibration.translation is not None:
+            distances.append(float(np.linalg.norm(calibration.translation)))
     if unit is None and distances:
-        unit = (
-            "m"
-            if max(distances) <= FAR
-            else "cm"
-            if max(distances) <= FARTHER
-            else "mm"
-        )
+        unit = _unit_of_distances(distances)
         guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
     for calibration in calibrations:
         if calibration.rotation is None:
@@ -323,28 +413,49 @@ def world_of(
                 "the calibration is for pictures of this size, which it does not state"
             )
     world = upright(calibrations, up)
-    heights = [
-        float(world[1] @ place)
-        for calibration in calibrations
-        if (place := calibration.in_metres(METRES[unit or "m"]).position) is not None
-    ]
-    if min(heights, default=0.0) < -BELOW:
+    metres = METRES[unit or "m"]
+    lowest = 0.0
+    for calibration in calibrations:
+        place = calibration.in_metres(metres).position
+        if place is not None:
+            lowest = min(lowest, float(world[1] @ place))
+    if lowest < -BELOW:
         guesses["below"] = (
-            f"a camera stands {-min(heights):.1f} m below its world's origin: is its translation its place?"
+            f"a camera stands {-lowest:.1f} m below its world's origin: is its "
+            "translation its place?"
         )
-    return world, METRES[unit or "m"], guesses
+    return world, metres, guesses
+
+
+def _unit_of_distances(distances: Sequence[float]) -> Unit:
+    """Return the likely unit of the cameras' distances from their world's origin."""
+    farthest = max(distances)
+    if farthest <= FAR:
+        return "m"
+    return "cm" if farthest <= FARTHER else "mm"
 
 
 def unit_of_heights(ratio: float) -> Unit:
-    """Return the unit of calibrations in which the person is so many times as tall as they are in metres."""
+    """Return the likely unit of calibrations.
+
+    Args:
+        ratio: The person's height in that unit, over their height in metres.
+
+    """
     return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
 
 
 def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Array:
-    """Return about which way a person faces in each frame (T,), radians about the vertical; NaN where unknown.
+    """Return about which way a person faces in each frame (T,), NaN if unknown.
 
-    `facings` (T,) are a segmenter's, as `Segmenter.facing`. Each frame gets the mean direction of the second around it,
-    so that a few wrong ones do not count.
+    Angles are radians about the vertical. Each is the mean direction over the second
+    around its frame, so that a few wrong facings do not count.
+
+    Args:
+        facings: (T,) as `Segmenter.facing`.
+        camera: The camera that they are relative to.
+        fps: Frames per second.
+
     """
     values = np.asarray(facings, dtype=np.float64)
     reach = max(round(AROUND * fps), 1)
@@ -352,15 +463,15 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
     known = np.isfinite(values)
     directions = np.where(known, np.exp(1j * (np.nan_to_num(values) + towards)), 0.0)
     around = [slice(max(k - reach, 0), k + reach + 1) for k in range(len(values))]
-    total, count = (
-        np.array([each[rows].sum() for rows in around]) for each in (directions, known)
-    )
-    return np.where(
-        np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9), np.angle(total), np.nan
-    )
+    total = np.array([directions[rows].sum() for rows in around])  # (T,) complex
+    count = np.array([known[rows].sum() for rows in around])
+    # the limit excludes frames without any facing, whose total is 0
+    agrees = np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9)
+    return np.where(agrees, np.angle(total), np.nan)
 
 
 def _unequal(views: Sequence[View]) -> list[str]:
+    """Return a warning if views differ in length."""
     lengths = [len(view) for view in views]
     if len(set(lengths)) == 1:
         return []
@@ -368,14 +479,16 @@ def _unequal(views: Sequence[View]) -> list[str]:
         f"{view.name} {length}" for view, length in zip(views, lengths, strict=True)
     )
     return [
-        f"the videos differ in length; the first {min(lengths)} frames are used of {came}"
+        f"the videos differ in length; the first {min(lengths)} frames are used of "
+        f"{came}"
     ]
 
 
 def _rate(views: Sequence[View], fps: float | None) -> tuple[float, bool]:
-    """Return the frame rate of views: `fps`, or else what their files state, or 30; and whether it is stated.
+    """Return the frame rate of views, and whether it is known or a guess.
 
-    Raises InputError where views of masks differ in their rates, or in how many frames they have.
+    It is `fps` if given, or else what the files state, or else 30. Raises InputError if
+    views of masks differ in their rates or in their number of frames.
     """
     first = views[0]
     for view in views[1:]:
@@ -397,49 +510,63 @@ def _rate(views: Sequence[View], fps: float | None) -> tuple[float, bool]:
 def place_of(
     silhouettes: Sequence[Silhouette], cameras: Sequence[Camera], stature: float
 ) -> Array:
-    """Return about where (3,) the root of a person of so many metres is, whom one camera or several see."""
-    shown = [
-        (camera, *extent_of(silhouette))
-        for camera, silhouette in zip(cameras, silhouettes, strict=True)
-        if silhouette.mask.any()
-    ]
-    if len(shown) > 1:
-        return meeting(
-            [camera for camera, _, _ in shown], [middle for _, middle, _ in shown]
-        )[0]
-    camera, middle, tall = shown[0]
-    depth = camera.focal[1] * stature / tall
-    place = np.array([*((middle - camera.centre) / camera.focal * depth), depth])
-    return np.asarray(camera.rotation.T @ (place - camera.translation))
+    """Return about where (3,) the root of a person is, in metres.
+
+    Args:
+        silhouettes: One per camera; at least one shows the person.
+        cameras: One camera, or several.
+        stature: The person's height in metres.
+
+    """
+    seeing = list[Camera]()
+    middles = list[Array]()
+    heights = list[float]()
+    for camera, silhouette in zip(cameras, silhouettes, strict=True):
+        if silhouette.mask.any():
+            middle, tall = extent_of(silhouette)
+            seeing.append(camera)
+            middles.append(middle)
+            heights.append(tall)
+    if len(seeing) > 1:
+        place, _ = meeting(seeing, middles)
+        return place
+    camera = seeing[0]
+    depth = camera.focal[1] * stature / heights[0]
+    across = (middles[0] - camera.centre) / camera.focal * depth
+    in_camera = np.array([*across, depth])
+    return np.asarray(camera.rotation.T @ (in_camera - camera.translation))
 
 
 def listed(
     cameras: Sequence[Camera | Calibration | str | Path],
 ) -> list[Camera | Calibration]:
-    """Return cameras, those of files read; a file with several cameras serves for several views, in its order.
+    """Return cameras, after reading those that are files.
 
-    Raises InputError where a file is one of masks.
+    A file may hold several cameras, which are for several views in their order. Raises
+    InputError if a file is not a calibration.
     """
     known = list[Camera | Calibration]()
     for camera in cameras:
         if isinstance(camera, Camera | Calibration):
             known.append(camera)
-        elif (suffix := Path(camera).suffix.lower()) in (*IMAGES, *ARRAYS) or Path(
-            camera
-        ).is_dir():
-            came = (
-                "a file of masks"
-                if suffix in ARRAYS
-                else "an image"
-                if suffix in IMAGES
-                else "a folder"
-            )
+            continue
+        mistake = _mistaken_for_calibration(Path(camera))
+        if mistake:
             raise InputError(
-                f"{camera}: expected a calibration of the camera, got {came}"
+                f"{camera}: expected a calibration of the camera, got {mistake}"
             )
-        else:
-            known += read_calibrations(camera)
+        known += read_calibrations(camera)
     return known
+
+
+def _mistaken_for_calibration(path: Path) -> str:
+    """Return what a path is if it cannot be a calibration, or else ""."""
+    suffix = path.suffix.lower()
+    if suffix in ARRAYS:
+        return "a file of masks"
+    if suffix in IMAGES:
+        return "an image"
+    return "a folder" if path.is_dir() else ""
 
 
 def calibrated(
@@ -447,10 +574,17 @@ def calibrated(
     filmed: Sequence[tuple[int, int] | None],
     names: Sequence[str] = (),
 ) -> list[Camera | Calibration]:
-    """Return the cameras of as many views, none for a single view without one; `filmed` are the sizes of videos.
+    """Return the camera of each view, or an empty list for one view without a camera.
 
-    Cameras have the order of the views, whose `names` are those of their sources; where both have the same names, they
-    are paired by these. Raises InputError where cameras and views do not fit each other.
+    Args:
+        cameras: Cameras, calibrations, or their files, in the order of the views.
+        filmed: Width and height of each view's video; None for masks.
+        names: Names of the views' sources. If the cameras have the same names, they are
+            paired by these and not by order.
+
+    Raises:
+        InputError: Cameras and views do not fit each other.
+
     """
     known = listed(cameras)
     views = len(filmed)
@@ -459,14 +593,11 @@ def calibrated(
             f"camera must be given for each of several views, {views}, got none"
         )
     if known and len(known) != views:
-        came = ", ".join(
-            camera.name for camera in known if isinstance(camera, Calibration)
-        )
-        chosen = (
-            f": {cut(came)}; FILE:NAME is one of a file"
-            if len(known) > views and came
-            else ""
-        )
+        calibrations = [each for each in known if isinstance(each, Calibration)]
+        came = ", ".join(calibration.name for calibration in calibrations)
+        chosen = ""
+        if len(known) > views and came:
+            chosen = f": {cut(came)}; FILE:NAME is one of a file"
         raise InputError(
             f"camera must be given for each view, {views}, got {len(known)}{chosen}"
         )
@@ -474,7 +605,8 @@ def calibrated(
         isinstance(camera, Calibration) and camera.rotation is None for camera in known
     ):
         raise InputError(
-            "camera must say where each of several cameras stands, got a file without rotation"
+            "camera must say where each of several cameras stands, got a file without "
+            "rotation"
         )
     if views > 1 and len(names) == views:
         known = [known[k] for k in order_by_name(known, names)]
@@ -487,72 +619,102 @@ def calibrated(
 def order_by_name(
     cameras: Sequence[Camera | Calibration], sources: Sequence[str]
 ) -> list[int]:
-    """Return which camera took each source: the one with its name, where all have one, else the one at its place.
+    """Return which camera took each source, by their names or else in order.
 
-    What all names share does not count, nor do zeros before a number: walk-a.mp4 and walk-b.mp4 are of the cameras a
-    and b, or cam_a and cam_b. Raises InputError where names can be paired in two ways.
+    Words that all names share and leading zeros do not count: walk-a.mp4 and walk-b.mp4
+    are from the cameras a and b, or cam_a and cam_b.
+
+    Args:
+        cameras: The cameras; only calibrations have names.
+        sources: The names of the sources, one per camera.
+
+    Returns:
+        For each source, the index of its camera.
+
+    Raises:
+        InputError: The names can be paired in several ways.
+
     """
     in_order = list(range(len(cameras)))
-    if not all(isinstance(camera, Calibration) for camera in cameras):
+    names = [camera.name for camera in cameras if isinstance(camera, Calibration)]
+    if len(names) < len(cameras):
         return in_order
-    wanted = [camera.name for camera in cameras if isinstance(camera, Calibration)]
-    orders = set[tuple[int, ...]]()
-    for given in (
-        [Path(source).stem for source in sources],
-        [Path(source).parent.name for source in sources],
-        list(sources),
-    ):
-        for these, those in (
-            (list(map(_words, given)), list(map(_words, wanted))),
-            (_own_words(given), _own_words(wanted)),
-        ):
-            if len(set(these)) == len(these) and set(these) == set(those):
-                orders.add(tuple(those.index(words) for words in these))
-                break
+    # files may be named after the cameras, or the folders that they are in
+    stems = [Path(source).stem for source in sources]
+    folders = [Path(source).parent.name for source in sources]
+    orders = set[Pairing]()
+    for given in (stems, folders, sources):
+        order = _order_by_words(names, given)
+        if order is not None:
+            orders.add(order)
     if not orders:
-        orders = _order_by_part(wanted, sources)
+        order = _order_by_part(names, stems)
+        if order is not None:
+            orders.add(order)
     if len(orders) > 1:
         raise InputError(
-            f"cameras must have names that only fit one order of the sources, got {cut(', '.join(wanted))} for "
-            f"{cut(', '.join(sources))}; give one file a camera, of other names"
+            "cameras must have names that only fit one order of the sources, got "
+            f"{cut(', '.join(names))} for {cut(', '.join(sources))}; "
+            "give one file a camera, of other names"
         )
     return list(*orders) if orders else in_order
 
 
-def _order_by_part(
-    cameras: Sequence[str], sources: Sequence[str]
-) -> set[tuple[int, ...]]:
-    """Return the order in which each source has one camera's name in its own, and each camera one source."""
-    words = [f" {' '.join(_words(camera))} " for camera in cameras]
-    order = []
-    for source in sources:
-        given = f" {' '.join(_words(Path(source).stem))} "
-        found = [
-            k for k, camera in enumerate(words) if camera.strip() and camera in given
-        ]
+def _order_by_words(names: Sequence[str], given: Sequence[str]) -> Pairing | None:
+    """Return the order in which cameras and sources have the same names; None if none.
+
+    Names are compared by all of their words, or else without the words that all share.
+    """
+    for words_of in (_all_words, _own_words):
+        of_sources = words_of(given)
+        of_cameras = words_of(names)
+        are_unique = len(set(of_sources)) == len(of_sources)
+        if are_unique and set(of_sources) == set(of_cameras):
+            return tuple(of_cameras.index(words) for words in of_sources)
+    return None
+
+
+def _order_by_part(names: Sequence[str], given: Sequence[str]) -> Pairing | None:
+    """Return the order in which the name of each source contains one camera's name.
+
+    None if a source contains none or several of them, or if two contain the same.
+    """
+    words = [f" {' '.join(_words(name))} " for name in names]
+    order = list[int]()
+    for source in given:
+        text = f" {' '.join(_words(source))} "
+        found = [k for k, name in enumerate(words) if name.strip() and name in text]
         if len(found) != 1:
-            return set()
+            return None
         order += found
-    return {tuple(order)} if len(set(order)) == len(cameras) else set()
+    return tuple(order) if len(set(order)) == len(names) else None
 
 
 def _words(name: str) -> tuple[str, ...]:
-    """Return the words and the numbers of a name, without regard to capitals and zeros in front."""
-    parts = re.findall(r"[0-9]+|[^\W\d_]+", name.casefold())
-    return tuple(part.lstrip("0") or "0" if part.isdigit() else part for part in parts)
+    """Return the words and numbers of a name, in lower case, without leading zeros."""
+    words = list[str]()
+    for part in re.findall(r"[0-9]+|[^\W\d_]+", name.casefold()):
+        if part.isdigit():
+            part = part.lstrip("0") or "0"
+        words.append(part)
+    return tuple(words)
+
+
+def _all_words(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the words of each name."""
+    return [_words(name) for name in names]
 
 
 def _own_words(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return the words of each name without those that all begin or end with."""
-    every = [_words(name) for name in names]
-    shortest = min(map(len, every))
+    """Return the words of each name without common ones at the beginning or the end."""
+    every = _all_words(names)
+    shortest = min(len(words) for words in every)
     before = 0
     while before < shortest and len({words[before] for words in every}) == 1:
         before += 1
     after = 0
-    while (
-        after < shortest - before and len({words[-1 - after] for words in every}) == 1
-    ):
+    remaining = shortest - before
+    while after < remaining and len({words[-1 - after] for words in every}) == 1:
         after += 1
     return [words[before : len(words) - after] for words in every]
 
@@ -560,10 +722,11 @@ def _own_words(names: Sequence[str]) -> list[tuple[str, ...]]:
 def _fitting(
     calibration: Calibration, size: tuple[int, int], *, scaled: bool
 ) -> Calibration:
-    """Return the calibration of pictures of a size, or of this shape where they may have been scaled.
+    """Return the calibration for pictures of a size.
 
-    Raises InputError for others, of which it is not known which part of the sensor they show: cameras often film with a
-    part of it where the size is another.
+    `scaled` pictures may have another size of the same shape. Raises InputError for any
+    other size, because cameras often film with only a part of the sensor then, and it
+    is not known which.
     """
     padded = calibration.padded(size)
     if padded is not None:

@@ -1,4 +1,4 @@
-"""Masks from elsewhere made clean: inverted ones are turned round, holes filled, one person of several is followed."""
+"""Clean masks from other tools: invert them, fill holes, and follow one person."""
 
 from dataclasses import replace
 
@@ -21,27 +21,36 @@ from posefit.silhouette.foreground import MAX_HOLE_AREA, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
 from posefit.silhouette.pieces import people_in
 
-# of the person's area: the largest hole that is filled in a mask by itself. Between an
-# arm and the trunk it says where the arm is, and no other frame does
+# share of the person's area: the largest hole that is filled if there is one mask only.
+# A hole between an arm and the trunk shows where the arm is, and no other frame does
 MAX_HOLE_ALONE = 0.0005
 
 
 def cleaned(
     view: View, holes: float | None = None, choice: Choice | Chooser | None = None
 ) -> View:
-    """Return the view of one person, by masks that others made.
+    """Return the view of one person, from masks that another tool made.
 
-    Of several people `choice` is followed, see `People.chosen`; the pixels of the others are unknown. Frames that show
-    no person before a background are not usable, nor are those in which the picture's edge leaves only a little of the
-    person. Holes of at most the share `holes` of the person are filled. Raises InputError where no frame shows a
-    person.
+    Frames become unusable if they show no person before a background, or if the
+    picture's edge cuts off most of the person. Other people's pixels become unknown.
+
+    Args:
+        view: The masks as read.
+        holes: Share of the person's area up to which holes are filled. The default
+            depends on whether there are several frames.
+        choice: Which of several people is followed, see `People.chosen`.
+
+    Raises:
+        InputError: No frame shows a person.
+
     """
     count = len(view)
     warnings = list(view.warnings)
     inverted = _is_inverted(view)
     if inverted:
         warnings.append(
-            f"{view.name}: most of the border is marked, so that the masks seem inverted: they are turned round"
+            f"{view.name}: most of the border is marked, so that the masks seem "
+            "inverted: they are turned round"
         )
     if holes is None:
         holes = MAX_HOLE_AREA if count > 1 else MAX_HOLE_ALONE
@@ -50,7 +59,8 @@ def cleaned(
         came = "one without background" if view.bits[0].any() else "an empty one"
         rest = f" first, and no other in {count}" if count > 1 else ""
         raise InputError(
-            f"{view.name}: expected a mask with a person before a background, got {came}{rest}"
+            f"{view.name}: expected a mask with a person before a background, "
+            f"got {came}{rest}"
         )
     people = People(view.fps or FPS)
     bits = empty_planes(count, view.size)
@@ -95,8 +105,9 @@ def _silhouette(view: View, k: int, inverted: bool) -> Silhouette:
 
 
 def _people(silhouette: Silhouette) -> list[Mask]:
-    """Return the masks of the people in a silhouette; a single person's is the whole mask."""
+    """Return the masks of the people in a silhouette."""
     people = people_in(silhouette.mask, silhouette.valid)
+    # a single person is the whole mask, with all of its small pieces
     if len(people) == 1:
         return [silhouette.mask]
     return [person.mask for person in people]
@@ -105,21 +116,35 @@ def _people(silhouette: Silhouette) -> list[Mask]:
 def _shows_enough(
     usable: NDArray[np.bool_], areas: Array, cut: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return which frames (T,) have most of the person's area in the nearest usable frame that is not cut."""
+    """Return whether each frame (T,) shows most of the person.
+
+    A frame in which the picture's edge cuts the person is compared with the nearest
+    frame in which it does not.
+
+    Args:
+        usable: (T,) which frames show a person.
+        areas: (T,) of the person, in pixels.
+        cut: (T,) in which frames the person touches the edge.
+
+    """
     enough = np.ones(len(areas), dtype=bool)
     whole = np.flatnonzero(usable & ~cut)
-    for frame in np.flatnonzero(usable & cut) if len(whole) else ():
-        enough[frame] = (
-            areas[frame] >= MOST * areas[whole[np.abs(whole - frame).argmin()]]
-        )
+    if not len(whole):
+        return enough
+    for frame in np.flatnonzero(usable & cut):
+        nearest = whole[np.abs(whole - frame).argmin()]
+        enough[frame] = areas[frame] >= MOST * areas[nearest]
     return enough
 
 
 def _is_inverted(view: View) -> bool:
-    """Return whether most masks cover most of the border, which a person does not."""
+    """Return whether most masks cover most of the border, as people never do."""
+    shows = view.shows
+    if not shows.any():
+        return False
     marked = border_of(view.bits, view.size)
     known = np.ones_like(marked)
     if view.known is not None:
         known = border_of(view.known, view.size)
     covered = (marked & known).sum(axis=1) > MOST * known.sum(axis=1)
-    return bool(np.mean(covered[view.shows] if view.shows.any() else 0.0) > 0.5)
+    return bool(np.mean(covered[shows]) > MOST)

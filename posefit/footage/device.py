@@ -1,4 +1,4 @@
-"""Scenes and silhouettes on a device that a plugin offers: poses that are compared with them are drawn there."""
+"""Move scenes and silhouettes to a device, which then rasterises poses for them."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -11,15 +11,15 @@ from posefit.footage.scene import LazyObservations, Scene
 from posefit.registry import registry
 from posefit.silhouette.mask import Device, Silhouette
 
-CPU = "cpu"
+CPU = "cpu"  # the only device that needs no plugin
 
 
 def device_of(name: str) -> Device | None:
     """Return the device of a name; None for "cpu".
 
     Raises:
-        InputError: if no plugin offers it, or this machine has none.
-        ImportError: if the plugin needs a library that is not installed.
+        InputError: No plugin offers it, or this machine does not have it.
+        ImportError: The plugin needs a library that is not installed.
 
     """
     one_of("device", name, (CPU, *registry().offers["device"]))
@@ -30,18 +30,18 @@ def device_of(name: str) -> Device | None:
 
 
 def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
-    """Return the silhouette on a device: poses that are compared with it are drawn and counted there.
+    """Move a silhouette to a device, which rasterises the poses compared with it.
 
     Args:
-        silhouette: of one view.
-        device: "cpu", or the name of a device that a plugin offers, such as "cuda".
+        silhouette: The silhouette of one view.
+        device: "cpu", or the name of a plugin's device, such as "cuda".
 
     Returns:
-        The same silhouette if it is there already, else a copy.
+        The silhouette itself if it is on the device already, or else a copy.
 
     Raises:
-        InputError: if no plugin offers the device, or this machine has none.
-        ImportError: if the plugin needs a library that is not installed.
+        InputError: No plugin offers the device, or this machine does not have it.
+        ImportError: The plugin needs a library that is not installed.
 
     >>> import numpy as np
     >>> silhouette = Silhouette.of(np.ones((4, 4)))
@@ -53,7 +53,10 @@ def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
 
 
 def on_device(scene: Scene, name: str) -> Scene:
-    """Return a scene whose poses are drawn on a device. Raises InputError and ImportError as `moved_to` does."""
+    """Return a scene whose poses are rasterised on a device.
+
+    Raises InputError and ImportError, as `moved_to` does.
+    """
     device = device_of(name)
     if device is None:
         return scene
@@ -71,7 +74,8 @@ def _moved_observation(
 def _moved(silhouette: Silhouette, device: Device | None) -> Silhouette:
     if device == silhouette.device:
         return silhouette
-    # a copy has the borders, too, that a smaller picture was given by a larger one
+    # a copy keeps the borders that a larger picture gave to a smaller one, and that
+    # making the silhouette again would lose
     moved = copy(silhouette)
     object.__setattr__(moved, "device", device)
     return moved

@@ -1,4 +1,4 @@
-"""Masks of one person as a file, with a preview and a report: `posefit extract`."""
+"""Write the masks of one person, a preview and a report: `posefit extract`."""
 
 import csv
 import zipfile
@@ -30,6 +30,12 @@ from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
+GREY = 128  # level of the preview's pictures if there is no film
+# colours of the person in the preview (blue, green, red): green, and red in frames that
+# are not usable
+USABLE = (90, 200, 90)
+UNUSABLE = (60, 60, 230)
+
 
 def extract(
     source: Any,
@@ -39,17 +45,34 @@ def extract(
     frames: Range = (None, None),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return a summary of masks of one person, and write them, a preview and a report to a new folder.
+    """Write the masks of one person to a new folder, with a preview and a report.
 
-    `source` is what `posefit.track` takes. masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,), `fps`
-    where it is known, the number of the `first` frame, and `landmarks` (T, 27, 3) where a segmenter gives any, see
-    `Segmenter`. The report, quality.csv, compares masks with the pictures of a film. Of several cameras each has its
-    number as a folder, 1 and so on, and its summary in the list `cameras`. The folder appears whole or not at all.
-    Raises InputError for mistakes in arguments or files, where no frame shows a person, and on a full disk.
+    masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,), `first`, the
+    number of the first frame, `fps` if it is known, and `landmarks` (T, 27, 3) if the
+    segmenter reports any, see `Segmenter`. quality.csv compares the masks of a film
+    with its pictures. Several cameras are written to the folders 1, 2 and so on.
+
+    The folder appears complete or not at all.
+
+    Args:
+        source: As for `posefit.track`.
+        out: The folder, which must not exist.
+        how: How to segment the person in a film.
+        frames: First frame, and the frame after the last.
+        progress: Shows how far a film is.
+
+    Returns:
+        The summary; for several cameras, a list of summaries as `cameras`.
+
+    Raises:
+        InputError: An argument or a file is wrong, no frame shows a person, or the disk
+            is full.
+
     """
     target = Path(out)
     check_new(target)
-    opencv_name(target)  # a name that it cannot write is refused before the work
+    # a name that OpenCV cannot write is refused before the work
+    opencv_name(target)
     resolved = resolve(source)
     how = how or Extraction()
     # checked before the folder is made
@@ -59,10 +82,10 @@ def extract(
     with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
-        if len(resolved.named) == 1:
-            folders = [building]
-        else:
-            folders = [building / f"{k}" for k in range(1, len(resolved.named) + 1)]
+        count = len(resolved.named)
+        folders = [building]
+        if count > 1:
+            folders = [building / str(number) for number in range(1, count + 1)]
         summaries = []
         if parts:
             for folder, part in zip(folders, parts, strict=True):
@@ -81,7 +104,10 @@ def _written(
     rows: Sequence[dict[str, Any]] = (),
     method: str | None = None,
 ) -> dict[str, Any]:
-    """Return the summary of a view, and write its files to a folder."""
+    """Write the files of a view to a folder, and return its summary.
+
+    `rows` become quality.csv, and `method` is the segmenter's name.
+    """
     folder.mkdir(exist_ok=True)
     warnings = [*view.warnings]
     preview = folder / "preview.mp4"
@@ -91,7 +117,7 @@ def _written(
                 silhouette = view.silhouette(k)
                 writer.write(_painted(image, silhouette, bool(view.usable[k])))
     except (InputError, cv2.error) as error:
-        # such as of a build of OpenCV without the format: the masks are the work
+        # some builds of OpenCV cannot write video, and the masks matter more
         preview.unlink(missing_ok=True)
         warnings.append(f"preview.mp4 is missing: {error}")
     _write_npz(folder / "masks.npz", view)
@@ -110,7 +136,7 @@ def _written(
         "size": list(view.size),
         "fps": view.fps,
         "touching_border": int(border.sum()),
-        # which a film's quality.csv says
+        # masks that were not segmented here have no rows
         "in_pieces": sum(row["pieces"] > 1 for row in rows) if rows else None,
         "warnings": warnings,
         "guesses": [*view.guesses],
@@ -126,15 +152,15 @@ def _masks(source: Resolved, how: Extraction, frames: Range) -> list[View]:
 
 
 def _pictures(view: View) -> Iterator[Image]:
-    """Yield the pictures of a film, or grey ones."""
+    """Yield the pictures of a view, or grey ones if it has masks only."""
     if view.pictures is not None:
         return view.pictures()
     width, height = view.size
-    return repeat(np.full((height, width, 3), 128, dtype=np.uint8), len(view))
+    return repeat(np.full((height, width, 3), GREY, dtype=np.uint8), len(view))
 
 
 def _write_npz(path: Path, view: View) -> None:
-    """Write masks.npz frame by frame, as there may be more than memory holds unpacked."""
+    """Write masks.npz frame by frame, because all masks may not fit in memory."""
     header = {
         "descr": "|u1",
         "fortran_order": False,
@@ -145,11 +171,8 @@ def _write_npz(path: Path, view: View) -> None:
             with archive.open(f"{kind}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_1_0(member, header)
                 for k in range(len(view)):
-                    member.write(
-                        getattr(view.silhouette(k), attribute)
-                        .astype(np.uint8)
-                        .tobytes()
-                    )
+                    plane = getattr(view.silhouette(k), attribute)
+                    member.write(plane.astype(np.uint8).tobytes())
         rest = {
             "usable": view.usable,
             "fps": None if view.fps is None else np.array(view.fps),
@@ -164,7 +187,8 @@ def _write_npz(path: Path, view: View) -> None:
 
 
 def _painted(image: Image, person: Silhouette, usable: bool) -> Image:
-    colour = np.array((90, 200, 90) if usable else (60, 60, 230), dtype=np.float32)
+    """Return a picture with the person tinted, and unknown pixels darkened."""
+    colour = np.array(USABLE if usable else UNUSABLE, dtype=np.float32)
     painted = image.copy()
     painted[~person.valid] //= 2
     painted[person.mask] = (0.5 * painted[person.mask] + 0.5 * colour).astype(np.uint8)

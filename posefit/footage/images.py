@@ -1,4 +1,4 @@
-"""Images that may be hostile: Pillow reads the size, which is checked, and decodes that many pixels and no others."""
+"""Read images, which may be hostile: their size is checked before they are decoded."""
 
 import logging
 import warnings
@@ -18,19 +18,22 @@ from posefit.reading import check_size
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".gif", ".webp")
 PAGED = (".tif", ".tiff", ".gif", ".webp")  # may hold several pictures
-PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
-LARGEST_FILE = 8 * PIXELS  # bytes of a picture
-FORMATS = "PNG, JPEG, BMP, TIFF, PGM, GIF or WebP"
-_JPEG = ("JPEG", "MPO")  # the latter of phones, with a preview
-_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "GIF", "WEBP")  # as Pillow calls them
-# of 255, and the share of an image's pixels: with more it is no grey one
+# most pixels of a picture or a frame of video; 8K has 33 million
+PIXELS = 50_000_000
+# most bytes of a picture: as many as 16 bits for each of four channels
+LARGEST_FILE = 8 * PIXELS
+FORMATS = "PNG, JPEG, BMP, TIFF, PGM, GIF or WebP"  # as messages call them
+_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "GIF", "WEBP")  # Pillow's names
+_JPEG = ("JPEG", "MPO")  # phones write MPO, a JPEG with a preview
+# levels of 255 between the channels of a pixel that is not grey
 COLOUR_RANGE = 32
+# share of an image's pixels: with more of them in colour, the image is in colour. Lossy
+# compression tints a few pixels of grey images
 COLOUR_SHARE = 0.02
-# a picture of a place, or a person cut out, has more; so many labels are rare
+# photographs have more colours than this, and maps of labels hardly ever do
 MANY_COLOURS = 64
-# as Pillow calls what has no colours
-_GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")
-# what is wrong with a file is reported by posefit
+_GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")  # Pillow's modes without colour
+# posefit reports itself what is wrong with a file
 logging.getLogger("PIL").addHandler(logging.NullHandler())
 
 
@@ -38,20 +41,29 @@ T = TypeVar("T")
 
 
 class Marks(NamedTuple):
-    """The values by which a picture marks a person, and of which kind they are."""
+    """The values by which an image marks a person, and what kind of values they are."""
 
-    # (height, width): grey levels, an alpha channel, indices of a palette, or colours
+    # (height, width): grey levels, an alpha channel, palette indices, or colours
     # 0xRRGGBB
     values: NDArray[Any]
-    soft: bool = False  # whether they are degrees
-    alpha: bool = False  # of an alpha channel
-    photo: bool = False  # a picture in many colours
+    soft: bool = False  # whether they say how much of a pixel is the person
+    alpha: bool = False  # whether they are an alpha channel
+    photo: bool = False  # whether the image is a photograph, and so not a mask
 
 
 def read_image(path: str | Path, grey: bool, page: int = 0) -> NDArray[np.uint8] | None:
-    """Return a picture (height, width) in grey, or (height, width, 3) in blue, green and red; None where it is none.
+    """Return a picture, or None if the file is not a picture.
 
-    Raises InputError where it has more than `PIXELS` or `LARGEST_FILE`.
+    Args:
+        path: The file.
+        grey: Whether to return grey levels (height, width); otherwise (height, width,
+            3) in blue, green and red.
+        page: Which picture of a file with several.
+
+    Raises:
+        InputError: The picture has more than `PIXELS`, or the file is larger than
+            `LARGEST_FILE`.
+
     """
     return next(_decoded(Path(path), [page], _grey if grey else _colours), None)
 
@@ -59,42 +71,56 @@ def read_image(path: str | Path, grey: bool, page: int = 0) -> NDArray[np.uint8]
 def read_marks(
     path: Path, pages: Sequence[int] = (0,), labelled: bool = False
 ) -> Iterator[Marks]:
-    """Yield the values by which the pages of a file mark a person; nothing, or too few, where it is no picture.
+    """Yield the values by which each page of a file marks a person.
 
-    They are its alpha channel, where it has one that is not all opaque and no label is wanted; else the indices of a
-    palette of colours, or colours as 0xRRGGBB, or grey levels, of 8 or 16 bits. Raises InputError as `read_image` does.
+    An alpha channel comes first, if some pixels are not opaque. Then come the indices
+    of a colour palette, colours as 0xRRGGBB, and grey levels of 8 or 16 bits. If the
+    file is damaged or not a picture, fewer pages are yielded.
+
+    Args:
+        path: The file.
+        pages: Which pages to read.
+        labelled: Whether the user named a label; the alpha channel is then ignored.
+
+    Raises:
+        InputError: As `read_image`.
+
     """
     return _decoded(path, pages, partial(_marks, labelled=labelled))
 
 
 def page_count(path: Path) -> int:
-    """Return how many pictures a file holds; 1 where it is none."""
+    """Return how many pictures a file holds; 1 if it is not a picture."""
     if path.suffix.lower() not in PAGED:
         return 1
-    return next(
-        _decoded(path, [0], lambda image: int(getattr(image, "n_frames", 1))), 1
-    )
+    return next(_decoded(path, [0], _frame_count), 1)
+
+
+def _frame_count(image: Image.Image) -> int:
+    return int(getattr(image, "n_frames", 1))
 
 
 @lru_cache(maxsize=64)
 def is_photo(path: Path) -> bool:
-    """Return whether a file is a picture in many colours, without alpha channel: of a place, not of a person's mask."""
+    """Return whether a file is a photograph: in many colours, without transparency."""
+
+    def photo(image: Image.Image) -> bool:
+        return image.mode not in _GREY and _marks(image, False).photo
+
     try:
-        return any(
-            _decoded(
-                path,
-                [0],
-                lambda image: image.mode not in _GREY and _marks(image, False).photo,
-            )
-        )
-    except InputError:  # raised again where it is read
+        return any(_decoded(path, [0], photo))
+    except InputError:  # raised again when the file is read
         return False
 
 
 def _decoded(
     path: Path, pages: Sequence[int], decode: Callable[[Image.Image], T]
 ) -> Iterator[T]:
-    """Yield what `decode` makes of pages of a file; no more where there is none. Raises InputError for large ones."""
+    """Yield what `decode` returns for pages of a file.
+
+    Ends early if the file is missing, damaged or not a picture. Raises InputError for a
+    file that is too large.
+    """
     if not path.is_file():
         return
     check_size(path, LARGEST_FILE)
@@ -117,44 +143,47 @@ def _decoded(
         raise InputError(f"{expected}, got far more") from None
     except InputError:
         raise
-    except Exception:  # whatever the library trips over, the file is to blame
+    except Exception:  # Pillow raises many types for damaged files
         return
 
 
 def _grey(image: Image.Image) -> NDArray[np.uint8]:
     if image.format not in _JPEG:
-        return np.asarray(
-            cv2.cvtColor(_colours(image), cv2.COLOR_BGR2GRAY), dtype=np.uint8
-        )
-    image.draft("L", None)  # which a JPEG has by itself
+        grey = cv2.cvtColor(_colours(image), cv2.COLOR_BGR2GRAY)
+        return np.asarray(grey, dtype=np.uint8)
+    # a JPEG stores brightness by itself, so its colours need no decoding
+    image.draft("L", None)
     return np.asarray(ImageOps.exif_transpose(image).convert("L"))
 
 
 def _colours(image: Image.Image) -> NDArray[np.uint8]:
+    """Return an image (height, width, 3) in blue, green and red."""
     image = ImageOps.exif_transpose(image)
     if image.mode.startswith("I"):  # 16 bits
         image = Image.fromarray((np.asarray(image) // 256).astype(np.uint8))
     return np.asarray(image.convert("RGB"))[..., ::-1]
 
 
+def _jpeg_marks(image: Image.Image) -> Marks:
+    """Return how a JPEG marks a person: by its brightness."""
+    # a JPEG stores brightness and two colour differences, so nothing is converted
+    if image.mode == "RGB":
+        image.draft("YCbCr", None)
+    image = ImageOps.exif_transpose(image)
+    if image.mode != "YCbCr":
+        return Marks(np.asarray(image.convert("L")), soft=True)
+    bright, blue, red = (np.asarray(channel) for channel in image.split())
+    grey = np.full_like(blue, 128)
+    off = np.maximum(cv2.absdiff(blue, grey), cv2.absdiff(red, grey))
+    # a colour whose channels differ by some range is about half of it away from grey
+    share = (off >= COLOUR_RANGE // 2).mean()
+    return Marks(bright, soft=True, photo=bool(share > COLOUR_SHARE))
+
+
 def _marks(image: Image.Image, labelled: bool) -> Marks:
+    """Return how an image marks a person, see `read_marks`."""
     if image.format in _JPEG:
-        # as which a JPEG has brightness and two distances from grey
-        if image.mode == "RGB":
-            image.draft("YCbCr", None)
-        image = ImageOps.exif_transpose(image)
-        if image.mode != "YCbCr":
-            return Marks(np.asarray(image.convert("L")), soft=True)
-        bright, *chroma = (np.asarray(channel) for channel in image.split())
-        off = np.maximum(
-            *(cv2.absdiff(channel, np.full_like(channel, 128)) for channel in chroma)
-        )
-        return Marks(
-            bright,
-            soft=True,
-            # a colour is about half its range off grey
-            photo=bool((off >= COLOUR_RANGE // 2).mean() > COLOUR_SHARE),
-        )
+        return _jpeg_marks(image)
     if not labelled and image.has_transparency_data:
         transparent = _transparent_marks(image)
         if transparent is not None:
@@ -165,28 +194,30 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
         grey = np.asarray(image)
         return Marks(grey.astype(grey.dtype.newbyteorder("=")))
     colours = np.asarray(image.convert("RGB"))
-    if (colours[..., 0] == colours[..., 1]).all() and (
-        colours[..., 0] == colours[..., 2]
-    ).all():
-        return Marks(colours[..., 0])
+    red, green, blue = (colours[..., channel] for channel in range(3))
+    if (red == green).all() and (red == blue).all():
+        return Marks(red)
+    # lossy compression tints grey images a little
     if image.format == "WEBP" and not _is_colourful(colours):
         return Marks(np.asarray(image.convert("L")), soft=True)
     if image.mode == "P" and image.format != "GIF":
         return Marks(np.asarray(image))
     numbers = _colour_numbers(colours)
-    return Marks(
-        numbers,
-        photo=_is_colourful(colours)
+    photo = (
+        _is_colourful(colours)
+        # every third row and column is enough to find many colours
         and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS
-        and flat_share(numbers) < MOST,
+        and flat_share(numbers) < MOST
     )
+    return Marks(numbers, photo=photo)
 
 
 def _transparent_marks(image: Image.Image) -> Marks | None:
-    """Return how a picture with transparent pixels marks a person; None where it has none.
+    """Return how transparent pixels mark a person; None if all pixels are opaque.
 
-    Its alpha channel does. Where that has two values only and few colours are opaque, these are labels, and what is
-    transparent is 0: of a single label the person is the same either way, and of several one is to be chosen.
+    The alpha channel marks the person, with one exception. If it has only two values,
+    and the opaque pixels have few colours, then the colours are labels and transparent
+    pixels are 0. For a single label the mask is the same either way.
     """
     coloured = np.asarray(image.convert("RGBA"))
     alpha = coloured[..., 3]
@@ -204,7 +235,7 @@ def _transparent_marks(image: Image.Image) -> Marks | None:
     else:
         numbers = _colour_numbers(coloured[..., :3])
     labels = np.unique(numbers[shown])
-    # black, or the palette's first colour, alone is the person
+    # if only black or the palette's first colour is opaque, labels would be all 0
     if len(labels) > MANY_COLOURS or not labels.any():
         return Marks(np.where(shown, alpha, 0), soft=True, alpha=True)
     return Marks(np.where(shown, numbers, 0))
@@ -220,22 +251,24 @@ def _colour_numbers(colours: NDArray[np.uint8]) -> NDArray[np.int32]:
 
 
 def flat_share(values: NDArray[Any]) -> float:
-    """Return which share of the pixels between the lowest and the highest tenth of values has equal neighbours.
+    """Return the share of pixels that equal their four neighbours, among middle values.
 
-    Most of labels are flat areas, and degrees pass from one value to the next.
+    Middle values are neither in the lowest nor in the highest tenth of the range.
+    Labels cover flat areas; soft masks change from pixel to pixel.
     """
     middle = values[1:-1, 1:-1]
-    low, high = float(values.min()), float(values.max())
-    between = (middle > low + 0.1 * (high - low)) & (middle < high - 0.1 * (high - low))
+    low = float(values.min())
+    high = float(values.max())
+    tenth = 0.1 * (high - low)
+    between = (middle > low + tenth) & (middle < high - tenth)
     if not between.any():
         return 0.0
+    above = values[:-2, 1:-1]
+    below = values[2:, 1:-1]
+    left = values[1:-1, :-2]
+    right = values[1:-1, 2:]
     flat = np.ones(middle.shape, dtype=bool)
-    for neighbour in (
-        values[:-2, 1:-1],
-        values[2:, 1:-1],
-        values[1:-1, :-2],
-        values[1:-1, 2:],
-    ):
+    for neighbour in (above, below, left, right):
         flat &= middle == neighbour
     return float(np.count_nonzero(flat & between) / np.count_nonzero(between))
 

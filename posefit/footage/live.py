@@ -1,4 +1,4 @@
-"""The frames of a camera, a network stream or a pipe as they come, and the person in each of them."""
+"""Read a camera, a network stream or a pipe live, and find the person in each frame."""
 
 import io
 import os
@@ -27,39 +27,52 @@ from posefit.reading import quoted
 from posefit.silhouette.foreground import BRIGHT, Image
 from posefit.silhouette.mask import Mask
 
-STALL_SECONDS = 5.0  # without a frame, after which a stream counts as broken
-EMPTY_SECONDS = 3.0  # in which the scene is still empty, by default: VSMM 1.1
+STALL_SECONDS = 5.0  # a stream without a frame for this long counts as broken
+# the scene must be empty for this long at first, to learn the background: VSMM 1.1
+EMPTY_SECONDS = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class LiveImage:
-    """A frame of a stream: a picture (height, width, 3), or a mask in grey levels (height, width)."""
+    """A frame of a stream: a picture (height, width, 3), or a mask (height, width)."""
 
-    number: int  # in the stream, skipped frames counted
+    number: int  # place in the stream, counting skipped frames
     arrived: float  # seconds of `time.perf_counter`
     image: Image = field(repr=False)
 
 
 class Stream:
-    """The frames of `source`: a device's number, an address that OpenCV opens, or "-", images on standard input.
+    """The frames of a live source. Iterate over it to get a `LiveImage` at a time.
 
-    Standard input holds binary PGM images, which are masks, or binary PPM images, one after another. A thread reads;
-    of the frames that come while one is tracked only the newest is kept. Raises InputError where a source cannot be
-    opened, a frame is damaged, or none comes for `STALL_SECONDS`.
+    A thread reads the source. If several frames arrive while one is tracked, only the
+    newest is kept. Iteration raises InputError if a frame is damaged, or if no frame
+    arrives for `STALL_SECONDS`.
     """
 
     def __init__(self, source: str, pipe: BinaryIO | None = None) -> None:
+        """Open a source, and start to read.
+
+        Args:
+            source: The number of a device, an address that OpenCV opens, or "-" for
+                standard input: binary PGM images, which are masks, or PPM images.
+            pipe: What to read in place of standard input.
+
+        Raises:
+            InputError: The source cannot be opened.
+
+        """
         self.name = source
         self.fps = FPS
         self.count = 0
-        self.rate: float | None = None  # frames a second, where the source states them
+        self.rate: float | None = None  # frames per second, if the source states them
         self._latest: LiveImage | None = None
         self._ended = False
         self._error: InputError | None = None
         self._changed = threading.Condition()
         frames: Iterator[Image]
         if source == "-":
-            # a file of its own: Python ends by SIGABRT while a thread reads from its standard input
+            # the descriptor is duplicated, because Python aborts (SIGABRT) at exit if a
+            # thread is reading from sys.stdin
             with suppress(io.UnsupportedOperation):  # a stream in memory has no file
                 pipe = pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb")
             frames = netpbm_images(pipe or sys.stdin.buffer)
@@ -69,8 +82,10 @@ class Stream:
             capture = cv2.VideoCapture(int(source) if source.isdigit() else address)
             if not capture.isOpened():
                 raise InputError(
-                    f"live must be a device or an address that can be opened, or -, got {quoted(source)}"
+                    "live must be a device or an address that can be opened, or -, "
+                    f"got {quoted(source)}"
                 )
+            # cameras report 0, NaN or absurd numbers if they do not know their rate
             rate = capture.get(cv2.CAP_PROP_FPS)
             self.rate = rate if np.isfinite(rate) and 1.0 <= rate <= 1000.0 else None
             self.fps = self.rate or FPS
@@ -112,33 +127,44 @@ class Stream:
 
 
 def netpbm_images(stream: BinaryIO) -> Iterator[Image]:
-    """Yield the binary PGM (height, width) and PPM (height, width, 3: BGR) images of a stream.
+    """Yield the binary PGM and PPM images of a stream.
 
-    Raises InputError for anything else, and for an image that breaks off.
+    PGM images have shape (height, width), PPM images (height, width, 3) in blue, green
+    and red.
+
+    Raises InputError for anything else, and for an incomplete image.
     """
     while magic := stream.read(2):
         if magic not in (b"P5", b"P6"):
+            came = quoted(magic.decode("latin-1"))
+            raise InputError(f"expected binary PGM or PPM images, got {came}")
+        width = _number(stream)
+        height = _number(stream)
+        highest = _number(stream)
+        if not (0 < width * height <= PIXELS and highest == 255):
             raise InputError(
-                f"expected binary PGM or PPM images, got {quoted(magic.decode('latin-1'))}"
+                f"expected an image of at most {PIXELS // 10**6} million pixels in 255 "
+                "levels"
             )
-        width, height, most = (_number(stream) for _ in range(3))
-        if not (0 < width * height <= PIXELS and most == 255):
-            raise InputError(
-                f"expected an image of at most {PIXELS // 10**6} million pixels in 255 levels"
-            )
-        shape = (height, width) if magic == b"P5" else (height, width, 3)
+        is_grey = magic == b"P5"
+        shape = (height, width) if is_grey else (height, width, 3)
         values = stream.read(int(np.prod(shape)))
         if len(values) < np.prod(shape):
             raise InputError("expected a whole image, got one that breaks off")
         image = np.frombuffer(values, dtype=np.uint8).reshape(shape)
-        yield image if magic == b"P5" else np.ascontiguousarray(image[..., ::-1])
+        # PPM stores red first, OpenCV blue
+        yield image if is_grey else np.ascontiguousarray(image[..., ::-1])
+
+
+MAX_DIGITS = 10  # more digits are no number of pixels: the header is damaged
 
 
 def _number(stream: BinaryIO) -> int:
-    """Return the next number of a netpbm header, and read the byte after it."""
+    """Return the next number of a netpbm header, and skip the byte after it."""
     digits = b""
-    while len(digits) < 10:
+    while len(digits) < MAX_DIGITS:
         byte = stream.read(1)
+        # a comment reaches to the end of its line
         if byte == b"#":
             while stream.read(1) not in (b"\n", b""):
                 pass
@@ -152,18 +178,30 @@ def _number(stream: BinaryIO) -> int:
 
 
 def _captured(capture: Any) -> Iterator[Image]:
-    while (frame := capture.read())[0]:
-        yield frame[1]
+    """Yield frames until the capture ends."""
+    read, image = capture.read()
+    while read:
+        yield image
+        read, image = capture.read()
     capture.release()
 
 
 def live_views(
     stream: Stream, how: Extraction | None, log: Callable[[str], None]
 ) -> Iterator[View]:
-    """Yield the view of each frame of a stream: grey frames are masks; others are segmented.
+    """Yield a view of each frame of a stream. Its time is that of `time.perf_counter`.
 
-    Times are seconds of `time.perf_counter`, when frames arrived. By default each pixel's background is its mean over
-    the first three seconds, which have to show the empty scene.
+    Grey frames are masks; colour frames are segmented.
+
+    Args:
+        stream: The frames.
+        how: How to segment them. By default the first three seconds must show the empty
+            scene, and each pixel's background is its mean over them.
+        log: Takes messages for the user.
+
+    Raises:
+        InputError: The stream fails, see `Stream`, or its frames differ in size.
+
     """
     images = _of_one_size(stream)
     first = next(images)
@@ -200,29 +238,36 @@ def _view(
     stream: Stream, live: LiveImage, mask: Mask, valid: Mask, usable: bool
 ) -> View:
     return View(
-        stream.name,
-        np.array([live.number]),
-        np.array([live.arrived]),
-        np.packbits(mask)[None],
-        np.packbits(valid)[None],
-        np.array([usable]),
-        (mask.shape[1], mask.shape[0]),
+        name=stream.name,
+        numbers=np.array([live.number]),
+        times=np.array([live.arrived]),
+        bits=np.packbits(mask)[None],
+        known=np.packbits(valid)[None],
+        usable=np.array([usable]),
+        size=(mask.shape[1], mask.shape[0]),
         fps=stream.rate,
     )
 
 
 def _of_one_size(stream: Stream) -> Iterator[LiveImage]:
-    """Yield the frames of a stream. Raises InputError where it has none, or one of another size than the first."""
+    """Yield the frames of a stream.
+
+    Raises InputError if there are none, or if one has another size than the first.
+    """
     first = None
     for live in stream:
         first = first or live
         if live.image.shape != first.image.shape:
-            expected, came = (
-                "x".join(map(str, frame.image.shape[1::-1])) for frame in (first, live)
-            )
+            expected = _size_of(first.image)
+            came = _size_of(live.image)
             raise InputError(
                 f"{stream.name}: expected frames of {expected}, got {came}"
             )
         yield live
     if first is None:
         raise InputError(f"{stream.name}: expected frames, got none")
+
+
+def _size_of(image: Image) -> str:
+    """Return the width and the height of an image as a message shows them."""
+    return f"{image.shape[1]}x{image.shape[0]}"

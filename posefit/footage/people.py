@@ -1,11 +1,12 @@
-"""The people of a film: who is who from frame to frame, and which of them is followed.
+"""Tell the people in a film apart from frame to frame, and choose one to follow.
 
-A person goes on from frame to frame as they went, and keeps about their size and colours. Where people meet, a blob
-shows several: what lies where one of them alone is expected is theirs, and the rest of it is unknown.
+A person is expected to keep their velocity, and about their size and colours. If people
+meet, one blob shows several of them. Pixels where only one person is expected belong to
+that person, and the rest of the blob is unknown.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -18,40 +19,57 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, padded_box
 from posefit.silhouette.pieces import RIVAL_AREA
 
-MAX_STEP = 1.0  # times the height: farther from where they are expected a person is not
-MAX_GAP_SECONDS = 1.0  # without a detection, after which a person is another one
-MEMORY = 0.8  # of the last step, size and colours that is kept with each frame
-# of where a person is expected: a blob that covers so much shows them, too
+# times the height: a person is at most this far from where they are expected
+MAX_STEP = 1.0
+MAX_GAP_SECONDS = 1.0  # a person who is hidden for longer counts as another one
+MEMORY = 0.8  # share of the last step, size and colours that is kept with each frame
+# share of a person's expected outline: a blob that covers more of it shows them
 COVERED = 0.3
-SLACK = 0.04  # of the height: so far around where they are expected people may be
-AROUND = 0.3  # of the height: so far around where they are a network looks for a person
-CLEARER = 2.0  # times as many pixels of a person as of any other show whose a mask is
-MIN_DETECTIONS = 8  # frames of a person alone; what shows in fewer may be noise
-COLOUR = 0.01  # what a grey level of another colour counts, in heights
-AREA = 0.5  # what an area e times as large counts, in heights
+SLACK = 0.04  # share of the height by which a person may be off their expected outline
+AROUND = 0.3  # share of the height around a person in which a network looks for them
+# a mask is a person's if it has this many times as many pixels of them as of any other
+CLEARER = 2.0
+MIN_DETECTIONS = 8  # frames that show a person alone; fewer may be noise
+COLOUR = 0.01  # heights: the distance that one grey level of different colour adds
+AREA = 0.5  # heights: the distance that an area e times as large adds
+GAP_FRAMES = 30.0  # a gap of this many frames halves what a distance counts
+UNREACHABLE = 1e6  # heights: replaces infinity, which the assignment does not accept
 
-Cut = tuple[tuple[slice, slice], NDArray[np.uint8]]  # a box of a mask, and its bits
-# a person by their number, 1 the longest visible, or by a point of where they are when they come
+
+class Cut(NamedTuple):
+    """The pixels of a mask: its box, and the bits in it."""
+
+    box: tuple[slice, slice]
+    bits: NDArray[np.uint8]
+
+
+class Detection(NamedTuple):
+    """What a frame shows of a person."""
+
+    shown: Cut  # the person's mask
+    hidden: Cut | None  # unknown pixels, where others are too; None for a person alone
+
+
+# a person by number, from 1 for the longest visible, or by a point at which they appear
 Choice = int | tuple[float, float]
 Persons = list[list["Tracklet"]]  # the parts of each person
-Chooser = Callable[[Persons], int]  # returns the number of one of several
+Chooser = Callable[[Persons], int]  # returns the number of one of several people
 
 
 def cut_out(mask: Mask) -> Cut:
-    """Return a mask's pixels as bits, no more than their box."""
+    """Return the pixels of a mask as bits of their bounding box."""
     box = padded_box(mask, 0)
-    return box, np.packbits(mask[box])
+    return Cut(box, np.packbits(mask[box]))
 
 
 def paste(cut: Cut, mask: Mask) -> None:
-    """Set the pixels in a mask that have been cut out of another."""
-    box, bits = cut
-    part = mask[box]
-    part |= unpacked(bits, part.shape[::-1])
+    """Set the pixels of a cut in a mask, in place."""
+    part = mask[cut.box]
+    part |= unpacked(cut.bits, part.shape[::-1])
 
 
 class _Blob:
-    """What may be a person in a picture."""
+    """A region of a picture that may be a person."""
 
     def __init__(self, mask: Mask, image: Image | None) -> None:
         self.mask = mask
@@ -64,40 +82,42 @@ class _Blob:
         self.colours = np.zeros(6)
         if image is not None:
             middle = int(self.place[1])
-            halves = (mask.copy(), mask.copy())
-            halves[0][middle:], halves[1][:middle] = False, False
-            self.colours = np.concatenate(
-                [cv2.mean(image, half.astype(np.uint8))[:3] for half in halves]
-            )
+            upper = mask.copy()
+            upper[middle:] = False
+            lower = mask.copy()
+            lower[:middle] = False
+            halves = [
+                cv2.mean(image, half.astype(np.uint8))[:3] for half in (upper, lower)
+            ]
+            self.colours = np.concatenate(halves)
 
 
 class Tracklet:
-    """One person of a film, from where they are visible first until they are lost."""
+    """A person in successive frames, from when they appear until they are lost."""
 
     def __init__(self, blob: _Blob, frame: int) -> None:
-        # by frame: their mask, and what is unknown of a blob
-        self.detections: dict[int, tuple[Cut, Cut | None]] = {}
+        self.detections: dict[int, Detection] = {}  # by frame
         self.rows: dict[int, dict[str, Any]] = {}  # by frame, of `FrameQuality`
-        self.quality: Any = None
-        # where they are visible first: frame, across and down
+        self.quality: Any = None  # the `FrameQuality` of this person
+        # where they appear: frame, column and row
         self.first = (frame, *blob.place.tolist())
         # the latest blob that shows them alone, and its frame
         self.latest = blob
         self.last = frame
-        self.alone = 0  # frames that show them alone
-        # smoothed over these
+        self.alone = 0  # number of frames that show them alone
+        # these are smoothed over the frames that show them alone
         self.height = blob.height
         self.area = blob.area
         self.colours = blob.colours
-        self._step = np.zeros(2)  # pixels a frame
-        self._usable = 0
+        self._step = np.zeros(2)  # pixels per frame
+        self._usable = 0  # number of usable rows
 
     def expected(self, frame: int) -> Array:
-        """Return where (2,) their middle is expected."""
+        """Return where (2,) the middle of the person is expected."""
         return np.asarray(self.latest.place + (frame - self.last) * self._step)
 
     def distance(self, blob: _Blob, frame: int) -> float:
-        """Return how far a blob is from what is expected, in heights; infinite where it is too far away."""
+        """Return how unlike the person a blob is, in heights; infinite if too far."""
         away = float(np.linalg.norm(blob.place - self.expected(frame))) / self.height
         colour = float(np.abs(blob.colours - self.colours).mean())
         if away > MAX_STEP:
@@ -106,59 +126,65 @@ class Tracklet:
         return away + COLOUR * colour + AREA * size
 
     def outline(self, frame: int) -> Mask:
-        """Return where they are expected, and a little around."""
-        (across, down), width = (
-            self.expected(frame) - self.latest.place,
-            2 * round(SLACK * self.height) + 1,
-        )
+        """Return the mask where the person is expected, widened by `SLACK`."""
+        across, down = self.expected(frame) - self.latest.place
         shift = np.array([[1.0, 0.0, across], [0.0, 1.0, down]])
         mask = self.latest.mask.astype(np.uint8)
         moved = cv2.warpAffine(mask, shift, mask.shape[::-1], flags=cv2.INTER_NEAREST)
-        return cv2.dilate(moved, np.ones((width, width), dtype=np.uint8)) > 0
+        return _widened(moved, self.height)
 
     def update(self, blob: _Blob, frame: int) -> None:
-        """Take a blob that shows them alone."""
+        """Add a blob that shows the person alone."""
         if frame > self.last:
             step = (blob.place - self.latest.place) / (frame - self.last)
+            # the first step has no earlier one to be smoothed with
             share = MEMORY if self.alone > 1 else 0.0
             self._step = share * self._step + (1.0 - share) * step
-            for name in ("area", "colours", "height"):
-                setattr(
-                    self,
-                    name,
-                    MEMORY * getattr(self, name) + (1.0 - MEMORY) * getattr(blob, name),
-                )
-        self.alone = self.alone + 1
+            self.area = MEMORY * self.area + (1.0 - MEMORY) * blob.area
+            self.colours = MEMORY * self.colours + (1.0 - MEMORY) * blob.colours
+            self.height = MEMORY * self.height + (1.0 - MEMORY) * blob.height
+        self.alone += 1
         self.last = frame
         self.latest = blob
-        self.detections[frame] = cut_out(blob.mask), None
+        self.detections[frame] = Detection(cut_out(blob.mask), None)
 
     def confirmed(self, least: float = MIN_DETECTIONS) -> bool:
-        """Return whether they are visible so often, and as a person, that they are no noise."""
-        frames = self._usable if self.rows else self.alone
-        return frames >= min(MIN_DETECTIONS, least)
+        """Return whether the person is visible in enough frames not to be noise."""
+        return self._frames >= min(MIN_DETECTIONS, least)
 
     def add_row(self, frame: int, row: dict[str, Any]) -> None:
-        """Take the row of `FrameQuality` of a frame."""
-        self.rows[frame], self._usable = row, self._usable + row["usable"]
+        """Add the row of `FrameQuality` of a frame."""
+        self.rows[frame] = row
+        self._usable += row["usable"]
+
+    @property
+    def _frames(self) -> int:
+        """How many frames show the person, if judged then only usable ones."""
+        return self._usable if self.rows else self.alone
 
     @property
     def score(self) -> float:
-        """How long and steadily they are visible, times their height: 0 where they are never usable."""
-        return (self._usable if self.rows else self.alone) * self.height
+        """How many frames show the person, times their height."""
+        return self._frames * self.height
 
 
 class People:
-    """Who is who in the frames of a film, which come one after the other."""
+    """Tells the people in a film apart, frame after frame."""
 
     def __init__(self, fps: float) -> None:
         self.tracklets: list[Tracklet] = []
-        self.active: list[Tracklet] = []  # those who may be in the next frame
+        self.active: list[Tracklet] = []  # who may be in the next frame
         self._frame = -1
         self._patience = MAX_GAP_SECONDS * fps
 
     def add(self, masks: Sequence[Mask], image: Image | None = None) -> list[Tracklet]:
-        """Return who is in the next frame, of which the blobs (height, width) are the largest first."""
+        """Return who is in the next frame.
+
+        Args:
+            masks: (height, width) of each blob in the frame, the largest first.
+            image: The picture, whose colours tell people apart.
+
+        """
         self._frame += 1
         frame = self._frame
         blobs = [_Blob(mask, image) for mask in masks]
@@ -167,7 +193,7 @@ class People:
             if frame - max(tracklet.detections) <= self._patience:
                 active.append(tracklet)
             else:
-                # only the next frame would need them, and memory would grow with noise
+                # what only later frames need is freed, or memory would grow with noise
                 tracklet.latest.mask = np.empty((0, 0), dtype=bool)
                 tracklet.quality = None
         owners = _owners(active, blobs, frame)
@@ -179,12 +205,13 @@ class People:
         outlines = [tracklet.outline(frame) for tracklet in confirmed] if blobs else []
         present = []
         for k, blob in enumerate(blobs):
-            hidden = [
-                tracklet
-                for tracklet, outline in zip(confirmed, outlines, strict=True)
-                if tracklet.area >= RIVAL_AREA * blob.area
-                and (outline & blob.mask).sum() > COVERED * outline.sum()
-            ]
+            # people without a blob who are probably in this one
+            hidden = list[Tracklet]()
+            for tracklet, outline in zip(confirmed, outlines, strict=True):
+                is_large = tracklet.area >= RIVAL_AREA * blob.area
+                covered = (outline & blob.mask).sum()
+                if is_large and covered > COVERED * outline.sum():
+                    hidden.append(tracklet)
             owner = owners.get(k)
             if owner is None and not hidden:
                 owner = Tracklet(blob, frame)
@@ -201,44 +228,37 @@ class People:
         return present
 
     def persons(self) -> Persons:
-        """Return the people, the longest and steadiest first: those parts of each that follow each other in time."""
+        """Return the people, the longest visible first.
+
+        A person who was lost and found again has several parts, which are never in one
+        frame.
+        """
         persons = Persons()
+        # in a short film fewer frames are enough
         least = 0.5 * (self._frame + 1)
-        for tracklet in sorted(
-            self.tracklets, key=lambda tracklet: tracklet.score, reverse=True
-        ):
-            apart = [
-                person
-                for person in persons
-                if not any(
-                    tracklet.detections.keys() & part.detections.keys()
-                    for part in person
-                )
-            ]
+        by_score = sorted(self.tracklets, key=lambda part: part.score, reverse=True)
+        for tracklet in by_score:
+            apart = [person for person in persons if _are_apart(tracklet, person)]
             if apart and tracklet.confirmed(least):
-                min(
-                    apart,
-                    key=lambda person: min(
-                        _distance(tracklet, part) for part in person
-                    ),
-                ).append(tracklet)
+                distances = [_least_distance(tracklet, person) for person in apart]
+                apart[distances.index(min(distances))].append(tracklet)
             else:
                 persons.append([tracklet])
-        scores = [sum(part.score for part in person) for person in persons]
-        confirmed = [
-            k
-            for k, person in enumerate(persons)
-            if any(part.confirmed(least) for part in person)
-        ]
-        if not confirmed:  # whatever there is
+        confirmed = Persons()
+        for person in persons:
+            if any(part.confirmed(least) for part in person):
+                confirmed.append(person)
+        if not confirmed:
+            # nobody is sure to be a person: all that there is counts as one
             return [[part for person in persons for part in person]] if persons else []
-        return [persons[k] for k in sorted(confirmed, key=lambda k: -scores[k])]
+        return sorted(confirmed, key=_score, reverse=True)
 
     def others(self, parts: Sequence[Tracklet]) -> list[Tracklet]:
-        """Return the parts of all people but those of one."""
-        return [
-            part for person in self.persons() for part in person if part not in parts
-        ]
+        """Return the parts of all people except one, whose `parts` are given."""
+        others = list[Tracklet]()
+        for person in self.persons():
+            others += [part for part in person if part not in parts]
+        return others
 
     def chosen(
         self,
@@ -246,15 +266,24 @@ class People:
         name: Callable[[int], str],
         scale: float = 1.0,
     ) -> tuple[list[Tracklet], str]:
-        """Return the parts of the person who is followed, and what there is to say where there are several.
+        """Return the parts of the person to follow, and a sentence.
 
-        `name` names a frame; places in `choice` and in words are `scale` times as large as in masks. Raises
-        NoPersonError where nobody has the number.
+        The sentence says who is followed. It is empty if there are not several people.
+
+        Args:
+            choice: The person's number, a point at which they appear, or a function
+                that returns the number. By default the first one is followed.
+            name: Returns the name of a frame, for the sentence.
+            scale: Pixels of `choice` and of the sentence per pixel of the masks.
+
+        Raises:
+            NoPersonError: There are fewer people than the number.
+
         """
         persons = self.persons()
         if not persons:
             return [], ""
-        # of the part that shows them best: the others may be noise
+        # the first part shows the person best, and the others may be noise
         where = [person[0].first for person in persons]
         number = 1
         other = "--person N another"
@@ -271,7 +300,8 @@ class People:
             number = 1 + int(np.argmin(away))
         if not 1 <= number <= len(persons):
             raise NoPersonError(
-                f"person must be 1 to {len(persons)}, as many people as there are, got {number}"
+                f"person must be 1 to {len(persons)}, as many people as there are, "
+                f"got {number}"
             )
         if len(persons) == 1:
             return persons[0], ""
@@ -287,77 +317,123 @@ class People:
 def _owners(
     tracklets: Sequence[Tracklet], blobs: Sequence[_Blob], frame: int
 ) -> dict[int, Tracklet]:
-    """Return whose each blob is, by its number, so that all are as near as possible to where they are expected."""
+    """Return the person of each blob by the blob's index.
+
+    The total distance is least. Blobs that are too far from everyone are missing.
+    """
     if not tracklets or not blobs:
         return {}
     distances = np.array(
         [[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets]
     )
     if 1 in distances.shape:
+        # one person or one blob: the nearest pair is the assignment
         pairs = [divmod(int(distances.argmin()), len(blobs))]
     else:
         # takes a third of a second to import
         from scipy.optimize import linear_sum_assignment
 
-        rows, columns = linear_sum_assignment(np.minimum(distances, 1e6))
+        rows, columns = linear_sum_assignment(np.minimum(distances, UNREACHABLE))
         pairs = list(zip(rows.tolist(), columns.tolist(), strict=True))
-    return {
-        column: tracklets[row]
-        for row, column in pairs
-        if np.isfinite(distances[row, column])
-    }
+    owners = dict[int, Tracklet]()
+    for row, column in pairs:
+        if np.isfinite(distances[row, column]):
+            owners[column] = tracklets[row]
+    return owners
+
+
+def _score(person: Sequence[Tracklet]) -> float:
+    return sum(part.score for part in person)
+
+
+def _are_apart(tracklet: Tracklet, person: Sequence[Tracklet]) -> bool:
+    """Return whether no frame shows both a tracklet and a part of a person."""
+    frames = tracklet.detections.keys()
+    return all(frames.isdisjoint(part.detections) for part in person)
+
+
+def _least_distance(tracklet: Tracklet, person: Sequence[Tracklet]) -> float:
+    return min(_distance(tracklet, part) for part in person)
 
 
 def _distance(tracklet: Tracklet, other: Tracklet) -> float:
-    """Return how far two parts of a film are from being one person's, in heights."""
+    """Return how unlikely it is that two tracklets show one person, in heights."""
     first, second = sorted((tracklet, other), key=lambda part: min(part.detections))
     start = min(second.detections)
     _, *place = second.first
     colour = float(np.abs(first.colours - second.colours).mean())
     away = float(np.linalg.norm(np.array(place) - first.latest.place)) / first.height
     size = float(abs(np.log(second.area / first.area)))
-    return (
-        COLOUR * colour + AREA * size + away / (1.0 + max(0, start - first.last) / 30.0)
-    )
+    # the longer a person was hidden, the farther they may have walked
+    gap = max(0, start - first.last) / GAP_FRAMES
+    return COLOUR * colour + AREA * size + away / (1.0 + gap)
+
+
+def _widened(mask: NDArray[Any], height: float) -> Mask:
+    """Return a mask widened by `SLACK` of a person's height."""
+    width = 2 * round(SLACK * height) + 1
+    return cv2.dilate(mask, np.ones((width, width), dtype=np.uint8)) > 0
 
 
 def _share(blob: _Blob, group: Sequence[Tracklet], frame: int) -> None:
-    """Give each of a group in a blob what lies where they alone are expected; the rest of it is unknown."""
+    """Divide a blob among the people in it.
+
+    Each gets the pixels where nobody else is expected. The rest of the blob is unknown.
+    """
     outlines = [tracklet.outline(frame) for tracklet in group]
     count = np.sum(outlines, axis=0)
     for tracklet, outline in zip(group, outlines, strict=True):
         clear = blob.mask & outline & (count == 1)
-        tracklet.detections[frame] = cut_out(clear), cut_out(blob.mask & ~clear)
+        hidden = blob.mask & ~clear
+        tracklet.detections[frame] = Detection(cut_out(clear), cut_out(hidden))
 
 
 def part_at(parts: Sequence[Tracklet], frame: int) -> Tracklet | None:
-    """Return the part of a person that a frame shows; of several, which are noise, that of the largest box."""
-    shown = [part for part in parts if frame in part.detections]
-    return max(shown, key=lambda part: part.detections[frame][0][1].size, default=None)
+    """Return the part of a person that a frame shows, or None.
+
+    Only parts that are noise can be in one frame. The one with the largest box is
+    returned then.
+    """
+    present = [part for part in parts if frame in part.detections]
+
+    def size(part: Tracklet) -> int:
+        return part.detections[frame].shown.bits.size
+
+    return max(present, key=size, default=None)
 
 
 def rows_of(
     parts: Sequence[Tracklet], blanks: Sequence[dict[str, Any]]
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Return the rows of a person in all frames, and in those that do not show others before or behind them.
+    """Return the rows of a person in all frames, and in frames without an overlap.
 
-    `blanks` are the rows of frames that do not show the person.
+    Args:
+        parts: The parts of the person.
+        blanks: For each frame, the row to use if it does not show the person.
+
     """
     rows = list[dict[str, Any]]()
     apart = list[dict[str, Any]]()
     for k, blank in enumerate(blanks):
         part = part_at(parts, k)
         rows.append(blank if part is None else part.rows[k])
-        if part is None or part.detections[k][1] is None:
+        if part is None or part.detections[k].hidden is None:
             apart.append(rows[-1])
     return rows, apart
 
 
 def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
-    """Return the index of the person in the mask of each frame; for a mask beside everyone, that of the mask before.
+    """Return the index of the person whom the mask of each frame shows, or None.
 
-    None where a mask is empty, covers more than half as much of another, or is beside everyone while the person before
-    is elsewhere; and everywhere if all masks are, or if most cover several people, who are parts of one then.
+    A mask that shows nobody gets the previous frame's person, unless this person is
+    elsewhere. The result is None for an empty mask, and for one that covers several
+    people about equally. It is None for all frames if every mask shows nobody, or if
+    most masks cover several people: they are probably parts of one person.
+
+    Args:
+        persons: The people.
+        masks: The mask (height, width) of each frame, from another segmenter.
+
     """
     beside = -1
     result = list[int | None]()
@@ -365,13 +441,15 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     for k, mask in enumerate(masks):
         present = [part_at(parts, k) for parts in persons]
         pixels = [
-            (0, 0) if part is None else _common(part.detections[k][0], mask)
+            (0, 0) if part is None else _common(part.detections[k].shown, mask)
             for part in present
         ]
-        areas, shares = np.array(pixels).T
+        areas, shares = np.array(pixels).T  # (people,) pixels of each, and in the mask
         *_, second, most = sorted(shares)
-        clear = mask.any() and most >= CLEARER * second
-        result.append((int(shares.argmax()) if most else beside) if clear else None)
+        if not mask.any() or most < CLEARER * second:
+            result.append(None)
+        else:
+            result.append(int(shares.argmax()) if most else beside)
         if mask.any() and (areas > 0).sum() > 1:
             several.append((2 * shares > areas).sum() > 1)
     latest = next((index for index in result if index not in (None, beside)), None)
@@ -386,20 +464,21 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
 
 
 def _common(cut: Cut, mask: Mask) -> tuple[int, int]:
-    """Return how many pixels a mask has that has been cut out, and how many of them are another's, too."""
-    box, bits = cut
-    part = mask[box]
-    own = unpacked(bits, part.shape[::-1])
+    """Return how many pixels a cut has, and how many of them a mask has, too."""
+    part = mask[cut.box]
+    own = unpacked(cut.bits, part.shape[::-1])
     return int(own.sum()), int((part & own).sum())
 
 
 def replace_detection(
     parts: Sequence[Tracklet], frame: int, mask: Mask, row: dict[str, Any]
 ) -> None:
-    """Give a person another mask, and its row of `FrameQuality`, in a frame."""
+    """Replace a person's mask in a frame, and its row of `FrameQuality`."""
     part = part_at(parts, frame) or parts[0]
-    _, hidden = part.detections.get(frame, (None, None))
-    part.detections[frame], part.rows[frame] = (cut_out(mask), hidden), row
+    before = part.detections.get(frame)
+    hidden = None if before is None else before.hidden
+    part.detections[frame] = Detection(cut_out(mask), hidden)
+    part.rows[frame] = row
 
 
 def excluded_mask(
@@ -408,41 +487,58 @@ def excluded_mask(
     frame: int,
     size: tuple[int, int],
 ) -> Mask:
-    """Return where one of several people surely is not in a frame of a size: where the others are, and far away."""
-    mask, own = (np.zeros(size[::-1], dtype=bool) for _ in range(2))
+    """Return where a person cannot be in a frame: at the others, and far away.
+
+    Args:
+        parts: The parts of the person.
+        others: The parts of all other people.
+        frame: The frame.
+        size: Its width and height.
+
+    """
+    mask = np.zeros(size[::-1], dtype=bool)
     for other in others:
         if frame in other.detections:
-            paste(other.detections[frame][0], mask)
-    width = 2 * round(SLACK * max((other.height for other in others), default=0.0)) + 1
-    mask = (
-        cv2.dilate(mask.astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
-    )
-    if (part := part_at(parts, frame)) is not None:
-        for cut in part.detections[frame]:
-            if cut is not None:
-                paste(cut, own)
-        mask &= ~own
-        near = np.zeros_like(mask)
-        near[padded_box(own, round(AROUND * part.height))] = True
-        mask |= ~near
+            paste(other.detections[frame].shown, mask)
+    tallest = max((other.height for other in others), default=0.0)
+    mask = _widened(mask.astype(np.uint8), tallest)
+    part = part_at(parts, frame)
+    if part is None:
+        return mask
+    own = np.zeros_like(mask)
+    for cut in part.detections[frame]:
+        if cut is not None:
+            paste(cut, own)
+    mask &= ~own
+    near = np.zeros_like(mask)
+    near[padded_box(own, round(AROUND * part.height))] = True
+    mask |= ~near
     return mask
 
 
 def planes_of(
     parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, known: Mask
 ) -> tuple[Mask, Mask]:
-    """Return the mask of a person in a frame, and which pixels are known: none of the others', or of those before them.
+    """Return the mask of a person in a frame, and which pixels are known.
 
-    `known` are those that the picture shows.
+    Pixels of other people are unknown, because the person may be behind them.
+
+    Args:
+        parts: The parts of the person.
+        others: The parts of all other people.
+        frame: The frame.
+        known: (height, width) the pixels that the picture shows.
+
     """
     mask = np.zeros_like(known)
     unknown = np.zeros_like(known)
-    if (part := part_at(parts, frame)) is not None:
+    part = part_at(parts, frame)
+    if part is not None:
         shown, hidden = part.detections[frame]
         paste(shown, mask)
         if hidden is not None:
             paste(hidden, unknown)
     for other in others:
         if frame in other.detections:
-            paste(other.detections[frame][0], unknown)
+            paste(other.detections[frame].shown, unknown)
     return mask, (known | mask) & ~(unknown & ~mask)

@@ -1,7 +1,7 @@
-"""Signs of whether masks taken from video are a person's: of each frame, of the whole video, and between cameras.
+"""Judge whether segmented masks show a person: per frame, per video, between cameras.
 
-The true mask is unknown. A frame's mask is compared with its picture, the pictures shortly before, and the background
-that was learned, where there is one.
+The true mask is unknown. So a frame's mask is compared with its picture, with earlier
+pictures, and with the learned background if the segmenter has one.
 """
 
 from collections import deque
@@ -21,47 +21,59 @@ from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import SAMPLES, Image, Person
 from posefit.silhouette.mask import Mask, Silhouette, box_of, padded_box
 
-# of a frame
-AREA_FRAMES = 15  # latest frames that a frame's area is compared with
-# a frame whose area differs by more than this share from the latest is not usable
+# per frame
+AREA_FRAMES = 15  # number of earlier frames that a frame's area is compared with
+# share by which a usable frame's area may differ from the earlier ones
 AREA_CHANGE = 0.5
-# the area of a person's silhouette over the square of its longer side: 0.08 to 0.47 in 1,296 poses of the library,
-# from any side
+# area of a silhouette over the square of its longer side. In 1,296 poses of the
+# library, seen from all sides, it is 0.08 to 0.47
 FILL = (0.07, 0.5)
-# pixels of the longer side below which a person cannot be distinguished from noise
+# pixels: a silhouette with a shorter longer side could be noise
 MIN_SIDE = 12
 LAG = 0.1  # seconds between two pictures that are compared for motion
-MOVING_LEVELS = 25  # grey levels by which a pixel that moved has changed
-# of the person's longer side: motion is searched as far as that from the mask
+MOVING_LEVELS = 25  # grey levels by which a pixel changes if something moved
+# share of the person's longer side: how far from the mask motion is searched
 MOTION_REACH = 0.5
 
-# of a video
-# needs no background: for a person who is always in the picture
+# per video
+# the segmenter that needs no background, for a person who is always in the picture
 PEOPLE_SEGMENTER = "mediapipe"
-# more of what moves lies outside the masks, in half of the frames: they are not the
-# person
+# share of the moving pixels outside the masks, as a median over frames: with more, the
+# masks are not the person
 UNEXPLAINED = 0.3
-# changes of the longer side and the area from frame to frame that one in ten exceeds
+# shares by which the longer side and the area change from frame to frame: the masks are
+# unsteady if more than one frame in ten changes more
 TALLER = 0.15
 LARGER = 0.25
-GHOSTS = 0.1  # of the frames with masks of an empty place: worth a warning
+CHANGE_PERCENTILE = 90
+# share of the frames whose masks show an empty place: with more, the user is warned
+GHOSTS = 0.1
 
 # between cameras
-# of the person's height: rays to the middles of masks that pass each other by more do
-# not meet in a person
+# share of the person's height by which rays through the middles of masks may miss each
+# other
 APART = 0.7
-# times their height: what a person may seem, from above, crouching, or with the arms up
+# a person's apparent height, times the real one: crouching or seen from above, and with
+# the arms up
 SHORT = 0.45
 TALL = 1.9
 
 
 class FrameQuality:
-    """Compares the mask of one frame after the other with the pictures; its rows become quality.csv."""
+    """Compares masks with their pictures. Its rows become quality.csv."""
 
     def __init__(
         self, fps: float, background: Image | None = None, *, still: bool = True
     ) -> None:
-        """Where the background need not be `still`, what moves outside a mask does not count."""
+        """Start with the first frame.
+
+        Args:
+            fps: Frames per second.
+            background: The learned picture of the empty scene, if there is one.
+            still: Whether the background must be still. If not, motion outside a mask
+                is not counted.
+
+        """
         self._still = still
         self._edges = None if background is None else _edges(background)
         self._before: deque[tuple[Image, Mask]] = deque(maxlen=max(1, round(LAG * fps)))
@@ -69,9 +81,10 @@ class FrameQuality:
         self._sides: deque[int] = deque(maxlen=AREA_FRAMES)
 
     def row(self, image: Image, person: Person, frame: int) -> dict[str, Any]:
-        """Return a frame's row: usable where the mask is whole, looks like a person and covers what moves.
+        """Return the row of quality.csv for the next frame.
 
-        Its area must not be far from that of the frames before either, where they are like a person's.
+        The frame is usable if its mask is whole, has the shape of a person, covers what
+        moves, and has about the area of earlier masks that may be a person.
         """
         side = max(cv2.boundingRect(person.mask.astype(np.uint8))[2:])
         outside = self._outside(image, person, side)
@@ -105,7 +118,7 @@ class FrameQuality:
         }
 
     def _outside(self, image: Image, person: Person, side: int) -> float:
-        """Return which share of the pixels that moved, at the person and around, lies outside the mask."""
+        """Return the share of the moving pixels near the person outside the mask."""
         if not self._still or not self._before or not person.area:
             return 0.0
         earlier, mask = self._before[0]
@@ -117,16 +130,17 @@ class FrameQuality:
         return outside / moved if moved else 0.0
 
     def _is_ghost(self, image: Image, mask: Mask) -> bool:
-        """Return whether the outline of a mask is an edge of the background rather than of the picture.
+        """Return whether a mask's outline is an edge in the background only.
 
-        There a person who was learned into the background has gone away.
+        Such a mask shows the place that a person has left who was learned into the
+        background.
         """
         if self._edges is None or not mask.any():
             return False
-        box = padded_box(mask, 2)  # what is farther away changes no edge at the mask
-        inner = (
-            cv2.erode(mask[box].astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) > 0
-        )
+        # edges at the mask depend on no pixel farther away
+        box = padded_box(mask, 2)
+        kernel = np.ones((3, 3), dtype=np.uint8)
+        inner = cv2.erode(mask[box].astype(np.uint8), kernel) > 0
         outline = mask[box] & ~inner
         now = _edges(image[box])[outline]
         before = self._edges[box][outline]
@@ -134,62 +148,77 @@ class FrameQuality:
 
 
 def changed_pixels(image: Image, earlier: Image) -> Mask:
-    """Return which pixels (height, width) changed from one picture to another, but for single ones, which are noise."""
-    levels = cv2.split(cv2.absdiff(image, earlier))
-    changed = np.asarray(
-        cv2.max(cv2.max(levels[0], levels[1]), levels[2]) > MOVING_LEVELS,
-        dtype=np.uint8,
-    )
+    """Return which pixels (height, width) changed between two pictures, less noise."""
+    blue, green, red = cv2.split(cv2.absdiff(image, earlier))
+    largest = cv2.max(cv2.max(blue, green), red)
+    changed = np.asarray(largest > MOVING_LEVELS, dtype=np.uint8)
+    # single pixels are noise
     return np.asarray(cv2.medianBlur(changed, 5) > 0)
 
 
 def moved_pixels(
     changed: Mask, region: Mask, body: Mask, reach: float, slack: float
 ) -> tuple[int, int]:
-    """Return how many pixels changed in a region and around, and how many of them lie at the body.
+    """Return how many pixels changed near a region, and how many of them at the body.
 
-    Around is as near as half of `reach`, the person's longer side in pixels, and at the body as near as `slack` of it.
+    Args:
+        changed: Which pixels changed.
+        region: Where the person is or was.
+        body: The pixels of the body.
+        reach: The person's longer side in pixels. Pixels up to `MOTION_REACH` of it
+            around the region are counted.
+        slack: Share of `reach` up to which a pixel is at the body.
+
     """
-    (left, top, right, bottom), far = box_of(region), round(MOTION_REACH * reach)
+    left, top, right, bottom = box_of(region)
+    far = round(MOTION_REACH * reach)
     window = np.s_[max(0, top - far) : bottom + far, max(0, left - far) : right + far]
     width = 2 * max(1, round(slack * reach)) + 1
-    near = (
-        cv2.dilate(
-            body[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)
-        )
-        > 0
-    )
+    kernel = np.ones((width, width), dtype=np.uint8)
+    near = cv2.dilate(body[window].astype(np.uint8), kernel) > 0
     return int(changed[window].sum()), int((changed[window] & near).sum())
 
 
+# the weights of a 3 x 3 Sobel filter add up to 8 grey levels per pixel
+SOBEL_SCALE = 1.0 / 8.0
+
+
 def _edges(image: Image) -> NDArray[np.float32]:
-    """Return how strong an edge is at each pixel (height, width), or next to it, in grey levels a pixel."""
+    """Return the strongest edge within one pixel of each (height, width).
+
+    It is in grey levels per pixel.
+    """
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
-    across, down = (
-        cv2.Sobel(grey, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1))
-    )
-    return np.asarray(
-        cv2.dilate(cv2.magnitude(across, down), np.ones((3, 3), dtype=np.uint8)),
-        dtype=np.float32,
-    )
+    across = cv2.Sobel(grey, cv2.CV_32F, 1, 0, scale=SOBEL_SCALE)
+    down = cv2.Sobel(grey, cv2.CV_32F, 0, 1, scale=SOBEL_SCALE)
+    kernel = np.ones((3, 3), dtype=np.uint8)
+    strongest = cv2.dilate(cv2.magnitude(across, down), kernel)
+    return np.asarray(strongest, dtype=np.float32)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is wrong with the masks of a video, and whether that is too much to go on."""
+    """What is wrong with the masks of a video."""
 
     text: str
-    refused: bool
+    refused: bool  # whether tracking them makes no sense
 
 
 def verdict(
     rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool
 ) -> Verdict | None:
-    """Return what is wrong with masks, by the rows of `FrameQuality`; None where nothing is.
+    """Return what is wrong with the masks of a video; None if nothing is.
 
-    `learned`: the segmenter was given no picture of the empty scene. Masks are refused where much moves outside them
-    and their size jumps, or where it jumps and few frames are usable or most masks are in pieces. Either alone may be
-    another person, or clothes like the background, and is a warning.
+    Masks are refused if their size jumps, and much moves outside them, few frames are
+    usable, or most masks are in pieces. Motion outside alone may be another person, and
+    a jumping size alone clothes like the background; they are warnings.
+
+    Args:
+        rows: The rows of `FrameQuality`.
+        method: Name of the segmenter.
+        learned: Whether the segmenter learned the background from the video itself, and
+            not from a picture of the empty scene.
+
     """
     whole = [row for row in rows if row["area"] and not row["touches_border"]]
     usable = sum(row["usable"] for row in whole)
@@ -197,38 +226,46 @@ def verdict(
     none = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
     cut = sum(bool(row["touches_border"]) for row in rows)
     if cut > MOST * len(rows):
-        none = f"expected a person who is whole in the picture, got one at its edge in {cut} of {len(rows)} frames"
+        none = (
+            "expected a person who is whole in the picture, got one at its edge in "
+            f"{cut} of {len(rows)} frames"
+        )
     if len(whole) < MIN_DETECTIONS:
         return None if usable else Verdict(none, True)
     outside = float(np.median([row["beside"] for row in whole]))
     pairs = [(a, b) for a, b in pairwise(whole) if b["frame"] == a["frame"] + 1]
-    taller, larger = (_change(pairs, name) for name in ("longer_side", "area"))
+    taller = _change(pairs, "longer_side")
+    larger = _change(pairs, "area")
     unsteady = taller > TALLER or larger > LARGER
     ghosts = float(np.mean([row["ghost"] for row in whole]))
     broken = float(np.mean([row["pieces"] > 1 for row in whole]))
     moves = f"{outside:.0%} of what moves"
     changes = f"change by {larger:.0%} from frame to frame"
     if outside > UNEXPLAINED and unsteady:
-        where = (
-            "the person seems to stand in the background"
-            if learned
-            else "the masks do not show the whole person"
-        )
+        where = "the masks do not show the whole person"
+        if learned:
+            where = "the person seems to stand in the background"
         text = f"{where}: {moves} lies outside the masks, and they {changes}"
         refused = True
     elif ghosts > GHOSTS:
-        text = f"{ghosts:.0%} of the masks show a place that is empty now: the person was learned into the background"
+        text = (
+            f"{ghosts:.0%} of the masks show a place that is empty now: the person was "
+            "learned into the background"
+        )
         refused = ghosts > MOST
     elif not usable:
         return Verdict(none, True)
     elif unsteady:
-        pieces = (
-            f" and are in pieces in {broken:.0%} of the frames" if broken > MOST else ""
-        )
+        pieces = ""
+        if broken > MOST:
+            pieces = f" and are in pieces in {broken:.0%} of the frames"
         text = f"the masks {changes}{pieces}: parts of the person seem to be missing"
         refused = usable < MOST * len(whole) or broken > MOST
     elif outside > UNEXPLAINED:
-        text = f"{moves} near the person lies outside the masks, which may miss parts of the person"
+        text = (
+            f"{moves} near the person lies outside the masks, which may miss parts of "
+            "the person"
+        )
         refused = False
     else:
         return None
@@ -236,7 +273,7 @@ def verdict(
 
 
 def advice(method: str, *, learned: bool) -> str:
-    """Return what to do instead of a segmenter, after a semicolon."""
+    """Return what a user may try instead of a segmenter, starting with a semicolon."""
     if method == PEOPLE_SEGMENTER:
         return "; --roi says where to look"
     empty = "give --background with an empty picture, or " if learned else ""
@@ -246,46 +283,56 @@ def advice(method: str, *, learned: bool) -> str:
 def _change(
     pairs: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]], name: str
 ) -> float:
-    """Return by which share a value changes from frame to frame in one frame of ten, or by more."""
+    """Return the share by which a value changes from frame to frame.
+
+    One frame in ten changes by this share or more.
+    """
     if not pairs:
         return 0.0
-    return float(
-        np.expm1(np.percentile([abs(np.log(b[name] / a[name])) for a, b in pairs], 90))
-    )
+    ratios = [abs(np.log(after[name] / before[name])) for before, after in pairs]
+    return float(np.expm1(np.percentile(ratios, CHANGE_PERCENTILE)))
 
 
 def extent_of(silhouette: Silhouette) -> tuple[Array, float]:
-    """Return the middle (2,) and the height in pixels of a silhouette's bounding box."""
+    """Return the middle (2,) and the height of a silhouette's box, in pixels."""
     left, top, right, bottom = box_of(silhouette.mask)
     return 0.5 * np.array([left + right, top + bottom]), float(bottom - top)
 
 
 def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array, Array]:
-    """Return where (3,) the rays of cameras through pixels (2,) meet best, and how far (n,) it is from each."""
-    rays = [
-        camera.rotation.T @ np.array([*((middle - camera.centre) / camera.focal), 1.0])
-        for camera, middle in zip(cameras, middles, strict=True)
-    ]
-    across = [np.eye(3) - np.outer(ray, ray) / (ray @ ray) for ray in rays]
+    """Return where the rays of cameras meet best.
+
+    Args:
+        cameras: n cameras.
+        middles: The pixel (2,) of each camera that its ray passes through.
+
+    Returns:
+        The point (3,) with the least squared distances from all rays, and its distance
+        (n,) from each ray.
+
+    """
     positions = [camera.position for camera in cameras]
-    place = np.linalg.lstsq(
-        np.sum(across, axis=0),
-        np.sum([a @ p for a, p in zip(across, positions, strict=True)], axis=0),
-    )[0]
-    return place, np.array(
-        [
-            np.linalg.norm(a @ (place - p))
-            for a, p in zip(across, positions, strict=True)
-        ]
-    )
+    # the projection (3, 3) onto the plane across each ray
+    across = list[Array]()
+    for camera, middle in zip(cameras, middles, strict=True):
+        in_camera = np.array([*((middle - camera.centre) / camera.focal), 1.0])
+        ray = camera.rotation.T @ in_camera
+        across.append(np.eye(3) - np.outer(ray, ray) / (ray @ ray))
+    rays = list(zip(across, positions, strict=True))
+    # the normal equations of the least squares
+    left = np.sum(across, axis=0)
+    right = np.sum([plane @ position for plane, position in rays], axis=0)
+    place = np.linalg.lstsq(left, right)[0]
+    away = [np.linalg.norm(plane @ (place - position)) for plane, position in rays]
+    return place, np.array(away)
 
 
 def apparent_sizes(
     observations: Observations, cameras: Sequence[Camera]
 ) -> tuple[float, Array] | None:
-    """Return by how much the rays of cameras to the person miss each other, and how tall the person is in each view.
+    """Return the medians of `apparent_size` over frames; None if none is usable.
 
-    Both are medians over frames, in the cameras' unit; None where no frame is usable in all views.
+    A frame is usable here if it is usable in all views.
     """
     count = len(observations)
     each = [view.usable[:count] for view in observations.views]
@@ -306,30 +353,50 @@ def apparent_sizes(
 def apparent_size(
     cameras: Sequence[Camera], extents: Sequence[tuple[Array, float]]
 ) -> tuple[float, Array]:
-    """Return by how much the rays of cameras to a person miss each other, and how tall the person is in each view.
+    """Return how well several cameras agree on a person's place and height.
 
-    `extents` are the middle (2,) and the height of the person in each picture. What lies behind a camera has a height
-    below 0.
+    Args:
+        cameras: n cameras.
+        extents: The middle (2,) and the height of the person in each picture, in
+            pixels.
+
+    Returns:
+        By how much the rays through the middles miss each other, and how tall (n,) the
+        person is in each view, both in the cameras' unit. A height is negative if the
+        rays meet behind that camera.
+
     """
     place, away = meeting(cameras, [middle for middle, _ in extents])
-    per_view = zip(cameras, extents, strict=True)
-    heights = [
-        tall * (camera.rotation @ place + camera.translation)[2] / camera.focal[1]
-        for camera, (_, tall) in per_view
-    ]
+    heights = list[float]()
+    for camera, (_, tall) in zip(cameras, extents, strict=True):
+        depth = (camera.rotation @ place + camera.translation)[2]
+        heights.append(tall * depth / camera.focal[1])
     return 2.0 * float(away.max()), np.array(heights)
 
 
 def disagreement(miss: float, tall: Array, stature: float) -> str | None:
-    """Return what is wrong between `apparent_sizes` and a person of a height, all in metres, if anything."""
+    """Return why cameras cannot all see one person; None if they can.
+
+    Args:
+        miss: By how much their rays miss each other, see `apparent_size`.
+        tall: (n,) how tall the person seems in each view.
+        stature: The person's height. All are in metres.
+
+    """
     reasons = (
         "the masks show only parts of the person, or another one, "
         "or the calibrations are in another order or unit"
     )
     if miss > APART * stature:
-        return f"expected cameras that see one person, got views that pass each other by {miss:.1f} m: {reasons}"
+        return (
+            "expected cameras that see one person, got views that disagree by "
+            f"{miss:.1f} m: {reasons}"
+        )
     wrong = np.flatnonzero((tall < SHORT * stature) | (tall > TALL * stature))
     if len(wrong):
         k = int(wrong[0])
-        return f"expected a person of {stature:.2f} m, got masks {tall[k]:.2f} m tall in view {k + 1}: {reasons}"
+        return (
+            f"expected a person of {stature:.2f} m, got masks {tall[k]:.2f} m tall in "
+            f"view {k + 1}: {reasons}"
+        )
     return None

@@ -1,4 +1,4 @@
-"""A scene: the person, the cameras and their observations, of a known motion or of footage."""
+"""The `Scene` that a tracker gets, and how it is made from a known motion."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,44 +20,49 @@ from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
-# default place of the camera of a synthetic sequence: 0 is in front, 90 to the side
+# default camera around a known motion: 0 is in front of the person, 90 to the side
 VIEW_DEGREES = 45.0
+# keeps the random numbers of corruptions apart from a search with the same seed
 RNG_STREAM_CORRUPTION = 2010
-# cameras are the user's, a guess, or set up around a known motion
+# cameras are the user's, a guess, or placed around a known motion
 Placing = Literal["given", "guessed", "placed"]
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a tracker gets, whatever it came from: the person, the cameras, and the observations."""
+    """The person, the cameras and the observations: all that a tracker gets."""
 
     name: str
     body: Body
     cameras: Sequence[Camera]
-    fps: float
-    count: int
-    yaw: float | None  # radians: about where the person faces at first
-    anchor: Array  # (3,) metres: about where the root is at first
-    truth: Motion | None
+    fps: float  # frames per second
+    count: int  # number of frames
+    # radians: about which way the person faces in the first usable frame
+    yaw: float | None
+    anchor: Array  # (3,) metres: about where the person's root is then
+    truth: Motion | None  # the known motion; None for footage
     observations: Sequence[Observation] = field(repr=False)
     placing: Placing = "placed"
-    warnings: Sequence[str] = ()  # what a user should know before they trust it
-    guesses: Sequence[str] = ()  # what the sources do not state, and posefit assumes
-    # yields the first camera's video frames, of its size; None where there is no video
+    warnings: Sequence[str] = ()  # what a user should know before trusting a track
+    guesses: Sequence[str] = ()  # what the sources do not state and posefit assumes
+    # yields the first camera's video frames, at its size; None without a video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
-    # the number of the first frame in the footage, or in the whole motion
+    # number of the first frame in the footage, or in the whole motion
     first: int = 0
-    camera_moves: bool = False  # whether the first camera seems to
-    # wall and CPU time that it took to read
+    camera_moves: bool = False  # whether the first camera seems to move
+    # wall and CPU time that reading took
     reading_seconds: tuple[float, float] = (0.0, 0.0)
 
     @property
     def cameras_turn(self) -> bool:
-        """Whether cameras may be turned a little from their calibrations, which several masks show to be off."""
+        """Whether the tracker may turn cameras a little from their calibrations.
+
+        Only the masks of several cameras show whether a calibration is inexact.
+        """
         return len(self.cameras) > 1 and self.placing == "given"
 
     def motion(self, frames: Sequence[Frame]) -> Motion:
-        """Return the person's motion that some frames estimate."""
+        """Return the tracked frames as a motion of the person."""
         poses = np.array([frame.pose for frame in frames])
         places = np.array([frame.translation for frame in frames])
         return Motion(
@@ -73,9 +78,20 @@ def synthetic(
     frames: Range,
     guesses: Sequence[str] = (),
 ) -> Scene:
-    """Return the scene of a known motion; its masks are drawn frame by frame as they are needed.
+    """Return the scene of a known motion, with masks that are rasterised on demand.
 
-    Without cameras there is one at each of `views_degrees`, which frames the whole motion.
+    Args:
+        motion: The motion, which becomes the scene's truth.
+        views_degrees: Without `cameras`, one camera is placed at each of these angles
+            around the person, so that it frames the whole motion. 0 is in front.
+        size: Width and height of these cameras' pictures.
+        cameras: Cameras to use instead.
+        frames: Which frames of the motion to use.
+        guesses: What was guessed about the cameras.
+
+    Raises:
+        InputError: A camera does not see the person in the first or the last frame.
+
     """
     body = Body.of(motion.skeleton)
     placing: Placing = "given" if cameras else "placed"
@@ -112,7 +128,7 @@ def synthetic(
 
 @dataclass(frozen=True, eq=False)
 class LazyObservations(Sequence[Observation]):
-    """Observations of so many frames, each made by `at(k)` when it is needed."""
+    """Observations that `at(k)` makes on demand, for k from 0 to `frames` - 1."""
 
     frames: int
     at: Callable[[int], Observation] = field(repr=False)
@@ -127,7 +143,7 @@ class LazyObservations(Sequence[Observation]):
 
 
 def rendered(motion: Motion, body: Body, cameras: Sequence[Camera]) -> LazyObservations:
-    """Return the observations of a known motion."""
+    """Return the observations of a known motion, rasterised on demand."""
     return LazyObservations(len(motion), partial(_rendered, motion, body, cameras))
 
 
@@ -136,31 +152,35 @@ def _rendered(
 ) -> Observation:
     pose = motion.poses[k]
     translation = motion.translations[k]
-    with uncounted():  # to show a known motion is no evaluation
+    # rasterising the truth must not count as an evaluation of the search
+    with uncounted():
         masks = [project(body, camera, pose, translation) for camera in cameras]
     return Observation([Silhouette.of(mask) for mask in masks], translation)
 
 
 def observed_views(scene: Scene) -> list[View]:
-    """Return what the cameras of a scene saw."""
+    """Return a view of each camera of a scene, with all of its masks."""
     observations = list(scene.observations)
     numbers = scene.first + np.arange(scene.count)
-    return [
-        View(
-            scene.name,
-            numbers,
-            times_of(numbers, scene.fps),
-            np.array([np.packbits(each.silhouettes[k].mask) for each in observations]),
-            np.array([np.packbits(each.silhouettes[k].valid) for each in observations]),
-            np.array([each.usable for each in observations]),
-            (camera.width, camera.height),
+    usable = np.array([each.usable for each in observations])
+    views = list[View]()
+    for k, camera in enumerate(scene.cameras):
+        seen = [each.silhouettes[k] for each in observations]
+        view = View(
+            name=scene.name,
+            numbers=numbers,
+            times=times_of(numbers, scene.fps),
+            bits=np.array([np.packbits(silhouette.mask) for silhouette in seen]),
+            known=np.array([np.packbits(silhouette.valid) for silhouette in seen]),
+            usable=usable,
+            size=(camera.width, camera.height),
             fps=scene.fps,
             counted=True,
             warnings=scene.warnings,
             guesses=scene.guesses,
         )
-        for k, camera in enumerate(scene.cameras)
-    ]
+        views.append(view)
+    return views
 
 
 def with_corruption(
@@ -169,10 +189,17 @@ def with_corruption(
     dropped: float,
     seed: int,
 ) -> LazyObservations:
-    """Return observations with corruptions of some strength, and a share of the frames dropped; the same each time."""
-    return LazyObservations(
-        len(observations), partial(_corrupted, observations, noise, dropped, seed)
-    )
+    """Return observations that are corrupted on purpose, the same way for each seed.
+
+    Args:
+        observations: The clean observations.
+        noise: Strength of each corruption by its name, see `corrupted`.
+        dropped: Share of the frames that become unusable. The first frame never does.
+        seed: Seed of the random numbers.
+
+    """
+    at = partial(_corrupted, observations, noise, dropped, seed)
+    return LazyObservations(len(observations), at)
 
 
 def _corrupted(
@@ -184,12 +211,9 @@ def _corrupted(
 ) -> Observation:
     observation = observations[k]
     rng = np.random.default_rng([RNG_STREAM_CORRUPTION, seed, k])
+    # a track starts from the first frame
     lost = k > 0 and rng.random() < dropped
-    masks = [
-        corrupted(silhouette.mask, noise, rng) for silhouette in observation.silhouettes
-    ]
-    return replace(
-        observation,
-        silhouettes=[Silhouette.of(mask) for mask in masks],
-        usable=not lost,
-    )
+    silhouettes = list[Silhouette]()
+    for silhouette in observation.silhouettes:
+        silhouettes.append(Silhouette.of(corrupted(silhouette.mask, noise, rng)))
+    return replace(observation, silhouettes=silhouettes, usable=not lost)

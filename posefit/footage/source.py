@@ -1,12 +1,12 @@
-"""What a user names, a motion or what one camera or several saw, becomes a scene, once.
+"""Recognise what a user names, and turn it into a scene.
 
     from posefit.footage.source import resolve, scene_of
 
-    source = resolve(["a.mp4", "b.mp4"])     # of which kind it is, and the files of each camera
+    source = resolve(["a.mp4", "b.mp4"])     # finds the kind, and the files per camera
     scene = scene_of(source, camera=["cameras.toml"])
 
-A kind of source is a line of `KINDS`: how it is recognised, and the reader, which returns a `View` or a film of which a
-segmenter makes one.
+Each kind of source is a line of `KINDS`: how it is recognised, and its reader. A reader
+returns a `View`, or a film that a segmenter turns into a `View`.
 """
 
 import os
@@ -58,71 +58,90 @@ from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
 from posefit.reading import cut, existing, quoted
 
+# suffixes of other inputs: what ends in one of them is never tried as a video
 NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf")
-# files that a user may well name, what they hold, and what is read of that
+
+
+class _Unread(NamedTuple):
+    """Suffixes that users may well try, but that posefit does not read."""
+
+    suffixes: Sequence[str]
+    what: str  # what such files hold
+    instead: str  # what posefit reads instead
+
+
+# without this table OpenCV would try these files, and call them damaged videos
 UNREAD = (
-    (
-        (
+    _Unread(
+        suffixes=(
             *(".trc", ".c3d", ".fbx", ".glb", ".gltf", ".mvnx", ".mot", ".sto"),
             *(".osim", ".htr", ".v3d", ".vmd", ".usd", ".usda", ".usdc", ".usdz"),
             *(".bip", ".dae", ".blend", ".tsv"),
         ),
-        "motions",
-        " and ".join(MOTIONS),
+        what="motions",
+        instead=" and ".join(MOTIONS),
     ),
-    (
-        (
+    _Unread(
+        suffixes=(
             *(".json", ".xml", ".csv", ".txt", ".yaml", ".yml", ".toml", ".zip"),
             *(".mat", ".h5", ".hdf5", ".pkl", ".pickle", ".pt", ".pth"),
         ),
-        "masks and motions",
-        f"masks as images or {' and '.join(ARRAYS)}, and motions as {' and '.join(MOTIONS)}",
+        what="masks and motions",
+        instead=f"masks as images or {' and '.join(ARRAYS)}, "
+        f"and motions as {' and '.join(MOTIONS)}",
     ),
 )
-SIZE = (320, 240)  # pixels of a rendered picture
-# what a source is of: a motion, masks, a video file, or pictures of a film
+SIZE = (320, 240)  # width and height of rendered masks, by default
+# what a source holds: a motion, masks, a video file, or pictures of a film
 Medium = Literal["motion", "masks", "video", "pictures"]
+# the same, as messages call it
 _MEDIA: dict[Medium, str] = {
     "motion": "a motion",
     "masks": "masks",
     "video": "a video",
     "pictures": "pictures",
 }
-# what a user names of one camera: image files, or masks (T, H, W), or one file
+# what a user names for one camera: a motion or a file, masks (T, H, W), or image files
 Footage = Source | NDArray[Any] | tuple[Path, ...]
-# the same, once it is known to be there
+# the same after `_place`: files are listed, and names of motions are known
 Place = Motion | str | Path | Images | NDArray[Any]
 
 
 class Kind(NamedTuple):
-    """A kind of source, which one reader reads: a function that returns a view, or a film; none reads a motion."""
+    """A kind of source and its reader: `view` for masks, `film` for pictures.
+
+    A motion has neither; `load_motion` reads it.
+    """
 
     medium: Medium
     recognises: Callable[[Place], bool]
-    # of a place, frames, a label, and a rate
+    # (place, frames, label, fps) to the view
     view: Callable[[Any, Range, int | None, float | None], View] | None = None
-    # of a place, and a rate
+    # (place, fps) to the film
     film: Callable[[Any, float | None], Video] | None = None
 
 
 def _is_film(place: Place) -> bool:
-    """Return whether images are a film: there are several, or pages, and the first is a picture in many colours."""
-    return (
-        isinstance(place, Images)
-        and is_photo(place.files[0])
-        and (len(place.files) > 1 or page_count(place.files[0]) > 1)
-    )
+    """Return whether images are a film: several pictures, the first in many colours."""
+    if not isinstance(place, Images):
+        return False
+    first = place.files[0]
+    return is_photo(first) and (len(place.files) > 1 or page_count(first) > 1)
 
 
 def _is_video(place: Place) -> bool:
-    """Return whether a file is a video: what is no other file is. Raises InputError for one that is known not to be."""
+    """Return whether a file may be a video: any suffix that has no other meaning.
+
+    Raises InputError for the suffixes in `UNREAD`.
+    """
     if not isinstance(place, Path):
         return False
     suffix = place.suffix.lower()
-    for suffixes, what, instead in UNREAD:
-        if suffix in suffixes:
+    for unread in UNREAD:
+        if suffix in unread.suffixes:
             raise InputError(
-                f"{existing(place)}: {what} of {suffix} are not read; {instead} are"
+                f"{existing(place)}: {unread.what} of {suffix} are not read; "
+                f"{unread.instead} are"
             )
     return suffix not in ("", *NO_VIDEO)
 
@@ -131,7 +150,7 @@ def _ends_in(suffix: str) -> Callable[[Place], bool]:
     return lambda place: isinstance(place, Path) and place.suffix.lower() == suffix
 
 
-# the first that recognises a source reads it
+# the first kind that recognises a source reads it
 KINDS = (
     Kind("masks", lambda place: isinstance(place, np.ndarray), view=read_array),
     Kind("masks", _ends_in(".npz"), view=read_npz),
@@ -139,34 +158,41 @@ KINDS = (
     Kind("pictures", _is_film, film=Video.of_pictures),
     Kind("masks", lambda place: isinstance(place, Images), view=read_images),
     Kind("video", _is_video, film=lambda place, _: Video.of(place)),
-    Kind("motion", lambda _: True),  # whose names need no suffix
+    Kind("motion", lambda _: True),  # names of motions need no suffix
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Resolved:
-    """What a user named, of which kind it is, and where: found out once."""
+    """A source whose kind is known and whose files are found. Made by `resolve`."""
 
     medium: Medium
-    named: Sequence[Footage]  # of each camera
-    names: Sequence[str]  # what messages call them
-    places: Sequence[Place]
-    kinds: Sequence[Kind]
+    named: Sequence[Footage]  # what the user named, one per camera
+    names: Sequence[str]  # what messages call each
+    places: Sequence[Place]  # where each is
+    kinds: Sequence[Kind]  # what reads each
 
 
 def resolve(source: Any) -> Resolved:
-    """Return what a user names: a source, or a sequence of them, as `sources_of` takes them.
+    """Recognise a source, or a sequence of them, and find its files.
 
-    Raises InputError where it is nothing that is read, or of several kinds.
+    Args:
+        source: As for `sources_of`. A resolved source is returned unchanged.
+
+    Raises:
+        InputError: No reader takes it, a file is missing, or cameras have sources of
+            different kinds.
+
     """
     if isinstance(source, Resolved):
         return source
     named = sources_of(source)
-    for each in named:  # names are in every file that is written
+    for each in named:
+        # every output file states these names, so OpenCV's limits are checked first
         if isinstance(each, str | Path | tuple):
             opencv_name(each[0] if isinstance(each, tuple) else each)
-    places = list(map(_place, named))
-    kinds = [next(kind for kind in KINDS if kind.recognises(each)) for each in places]
+    places = [_place(each) for each in named]
+    kinds = [_kind_of(place) for place in places]
     media = {kind.medium for kind in kinds}
     if len(media) > 1:
         raise InputError(
@@ -175,107 +201,154 @@ def resolve(source: Any) -> Resolved:
     (medium,) = media
     if medium == "motion" and len(named) > 1:
         raise InputError(
-            f"source must be one motion, or views of one person, got {len(named)} motions"
+            "source must be one motion, or views of one person, "
+            f"got {len(named)} motions"
         )
+    places = _with_numbers(places)
+    names = [_name_of(place) for place in places]
+    return Resolved(medium, named, names, places, kinds)
+
+
+def _kind_of(place: Place) -> Kind:
+    """Return the first kind that recognises a source. The last one takes anything."""
+    return next(kind for kind in KINDS if kind.recognises(place))
+
+
+def _with_numbers(places: Sequence[Place]) -> list[Place]:
+    """Return places whose images are in the order of the numbers in their names.
+
+    Cameras are paired by these numbers if all of them have images. If another camera
+    has an .npz file, say, each camera's images are numbered alone.
+    """
     images = [place for place in places if isinstance(place, Images)]
     if len(images) == len(places):
-        places = [*numbered_together(images)]
-    else:
-        places = [
-            numbered_together([place])[0] if isinstance(place, Images) else place
-            for place in places
-        ]
-    return Resolved(medium, named, [*map(_name_of, places)], places, kinds)
+        return [*numbered_together(images)]
+    numbered = list[Place]()
+    for place in places:
+        if isinstance(place, Images):
+            (place,) = numbered_together([place])
+        numbered.append(place)
+    return numbered
 
 
 def first_of(source: Resolved) -> int:
     """Return the number of the first frame that all cameras have.
 
-    An .npz file of masks may state its own; other sources begin at 0.
+    An .npz file of masks may state the number of its first frame. Other sources begin
+    at 0.
     """
-    archives = [
-        place
-        for kind, place in zip(source.kinds, source.places, strict=True)
-        if kind.view is read_npz
-    ]
-    return max((first_number(Path(str(place))) for place in archives), default=0)
+    first = 0
+    for kind, place in zip(source.kinds, source.places, strict=True):
+        if kind.view is read_npz:
+            first = max(first, first_number(Path(str(place))))
+    return first
 
 
 def _place(source: Footage) -> Place:
-    """Return where a source is: a built-in motion's name is never a folder.
+    """Return where a source is.
 
-    A path with a separator and no suffix is a folder, even if it does not exist. Raises InputError for a file whose
-    name says that it is no source.
+    The name of a built-in motion is never taken for a folder. A path with a separator
+    and without a suffix is a folder, even if it does not exist. Raises InputError for a
+    path that cannot be a source.
     """
     if isinstance(source, np.ndarray | Motion):
         return source
     if isinstance(source, tuple):
-        folder = source[0].parent
-        name = str(source[0]) if len(source) == 1 else str(folder)
-        return Images(name if folder.name or len(source) == 1 else "masks", source)
+        return _listed_images(source)
     if source in built_in.names() or recorded.is_recorded(source):
         return source
     path = Path(source)
-    suffix = path.suffix.lower()
     if path.is_dir():
-        if (path / "poses.npz").is_file() and (path / "summary.json").is_file():
-            raise InputError(
-                f"{path}: expected a source, got a track's folder: give the source that it was made from"
-            )
-        images = images_in(path)
-        if not images:
-            raise InputError(
-                f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none"
-            )
-        return Images(str(path), tuple(images))
-    if not suffix and path.is_file():
+        return _images_of_folder(path)
+    if path.suffix:
+        return path
+    if path.is_file():
         raise InputError(
-            f"{path}: expected a name that ends in what the file is, such as .mp4, .npz or .bvh, got no suffix"
+            f"{path}: expected a name that ends in what the file is, such as .mp4, "
+            ".npz or .bvh, got no suffix"
         )
-    if not suffix:
-        return existing(path) if os.sep in str(source) else source
-    return path
+    return existing(path) if os.sep in str(source) else source
+
+
+def _listed_images(files: tuple[Path, ...]) -> Images:
+    """Return images that a user listed, named after their file or their folder."""
+    if len(files) == 1:
+        return Images(str(files[0]), files)
+    folder = files[0].parent
+    return Images(str(folder) if folder.name else "masks", files)
+
+
+def _images_of_folder(folder: Path) -> Images:
+    """Return the images in a folder. Raises InputError if it contains none."""
+    if (folder / "poses.npz").is_file() and (folder / "summary.json").is_file():
+        raise InputError(
+            f"{folder}: expected a source, got a track's folder: give the source that "
+            "it was made from"
+        )
+    images = images_in(folder)
+    if not images:
+        raise InputError(
+            f"{folder}: expected a folder with mask images ({', '.join(IMAGES)}), "
+            "got none"
+        )
+    return Images(str(folder), tuple(images))
 
 
 def _name_of(place: Place) -> str:
+    """Return what messages call a source."""
     if isinstance(place, Images | Motion):
         return place.name
     return "masks" if isinstance(place, np.ndarray) else str(place)
 
 
-_USED_FOR: dict[str, tuple[str, Sequence[Medium]]] = {
-    "extraction": ("video", ["video", "pictures"]),
-    "fps": ("motions, masks and pictures", ["motion", "masks", "pictures"]),
-    "label": ("masks", ["masks"]),
-    "holes": ("masks", ["masks"]),
-    "height": ("footage", ["masks", "video", "pictures"]),
-    "person": ("footage", ["masks", "video", "pictures"]),
-    "size": ("motions", ["motion"]),
+class _Use(NamedTuple):
+    """The sources that an option applies to."""
+
+    where: str  # as messages call them
+    media: Sequence[Medium]
+
+
+_FOOTAGE: Sequence[Medium] = ("masks", "video", "pictures")
+_USED_FOR = {
+    "extraction": _Use("video", ["video", "pictures"]),
+    "fps": _Use("motions, masks and pictures", ["motion", "masks", "pictures"]),
+    "label": _Use("masks", ["masks"]),
+    "holes": _Use("masks", ["masks"]),
+    "height": _Use("footage", _FOOTAGE),
+    "person": _Use("footage", _FOOTAGE),
+    "size": _Use("motions", ["motion"]),
 }
 
 
 def check_used(medium: Medium, view: Mapping[str, Any]) -> None:
-    """Raise InputError where an option is given that sources of this kind have no use for."""
-    for name, (where, media) in _USED_FOR.items():
-        if medium not in media and view.get(name) is not None:
-            raise useless_for(medium, name, view[name], where)
-    if view.get("up") is not None and not view.get("camera") and medium != "motion":
-        raise useless_for(medium, "up", view["up"], "calibrations and files of motions")
-    if (
-        view.get("unit") is not None
-        and medium != "motion"
-        and view.get("asf") is None
-        and not view.get("camera")
-    ):
-        raise useless_for(
-            medium, "unit", view["unit"], "calibrations and files of motions"
-        )
+    """Raise InputError if a given option does not apply to this kind of source.
+
+    Args:
+        medium: The kind of source.
+        view: The options by name; None if not given.
+
+    """
+    for name, use in _USED_FOR.items():
+        if medium not in use.media and view.get(name) is not None:
+            raise useless_for(medium, name, view[name], use.where)
+    if medium == "motion" or view.get("camera"):
+        return
+    # without these files nothing is left that has an axis or a unit
+    files = "calibrations and files of motions"
+    if view.get("up") is not None:
+        raise useless_for(medium, "up", view["up"], files)
+    if view.get("unit") is not None and view.get("asf") is None:
+        raise useless_for(medium, "unit", view["unit"], files)
 
 
 def useless_for(medium: Medium, name: str, value: object, where: str) -> InputError:
-    """Return the error of an option that sources of this kind have no use for, and says for which it is given."""
+    """Return the error for an option that does not apply to this kind of source.
+
+    `where` says which sources the option is for.
+    """
     return InputError(
-        f"{name} must be given for {where} only, got {quoted(value)} for {_MEDIA[medium]}"
+        f"{name} must be given for {where} only, got {quoted(value)} "
+        f"for {_MEDIA[medium]}"
     )
 
 
@@ -298,27 +371,51 @@ def scene_of(
     holes: float | None = None,
     person: Choice | None = None,
 ) -> Scene:
-    """Return the scene of what `resolve` returns or takes: a motion, or what cameras saw at the same times.
+    """Return the scene of a motion, or of what cameras saw at the same times.
 
-    The options are those of `posefit.track`, see `posefit.tracking.options`; `check_used` refuses those that
-    sources have no use for. Of several ways to take the person out of a film, the first is used whose masks are not
-    doubted, or else are doubted least. Raises InputError where an option does not fit, or no way shows a person.
+    Several segmenters may be tried on a film. The first one without doubtful masks is
+    used, or else the one with the least doubtful masks.
+
+    Args:
+        source: As for `resolve`, or its result.
+        progress: Shows how far reading is.
+        asf: Skeleton file of the person.
+        camera: Cameras, calibrations, or their files; by default one is guessed.
+        view_degrees: Angles of the cameras around a motion, or which way the person
+            faces in footage.
+        size: Width and height of rendered masks.
+        fps: Frames per second; by default what the source states, or else 30.
+        frames: First frame, and the frame after the last.
+        extraction: How the person is segmented in a film.
+        height: Height of the person in metres.
+        up: Which axis of the calibrations or the motion's file points up.
+        unit: Unit of the calibrations or the motion's file.
+        rate: Frames per second of a motion's file that does not state them.
+        label: The person's value in masks with several labels.
+        holes: Share of the person's area up to which holes are filled.
+        person: Which of several people is followed.
+
+    Returns:
+        The scene, whose guesses are logged.
+
+    Raises:
+        InputError: An option does not fit the source, or no segmenter finds a person.
+
     """
     source = resolve(source)
     if source.medium == "motion":
-        # `up` and `unit` are those of the calibrations, where there are any, and else of the motion's file
+        # `up` and `unit` describe the calibrations if given, or else the motion's file
         cameras, guesses = _placed(listed(camera), size or SIZE, up, unit)
         stated = FileOptions(
             asf, None if cameras else unit, None if cameras else up, rate
         )
         motion = load_motion(cast(Source, source.places[0]), fps or FPS, stated)
-        return logged(
-            synthetic(motion, view_degrees, size or SIZE, cameras, frames, guesses),
-            progress,
-        )
+        scene = synthetic(motion, view_degrees, size or SIZE, cameras, frames, guesses)
+        return logged(scene, progress)
     if len(view_degrees) > 1:
         raise InputError(
-            f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}"
+            "view_degrees must be one for footage, of its first camera, "
+            f"got {len(view_degrees)}"
         )
     body, notes, of_height = body_of(asf, height, None if camera else unit)
     facing = view_degrees[0] if view_degrees else None
@@ -326,17 +423,16 @@ def scene_of(
     sizes = [film.size for film in films]
     known = calibrated(camera, sizes or [None] * len(source.places), source.names)
 
-    def scene(views: Sequence[View]) -> Scene:
-        return combined(
-            views, Path(views[0].name).stem, body, known, facing, up, fps, unit
-        )
+    def combine(views: Sequence[View]) -> Scene:
+        name = Path(views[0].name).stem
+        return combined(views, name, body, known, facing, up, fps, unit)
 
     if films:
         how = replace(extraction or Extraction(), person=person)
-        result = _of_films(films, known, how, frames, progress, scene)
+        result = _of_films(films, known, how, frames, progress, combine)
     else:
         views = views_of_masks(source, frames, label, fps)
-        result = scene(_of_one_person(views, known, holes, person))
+        result = combine(_of_one_person(views, known, holes, person))
     result = replace(
         result,
         warnings=[*notes, *result.warnings],
@@ -351,37 +447,42 @@ def _placed(
     up: Up | None,
     unit: Unit | None,
 ) -> tuple[list[Camera], list[str]]:
-    """Return the cameras around a known motion, of a `size` where a file states none, and what was guessed of them."""
+    """Return the cameras around a known motion, and what was guessed about them.
+
+    `size` is used for calibrations that do not state theirs.
+    """
     world, metres, guesses = world_of(known, up, unit)
-    cameras = [
-        camera
-        if isinstance(camera, Camera)
-        else camera.in_metres(metres).camera(camera.size or size, world)
-        for camera in known
-    ]
-    # bodies are drawn with square pixels
-    return [camera.squared() for camera in cameras], [*guesses.values()]
+    cameras = list[Camera]()
+    for each in known:
+        if isinstance(each, Calibration):
+            each = each.in_metres(metres).camera(each.size or size, world)
+        # the rasteriser needs square pixels
+        cameras.append(each.squared())
+    return cameras, [*guesses.values()]
 
 
 def logged(scene: Scene, progress: Progress) -> Scene:
-    """Return a scene whose guesses are logged."""
+    """Log the guesses of a scene, and return it."""
     if scene.guesses:
         progress.log(f"guessed: {'; '.join(scene.guesses)}")
     return scene
 
 
 def films_of(source: Resolved, fps: float | None = None) -> list[Video]:
-    """Return the films that cameras took, pictures at a rate; none where a source is of masks.
+    """Return the films of a source, one per camera; an empty list if it has masks.
 
-    Raises InputError where one cannot be read, or their rates differ.
+    `fps` is the rate of pictures. Raises InputError if a film cannot be read, or if the
+    rates differ.
     """
-    read = zip(source.kinds, source.places, strict=True)
-    films = [kind.film(place, fps) for kind, place in read if kind.film is not None]
-    rates = {round(film.fps, 3) for film in films}
+    films = list[Video]()
+    for kind, place in zip(source.kinds, source.places, strict=True):
+        if kind.film is not None:
+            films.append(kind.film(place, fps))
+    # videos that were cut or converted state rates that differ after the third decimal
+    rates = sorted({round(film.fps, 3) for film in films})
     if len(rates) > 1:
-        raise InputError(
-            f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}"
-        )
+        came = ", ".join(str(rate) for rate in rates)
+        raise InputError(f"videos must have one frame rate, got {came}")
     return films
 
 
@@ -391,18 +492,23 @@ def views_of_masks(
     label: int | None = None,
     fps: float | None = None,
 ) -> list[View]:
-    """Return what cameras saw, as masks show it. `label` is the person's value, where masks hold several.
+    """Return the views of a source of masks, one per camera, of the same frames.
 
-    Raises InputError naming the file where masks cannot be read, or cameras have no frame in common.
+    Args:
+        source: Masks; other sources have no views yet.
+        frames: Which frames to read.
+        label: The person's value, for masks with several labels.
+        fps: Frames per second; by default what the source states.
+
+    Raises:
+        InputError: Masks cannot be read, or cameras have no frame in common.
+
     """
-    read = zip(source.kinds, source.places, strict=True)
-    return together(
-        [
-            kind.view(place, frames, label, fps)
-            for kind, place in read
-            if kind.view is not None
-        ]
-    )
+    views = list[View]()
+    for kind, place in zip(source.kinds, source.places, strict=True):
+        if kind.view is not None:
+            views.append(kind.view(place, frames, label, fps))
+    return together(views)
 
 
 def _of_one_person(
@@ -411,12 +517,20 @@ def _of_one_person(
     holes: float | None,
     person: Choice | None,
 ) -> list[View]:
-    """Return views of the person who is followed in the first one."""
+    """Return cleaned views of one person: the one that the first view follows."""
     clean = [cleaned(views[0], holes, person)]
     for k, view in enumerate(views[1:], 1):
         choose = partial(same_person, [known[0], known[k]], clean[0], view.size)
         clean.append(cleaned(view, holes, choose))
     return clean
+
+
+class _Attempt(NamedTuple):
+    """What one segmenter made of the films."""
+
+    name: str  # of the segmenter
+    scene: Scene | None  # None if it found no person
+    doubt: str  # what is wrong with its masks; "" if nothing
 
 
 def _of_films(
@@ -425,10 +539,10 @@ def _of_films(
     how: Extraction,
     frames: Range,
     progress: Progress,
-    scene: Callable[[Sequence[View]], Scene],
+    combine: Callable[[Sequence[View]], Scene],
 ) -> Scene:
-    """Return the scene of what films show. Raises NoPersonError where no way shows a person."""
-    tried = list[tuple[str, Scene | None, str]]()
+    """Return the scene of films. Raises NoPersonError if nobody is found in them."""
+    attempts = list[_Attempt]()
     for way in how.ways(len(films)):
         among = how if len(films) == 1 and way is not how else None
         # all are checked before any is read
@@ -436,21 +550,22 @@ def _of_films(
         try:
             views = _taken_out(parts, known, progress)
             doubts = [view.doubt for view in views if view.doubt]
-            tried.append((way.name, scene(views), doubts[0] if doubts else ""))
+            attempt = _Attempt(way.name, combine(views), doubts[0] if doubts else "")
         except NoPersonError as error:
-            tried.append((way.name, None, str(error)))
-        if not tried[-1][2]:
+            attempt = _Attempt(way.name, None, str(error))
+        attempts.append(attempt)
+        if not attempt.doubt:
             break
-    name, result, doubt = min(
-        tried, key=lambda way: 2 if way[1] is None else bool(way[2])
-    )
-    if result is None:
-        raise NoPersonError(doubt)
-    first, _, before = tried[0]
-    if name != first:
-        warning = f"{name} took the person out, instead of {first}: {before.partition(';')[0]}"
-        result = replace(result, warnings=[*result.warnings, warning])
-    return result
+    # doubtful masks are better than none, and of equals the first segmenter's
+    best = min(attempts, key=lambda each: (each.scene is None, bool(each.doubt)))
+    if best.scene is None:
+        raise NoPersonError(best.doubt)
+    first = attempts[0]
+    if best is first:
+        return best.scene
+    reason, _, _ = first.doubt.partition(";")
+    warning = f"segmented by {best.name} instead of {first.name}: {reason}"
+    return replace(best.scene, warnings=[*best.scene.warnings, warning])
 
 
 def _taken_out(
@@ -458,10 +573,13 @@ def _taken_out(
     known: Sequence[Camera | Calibration],
     progress: Progress,
 ) -> list[View]:
-    """Return views of the person who is followed in the first film. Raises NoPersonError for masks that are refused."""
+    """Return views of one person: the one that the first film follows.
+
+    Raises NoPersonError if a film's masks cannot be a person's.
+    """
     views = list[View]()
     for k, part in enumerate(parts):
-        progress.log(f"taking the person out of {part.video.path} by {part.how.name}")
+        progress.log(f"segmenting {part.video.path} by {part.how.name}")
         choose = None
         if views:
             choose = partial(
@@ -481,27 +599,39 @@ def _taken_out(
 def body_of(
     asf: str | Path | None, height: float | None, unit: Unit | None = None
 ) -> tuple[Body, Sequence[str], Sequence[str]]:
-    """Return the body of a skeleton file, or the average one, scaled to a height in metres; warnings, and guesses."""
-    acclaim = (
-        Acclaim(built_in.average_skeleton(), 1.0)
-        if asf is None
-        else parse_asf(asf, unit)
-    )
+    """Return the person's body, with warnings and guesses about it.
+
+    Args:
+        asf: A skeleton file; None for the average skeleton.
+        height: Height in metres that the body is scaled to.
+        unit: Unit of the skeleton file.
+
+    Returns:
+        The body, warnings about the file, and what was guessed. A given height replaces
+        what both of them are about.
+
+    """
+    average = Acclaim(built_in.average_skeleton(), 1.0)
+    acclaim = average if asf is None else parse_asf(asf, unit)
     body = Body.of(acclaim.skeleton)
     if height is not None:
-        return body.scaled(height / body.stature, height / body.stature), (), ()
-    return (
-        body,
-        acclaim.notes,
-        [f"a person of {body.stature:.2f} m"] if asf is None else (),
-    )
+        factor = height / body.stature
+        return body.scaled(factor, factor), (), ()
+    guesses = [f"a person of {body.stature:.2f} m"] if asf is None else []
+    return body, acclaim.notes, guesses
 
 
 def sources_of(source: Any) -> list[Footage]:
-    """Return one source a camera of what a user names: a source, or a sequence of them.
+    """Return one source per camera.
 
-    Images and masks (H, W) in a sequence are the frames of one camera; sequences of these in a sequence, and anything
-    else in one, are of a camera each. Raises InputError where it is anything else.
+    Args:
+        source: One source, or a sequence. Images and masks (H, W) in a sequence are the
+            frames of one camera. Anything else in a sequence, such as a video or a
+            sequence of images, is one camera each.
+
+    Raises:
+        InputError: The source is none of these.
+
     """
     if isinstance(source, os.PathLike):
         source = Path(source)
@@ -515,7 +645,8 @@ def sources_of(source: Any) -> list[Footage]:
         return [array[None] if array.ndim == 2 else array]
     if not isinstance(source, Sequence) or isinstance(source, bytes):
         raise InputError(
-            f"source must be a motion, masks, a video or a list of these, got {quoted(source)}"
+            "source must be a motion, masks, a video or a list of these, "
+            f"got {quoted(source)}"
         )
     if not source:
         raise InputError("source must name something, got an empty list")
@@ -524,20 +655,21 @@ def sources_of(source: Any) -> list[Footage]:
 
 
 def _view(source: Any) -> Footage:
-    """Return what one of several cameras took."""
+    """Return the source of one of several cameras."""
     if not isinstance(source, Sequence) or isinstance(source, str | Motion):
         (view,) = sources_of(source)
         return view
     frames = _frames(source) if source else None
     if frames is None:
         raise InputError(
-            f"source must have image files or masks in the list of each camera, got {quoted(source)}"
+            "source must have image files or masks in the list of each camera, "
+            f"got {quoted(source)}"
         )
     return frames
 
 
 def _frames(sources: Sequence[Any]) -> NDArray[Any] | tuple[Path, ...] | None:
-    """Return the frames of one camera, image files or masks (H, W); None where these are anything else."""
+    """Return the frames of one camera; None if they are not images or masks (H, W)."""
     if all(_is_image(each) for each in sources):
         files = _images(*sources)
         return None if _are_films(files) else files
@@ -553,19 +685,22 @@ def _frames(sources: Sequence[Any]) -> NDArray[Any] | tuple[Path, ...] | None:
 
 
 def _are_films(files: Sequence[Path]) -> bool:
-    """Return whether image files are what several cameras took: several of them, each with several pages."""
+    """Return whether each of several image files is a film: a file of several pages.
+
+    Raises InputError if only some of them have several pages.
+    """
     if len(files) == 1:
         return False
-    pages = [
-        page_count(file) if file.suffix.lower() in PAGED and file.is_file() else 1
-        for file in files
-    ]
+    pages = list[int]()
+    for file in files:
+        is_paged = file.suffix.lower() in PAGED and file.is_file()
+        pages.append(page_count(file) if is_paged else 1)
     if max(pages) == 1:
         return False
     if min(pages) == 1:
         raise InputError(
             "source must be images of one page each, or a file of several pages for "
-            f"each camera, got {files[pages.index(1)]} beside such a file"
+            f"each camera, got {files[pages.index(1)]} with only one page"
         )
     return True
 
@@ -575,11 +710,11 @@ def _is_named(source: Any) -> bool:
 
 
 def _is_image(source: Any) -> bool:
-    return (
-        isinstance(source, str | os.PathLike)
-        and Path(source).suffix.lower() in IMAGES
-        and not Path(source).is_dir()
-    )
+    """Return whether a source is the path of an image file, by its suffix."""
+    if not isinstance(source, str | os.PathLike):
+        return False
+    path = Path(source)
+    return path.suffix.lower() in IMAGES and not path.is_dir()
 
 
 def _images(*files: str | os.PathLike[str]) -> tuple[Path, ...]:
@@ -591,10 +726,14 @@ def _is_array(source: Any) -> bool:
 
 
 def _array(source: Any) -> Any:
-    """Return a NumPy array of another library's. Raises InputError where that has none, as on a GPU."""
+    """Convert another library's array to NumPy.
+
+    Raises InputError if NumPy cannot read it, for example an array on a GPU.
+    """
     try:
         return np.asarray(source)
     except Exception as error:
         raise InputError(
-            f"masks must be arrays that NumPy can read, got {type(source).__name__}: {cut(str(error))}"
+            f"masks must be arrays that NumPy can read, got {type(source).__name__}: "
+            f"{cut(str(error))}"
         ) from None

@@ -1,13 +1,13 @@
-"""Reads video, or pictures of a film, frame by frame, so that memory does not grow with its length."""
+"""Read video, or pictures of a film, frame by frame, to keep memory constant."""
 
 import errno
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -21,123 +21,107 @@ from posefit.footage.readers import Images
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 
-HEAD = 2_000  # bytes at the beginning of a file by which a text is recognised
-SQUARE = 0.02  # by how much the sides of a pixel may differ
+HEAD = 2_000  # bytes at the beginning of a file that tell whether it is text
+SQUARE = 0.02  # share by which the sides of a pixel may differ and count as equal
 Order = NDArray[np.int64]  # (T,) numbers of frames
 CODE = "mp4v"
-# MPEG-4 counts time in at most so many parts of a second, and OpenCV gives it a rate as
-# a decimal fraction of at most three places
+# MPEG-4 divides a second into at most this many ticks, and OpenCV passes it the rate as
+# a decimal fraction with at most three places
 MAX_TICKS = 65_535
-WRITTEN_RATES = 0.01, 60_000.0  # frames a second of a file that OpenCV writes
-# of the distance between frames: one that comes so much too early or too late is not in
-# its place
+WRITTEN_RATES = 0.01, 60_000.0  # frames per second that OpenCV can write
+MAX_RATE = 1_000.0  # frames per second: files that state more do not know their rate
+MAX_CLAIMED = 1e9  # frames: files that state more do not know their length
+# share of the distance between frames: if a frame comes this much too early or too
+# late, the frames are not at even times
 UNEVEN = 0.75
-# seconds that the times of frames are rounded to in many files
+# seconds: many files round the times of frames to milliseconds
 STAMP = 1e-3
-# by which share the length of a film may differ from its rate's without a word
+# share by which a film's length may differ from the length by its stated rate
 SAME_RATE = 5e-3
-# times the mean rate: frames are not taken more often, however short some of them are
+# times the mean rate: the highest rate at which uneven frames are sampled, because a
+# few frames close together say nothing about the rest
 DENSEST = 4.0
-# posefit reports once what is wrong with a file; a user may set the variable to get FFmpeg's own messages
+# posefit reports once what is wrong with a file. A user may set the variable to see
+# FFmpeg's own messages
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 
 @dataclass(frozen=True)
 class Video:
-    """A film: a video file, opened again for each pass through its frames, or pictures, one a frame."""
+    """A film: a video file, reopened for each pass through it, or pictures.
+
+    Frames are numbered in even steps of time. If the file's own frames are not evenly
+    spaced, each number gets the nearest one.
+    """
 
     path: Path
     fps: float
     size: tuple[int, int]  # width and height in pixels, as filmed
-    claimed: int = 0  # frames, by what the file says of itself; 0 where it says nothing
-    # images, or their files and pages; of a video file none
+    claimed: int = 0  # number of frames that the file states; 0 if it states none
+    # images, or their files and pages; empty for a video file
     pictures: Sequence[tuple[Path, int] | Image] = field(
         default=(), repr=False, compare=False
     )
-    warnings: Sequence[str] = ()  # what a user should know of its frames
-    guesses: Sequence[str] = ()  # what it does not state
-    # of the file's frames: one for each moment
+    warnings: Sequence[str] = ()  # what a user should know about the frames
+    guesses: Sequence[str] = ()  # what the file does not state
+    # (T,) for each frame, which of the file's frames it is
     _order: Order = field(kw_only=True, repr=False, compare=False)
-    # (T,) at that moment
+    # (T,) whether it was filmed at that time, and is not a repetition
     _filmed: NDArray[np.bool_] = field(kw_only=True, repr=False, compare=False)
 
     @classmethod
     def of(cls, path: str | Path) -> "Video":
-        """Return a video. Raises InputError where the file is missing, cannot be read or has no frame."""
+        """Open a video file.
+
+        Raises:
+            InputError: The file is missing, cannot be read, or has no frame.
+
+        """
         path = Path(path)
-        if not path.is_file():
-            came = "a folder" if path.is_dir() else "nothing of that name"
-            raise InputError(f"{path}: expected a video file, got {came}")
-        _check_no_text(path)
-        capture = cv2.VideoCapture(opencv_name(path))
-        try:
-            wide, tall = (
-                capture.get(key)
-                for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
-            )
-            if wide * tall > PIXELS:
-                most = f"{PIXELS // 10**6} million pixels"
-                raise InputError(
-                    f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}"
-                )
-            read, image = capture.read()
-            if not read:
-                raise InputError(
-                    f"{path}: expected a video that OpenCV can read, got none or one without frames"
-                )
-            fps, claimed, across, down = (
-                float(capture.get(key))
-                for key in (
-                    cv2.CAP_PROP_FPS,
-                    cv2.CAP_PROP_FRAME_COUNT,
-                    cv2.CAP_PROP_SAR_NUM,
-                    cv2.CAP_PROP_SAR_DEN,
-                )
-            )
-            _check_written(path, image, capture)
-        finally:
-            capture.release()
-        stated = np.isfinite(fps) and 0.0 < fps <= 1000.0
-        moments = _moments(path)
-        order, filmed, rate = _even(moments, fps if stated else FPS)
+        head = _read_head(path)
+        is_stated = np.isfinite(head.fps) and 0.0 < head.fps <= MAX_RATE
+        stated = head.fps if is_stated else FPS
+        order, filmed, rate = _even(_moments(path), stated)
+        is_uneven = bool((np.diff(order) != 1).any())
         warnings = []
-        if across > 0.0 < down and abs(across / down - 1.0) > SQUARE:
-            aspect = f"{across / down:.3g} times as wide as high"
+        if head.aspect is not None and abs(head.aspect - 1.0) > SQUARE:
             warnings.append(
-                f"{path}: its pixels are {aspect}, which is not corrected: the person looks that much too slim"
+                f"{path}: its pixels are {head.aspect:.3g} times as wide as high, "
+                "which is not corrected: the person looks that much too slim"
             )
-        if uneven := bool((np.diff(order) != 1).any()):
+        if is_uneven:
             held = np.count_nonzero(~filmed)
             warnings.append(
-                f"{path}: its frames come at uneven times; it is sampled {rate:.3g} times a second, so that {held} of "
-                f"{len(order)} frames stand for moments without a filmed one, and are held"
+                f"{path}: its frames come at uneven times; it is sampled {rate:.3g} "
+                f"times a second, so that {held} of {len(order)} frames stand for "
+                "moments without a filmed one, and are held"
             )
         guesses = []
-        by_stamps = rate != (fps if stated else FPS)
-        if not stated:
-            unsaid = (
-                "by its frames' times" if by_stamps else "which the file does not state"
-            )
-            guesses.append(f"{path}: {rate:.4g} frames a second, {unsaid}")
-        elif by_stamps and not uneven:
+        by_times = rate != stated
+        if not is_stated:
+            reason = "which the file does not state"
+            if by_times:
+                reason = "by its frames' times"
+            guesses.append(f"{path}: {rate:.4g} frames a second, {reason}")
+        elif by_times and not is_uneven:
             guesses.append(
-                f"{path}: {rate:.4g} frames a second by its frames' times, where its head says {fps:.4g}"
+                f"{path}: {rate:.4g} frames a second by its frames' times, where its "
+                f"head says {head.fps:.4g}"
             )
-        size = image.shape[1], image.shape[0]
-        video = cls(
+        # many files compute their number of frames from their length and their stated
+        # rate, so that it counts nothing if that rate is wrong
+        claimed = 0
+        if 0.0 < head.claimed < MAX_CLAIMED and not is_uneven and not by_times:
+            claimed = int(head.claimed)
+        return cls(
             path,
             rate,
-            size,
+            head.size,
+            claimed,
             warnings=warnings,
             guesses=guesses,
             _order=order,
             _filmed=filmed,
-        )
-        # what a file says counts the frames as they were filmed, often by its length and the rate in its head
-        return (
-            replace(video, claimed=int(claimed))
-            if 0.0 < claimed < 1e9 and not (uneven or by_stamps)
-            else video
         )
 
     @classmethod
@@ -149,29 +133,33 @@ class Video:
 
     @classmethod
     def of_pictures(cls, images: Images, fps: float | None = None) -> "Video":
-        """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
+        """Return the film of numbered pictures, or of the pages of a file.
+
+        A missing picture is replaced by the one before it. The default rate is 30
+        frames per second, which is a guess. Raises InputError if the first picture
+        cannot be read.
+        """
         assert images.numbered is not None
         files = [file for file in images.numbered.files if file is not None]
         guesses = list(images.numbered.guesses)
-        pictures: list[tuple[Path, int] | Image] = [
-            (file, page) for file in files for page in range(page_count(file))
-        ]
-        image = _picture(pictures[0])
-        filmed = np.array([file is not None for file in images.numbered.files])
-        # a film that begins with missing pictures holds the first one
-        order = np.maximum(np.cumsum(filmed) - 1, 0)
+        pictures = list[tuple[Path, int] | Image]()
+        for file in files:
+            pictures += [(file, page) for page in range(page_count(file))]
+        first = _picture(pictures[0])
         if len(pictures) > len(files):
             order = np.arange(len(pictures))
             filmed = np.ones(len(pictures), dtype=bool)
-        size = image.shape[1], image.shape[0]
+        else:
+            filmed = np.array([file is not None for file in images.numbered.files])
+            # a film that begins with missing pictures repeats the first one
+            order = np.maximum(np.cumsum(filmed) - 1, 0)
         if fps is None:
             guesses.append(f"{FPS:g} frames a second")
         return cls(
             Path(images.name),
             fps or FPS,
-            size,
-            0,
-            pictures,
+            (first.shape[1], first.shape[0]),
+            pictures=pictures,
             guesses=guesses,
             _order=order,
             _filmed=filmed,
@@ -180,31 +168,32 @@ class Video:
     def frames(
         self, start: int, stop: int | None, size: tuple[int, int], step: int = 1
     ) -> Iterator[Image]:
-        """Yield every `step`th frame of start to stop, scaled to `size`.
+        """Yield every `step`th frame from start to stop, scaled to `size`.
 
-        Raises InputError where a frame has another size than the first.
+        Raises InputError if a frame has another size than the first.
         """
-        # a frame may stand for several moments
+        # a frame of the file may be repeated: it is decoded once
         wanted = Counter(self._order[start:stop:step].tolist())
-        decoded = (
-            (_picture(self.pictures[k]) for k in wanted)
-            if self.pictures
-            else self._decoded(list(wanted))
-        )
+        decoded = self._decoded(list(wanted))
         for (number, times), image in zip(wanted.items(), decoded, strict=False):
             if (image.shape[1], image.shape[0]) != self.size:
                 came = f"{image.shape[1]}x{image.shape[0]} in frame {number}"
                 raise InputError(
-                    f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}"
+                    f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, "
+                    f"got {came}"
                 )
             yield from repeat(scaled(image, size), times)
 
     def _decoded(self, numbers: Sequence[int]) -> Iterator[Image]:
-        """Yield the frames of these numbers of a video file, as far as it can be read."""
+        """Yield these frames of the file, in rising order, until it ends."""
+        if self.pictures:
+            yield from (_picture(self.pictures[k]) for k in numbers)
+            return
         capture = cv2.VideoCapture(opencv_name(self.path))
         k = -1
         try:
             for number in numbers:
+                # frames in between are skipped without converting them
                 while k < number - 1 and capture.grab():
                     k += 1
                 read, image = capture.read()
@@ -216,26 +205,72 @@ class Video:
             capture.release()
 
     def count(self) -> int:
-        """Return how many frames there are: what a file says of itself is often wrong."""
+        """Return how many frames can be read; files often state a wrong number."""
         return len(self._order)
 
     def is_filmed(self, k: int) -> bool:
-        """Return whether frame k was filmed at its time; else it is the frame before or after it once more."""
+        """Return whether frame k was filmed at its time, and is not a repetition."""
         return bool(self._filmed[k])
 
 
 def _picture(source: tuple[Path, int] | Image) -> Image:
+    """Return a picture, which is read from its file and page if it is not in memory."""
     if isinstance(source, np.ndarray):
         return source
     file, page = source
     image = read_image(file, grey=False, page=page)
     if image is None:
-        raise InputError(f"{file}: expected a picture, got a file that is none")
+        raise InputError(f"{file}: expected a picture, got another or a damaged file")
     return image
 
 
+class _Head(NamedTuple):
+    """What a video file states about itself."""
+
+    size: tuple[int, int]  # width and height of the first frame
+    fps: float  # may be 0, NaN or absurd
+    claimed: float  # number of frames; may be absurd
+    aspect: float | None  # width of a pixel over its height
+
+
+def _read_head(path: Path) -> _Head:
+    """Return what a video states about itself. Raises InputError if unreadable."""
+    if not path.is_file():
+        came = "a folder" if path.is_dir() else "nothing of that name"
+        raise InputError(f"{path}: expected a video file, got {came}")
+    _check_no_text(path)
+    capture = cv2.VideoCapture(opencv_name(path))
+    try:
+        wide = capture.get(cv2.CAP_PROP_FRAME_WIDTH)
+        tall = capture.get(cv2.CAP_PROP_FRAME_HEIGHT)
+        # checked before the first frame is decoded
+        if wide * tall > PIXELS:
+            most = f"{PIXELS // 10**6} million pixels"
+            raise InputError(
+                f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}"
+            )
+        read, image = capture.read()
+        if not read:
+            raise InputError(
+                f"{path}: expected a video that OpenCV can read, got none or one "
+                "without frames"
+            )
+        fps = float(capture.get(cv2.CAP_PROP_FPS))
+        claimed = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        across = float(capture.get(cv2.CAP_PROP_SAR_NUM))
+        down = float(capture.get(cv2.CAP_PROP_SAR_DEN))
+        _check_written(path, image, capture)
+    finally:
+        capture.release()
+    aspect = across / down if across > 0.0 and down > 0.0 else None
+    return _Head((image.shape[1], image.shape[0]), fps, claimed, aspect)
+
+
 def _check_no_text(path: Path) -> None:
-    """Raise InputError for a text, such as a playlist, by which FFmpeg would open other files."""
+    """Raise InputError for a text file.
+
+    FFmpeg would take it for a playlist and open the files that it lists.
+    """
     with path.open("rb") as file:
         head = file.read(HEAD)
     is_text = (
@@ -248,9 +283,10 @@ def _check_no_text(path: Path) -> None:
 
 
 def _check_written(path: Path, first: Any, capture: Any) -> None:
-    """Raise InputError where all frames are the same.
+    """Raise InputError if all frames are equal.
 
-    OpenCV 4.13 to 5.0 do not convert interlaced frames, and return what was in memory before.
+    OpenCV 4.13 to 5.0 do not convert interlaced frames, and return whatever was in
+    memory before.
     """
     more, image = capture.read()
     if not more:
@@ -260,27 +296,27 @@ def _check_written(path: Path, first: Any, capture: Any) -> None:
             return
         more, image = capture.read()
     raise InputError(
-        f"{path}: expected a film, got the same picture in all frames; if it is interlaced, which this OpenCV cannot "
-        "read: ffmpeg -i FILE -vf yadif NEW.mp4"
+        f"{path}: expected a film, got the same picture in all frames; if it is "
+        "interlaced, which this OpenCV cannot read: "
+        "ffmpeg -i FILE -vf yadif NEW.mp4"
     )
 
 
 def scaled(image: Any, size: tuple[int, int]) -> Image:
-    """Return a picture scaled to a width and a height: by a whole number first, which takes a tenth of the time."""
+    """Return a picture scaled to a width and a height."""
     wide = image.shape[1]
     tall = image.shape[0]
     whole = min(wide // size[0], tall // size[1])
+    # scaling down by a whole number first takes a tenth of the time
     if whole > 1 and wide % whole == tall % whole == 0:
-        image = cv2.resize(
-            image, (wide // whole, tall // whole), interpolation=cv2.INTER_AREA
-        )
-    return np.asarray(
-        cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8
-    )
+        smaller = (wide // whole, tall // whole)
+        image = cv2.resize(image, smaller, interpolation=cv2.INTER_AREA)
+    result = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(result, dtype=np.uint8)
 
 
 def _moments(path: Path) -> Array:
-    """Return when each frame is shown, in seconds, by going through them."""
+    """Return when each frame is shown (T,), in seconds, by going through the file."""
     capture = cv2.VideoCapture(opencv_name(path))
     times = []
     while capture.grab():
@@ -290,35 +326,51 @@ def _moments(path: Path) -> Array:
 
 
 def _even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
-    """Return which frames are shown at even times, which of them then, and how many a second: all, if they are even.
+    """Return frames at even times.
 
-    Frames at uneven times are taken at their usual distance, each moment the one that is nearest to it.
+    If the frames are evenly spaced, these are all of them. Otherwise moments are spaced
+    at the frames' usual distance, and each one gets the nearest frame.
+
+    Args:
+        times: (T,) when each frame is shown, in seconds.
+        fps: The rate that the file states.
+
+    Returns:
+        For each moment its frame, whether that frame was filmed then and is not a
+        repetition, and the number of moments per second.
+
     """
-    whole = np.arange(len(times))
+    numbers = np.arange(len(times))
+    all_filmed = numbers >= 0
     apart = np.diff(times)
-    if len(times) < 3 or not (apart > 0.0).all():  # a file that does not say
-        return whole, whole >= 0, fps
+    # a file without usable times
+    if len(times) < 3 or not (apart > 0.0).all():
+        return numbers, all_filmed, fps
     mean = float(apart.mean())
-    off = float(np.abs(times - times[0] - mean * whole).max())
-    if off <= UNEVEN * mean:
-        return whole, whole >= 0, _rate(times, off, fps)
+    largest_miss = float(np.abs(times - times[0] - mean * numbers).max())
+    if largest_miss <= UNEVEN * mean:
+        return numbers, all_filmed, _rate(times, largest_miss, fps)
     usual = max(float(np.median(apart)), mean / DENSEST)
-    # stamps are rounded
-    usual = float(apart.sum() / np.maximum(np.round(apart / usual), 1.0).sum())
-    moments = times[0] + usual * np.arange(round((times[-1] - times[0]) / usual) + 1)
+    # times are rounded, so the median is inexact: the mean over all steps is better
+    steps = np.maximum(np.round(apart / usual), 1.0)
+    usual = float(apart.sum() / steps.sum())
+    count = round((times[-1] - times[0]) / usual) + 1
+    moments = times[0] + usual * np.arange(count)
     later = np.clip(np.searchsorted(times, moments), 1, len(times) - 1)
-    earlier = moments - times[later - 1] <= times[later] - moments
-    order = np.where(earlier, later - 1, later)
-    off = np.abs(times[order] - moments)
+    is_earlier_nearer = moments - times[later - 1] <= times[later] - moments
+    order = np.where(is_earlier_nearer, later - 1, later)
+    # of several moments with one frame, the nearest is the one when it was filmed
+    miss = np.abs(times[order] - moments)
     least = np.full(len(times), np.inf)
-    np.minimum.at(least, order, off)
-    return order, off == least[order], 1.0 / usual
+    np.minimum.at(least, order, miss)
+    return order, miss == least[order], 1.0 / usual
 
 
 def video_rate(fps: float) -> float:
-    """Return the rate that an .mp4 file has for `fps`: 119.88 for 119.8765.
+    """Return the rate that an .mp4 file states for `fps`: 119.88 for 119.8765.
 
-    It is rounded to three decimals up to 65 frames a second, to two up to 655, and to one above.
+    It is rounded to three decimals up to 65 frames per second, to two up to 655, and to
+    one above.
     """
     rate = float(np.clip(fps, *WRITTEN_RATES))
     digits = next(digits for digits in (3, 2, 1, 0) if rate * 10**digits <= MAX_TICKS)
@@ -326,14 +378,21 @@ def video_rate(fps: float) -> float:
 
 
 def _rate(times: Array, off: float, stated: float) -> float:
-    """Return how many frames a second come at even times, which are `off` seconds off at most.
+    """Return the rate of frames at almost even times.
 
-    It is the stated rate where the times allow it, or else the nearest whole rate, or 1000 / 1001 of one, that they do.
+    This is the stated rate if the times allow it. Otherwise it is the nearest usual
+    rate that they allow: a whole number, or 1000 / 1001 of one as in NTSC.
+
+    Args:
+        times: (T,) when each frame is shown, in seconds.
+        off: By how many seconds a time differs at most from even ones.
+        stated: The rate that the file states.
+
     """
     intervals = len(times) - 1
     lasted = float(times[-1] - times[0])
     rate = intervals / lasted
-    # the first and the last may be off by as much
+    # both the first and the last time may be wrong by `off`
     slack = max(STAMP + 2.0 * off, SAME_RATE * lasted)
 
     def miss(likely: float) -> float:
@@ -347,9 +406,10 @@ def _rate(times: Array, off: float, stated: float) -> float:
 
 
 class VideoWriter:
-    """Writes an .mp4 whose number of frames is checked at the end: OpenCV says nothing when the disk is full.
+    """Writes an .mp4 file at the rate `video_rate`.
 
-    Its rate is `video_rate`, which is rounded.
+    The number of frames is checked at the end, because OpenCV does not report a full
+    disk.
     """
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
@@ -360,7 +420,8 @@ class VideoWriter:
         )
         if not self._writer.isOpened():
             raise InputError(
-                f"expected OpenCV to write {CODE} video, got a build or a disk that cannot"
+                f"expected OpenCV to write {CODE} video, got a build or a disk that "
+                "cannot"
             )
 
     def write(self, image: Image) -> None:
@@ -369,12 +430,12 @@ class VideoWriter:
         self._count += 1
 
     def close(self) -> None:
-        """Finish the file. Raises OSError where it does not hold all frames."""
+        """Finish the file. Raises OSError if frames are missing in it."""
         self._writer.release()
         capture = cv2.VideoCapture(opencv_name(self._path))
-        written = (
-            round(capture.get(cv2.CAP_PROP_FRAME_COUNT)) if capture.isOpened() else 0
-        )
+        written = 0
+        if capture.isOpened():
+            written = round(capture.get(cv2.CAP_PROP_FRAME_COUNT))
         capture.release()
         if written != self._count:
             raise OSError(

@@ -1,4 +1,4 @@
-"""What one camera saw: every reader makes a `View`, and everything after takes it.
+"""The `View`: what one camera saw. Readers return one, and later steps take one.
 
 from posefit.footage.source import resolve, views_of
 
@@ -26,47 +26,54 @@ from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, Silhouette
 
-MOST = 0.5  # a larger share of something is most of it
+# a majority: tests of "most frames" or "most pixels" all compare with this share
+MOST = 0.5
+# first and last frame, as in a slice
 Range = tuple[int | None, int | None]
-# (T, bytes): of each frame the bits of its pixels, row by row; bits after the last are 0
+# (T, bytes): the pixels of each frame as bits, row by row; unused bits at the end are 0
 Planes = NDArray[np.uint8]
-# bytes of the masks that are kept as they were decoded; those of a short film
+# cache of decoded masks: large enough for a short film
 DECODED_BYTES = 64_000_000
+# a decoded silhouette per pixel: two arrays of bytes, and two of bits
+BYTES_PER_PIXEL = 2.25
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What one camera saw, a bit a pixel, however it came. Its arrays are read-only.
+    """What one camera saw: the masks of its frames, one bit per pixel.
 
-    `replace` and the functions below return other views; nothing changes one.
+    A view is immutable and its arrays are read-only. `dataclasses.replace` and the
+    functions below return new views.
     """
 
-    name: str  # of the source
-    numbers: NDArray[np.int64]  # (T,) of the frames, as filmed
+    name: str  # name of the source, for messages
+    numbers: NDArray[np.int64]  # (T,) frame numbers, as filmed
     times: Array  # (T,) seconds, as filmed
-    bits: Planes = field(repr=False)  # the person
-    known: Planes | None = field(repr=False)  # which pixels are; None where all are
+    bits: Planes = field(repr=False)  # pixels that show the person
+    # pixels that are known to be person or background; None if all are
+    known: Planes | None = field(repr=False)
     # (T,) whether a frame shows enough of the person to be searched
     usable: NDArray[np.bool_] = field(repr=False)
     size: tuple[int, int]  # width and height
-    fps: float | None = None  # None where the source does not state it
-    # whether the source states its frames' numbers; else they are counted from 0
+    fps: float | None = None  # None if the source does not state it
+    # whether the source states its frame numbers; if not, they are counted from 0
     counted: bool = False
-    # width and height of the pictures, where the masks were taken out of some
+    # width and height of the film, if the masks were segmented from one
     filmed: tuple[int, int] | None = None
-    # (T, 27, 3), see `Segmenter`; None where there are none
+    # (T, 27, 3) as `Segmenter.landmarks`; None if the segmenter reports none
     landmarks: Array | None = field(default=None, repr=False)
-    # (T,) as `Segmenter.facing`, NaN where unknown or going along; None where all are
+    # (T,) as `Segmenter.facing`, NaN if unknown or if the person walks across the
+    # picture; None if all are unknown
     facings: Array | None = field(default=None, repr=False)
-    moves: bool = False  # whether the camera seems to
+    moves: bool = False  # whether the camera seems to move
     doubt: str = ""  # what is wrong with the masks, if anything
-    warnings: Sequence[str] = ()  # what a user should check before they trust the masks
-    guesses: Sequence[str] = ()  # what the source does not state
-    # yields the pictures, of the masks' size; None where the source is of masks
+    warnings: Sequence[str] = ()  # what a user should check before trusting the masks
+    guesses: Sequence[str] = ()  # what the source does not state and posefit assumes
+    # yields the pictures, at the masks' size; None if the source holds masks only
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only: who wrote into one would change what others decode."""
+        """Make the arrays read-only, because several views share them."""
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
@@ -75,72 +82,80 @@ class View:
         return len(self.numbers)
 
     def __getitem__(self, rows: slice) -> "View":
-        """Return the view of some frames, by their places."""
-        cut: dict[str, Any] = {
-            name: value[rows]
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
-        }
+        """Return the view of a slice of its frames, counted from 0."""
+        cut: dict[str, Any] = {}
+        for name in self._array_names():
+            cut[name] = getattr(self, name)[rows]
         return replace(self, **cut)
 
+    def _array_names(self) -> list[str]:
+        """Return the names of the fields that hold one row per frame."""
+        fields = vars(self).items()
+        return [name for name, value in fields if isinstance(value, np.ndarray)]
+
     def silhouette(self, k: int) -> Silhouette:
-        """Return the silhouette of the frame at place k, which is decoded for it."""
+        """Decode and return the silhouette of frame k, counted from 0."""
         known = None if self.known is None else unpacked(self.known[k], self.size)
         return Silhouette.of(unpacked(self.bits[k], self.size), known)
 
     @property
     def shows(self) -> NDArray[np.bool_]:
-        """Whether each frame (T,) shows a person before a background, by its bits."""
+        """Whether each frame (T,) has both person and background pixels."""
         known = full_planes(1, self.size) if self.known is None else self.known
         bits = self.bits & known
         return np.asarray(bits.any(axis=1) & (bits != known).any(axis=1))
 
 
 def joined(views: Sequence[View]) -> View:
-    """Return the view of successive frames, each of which is a view."""
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(view, name) for view in views])
-        for name, value in vars(views[0]).items()
-        if isinstance(value, np.ndarray)
-    }
+    """Return one view of all frames of several views, in order, without pictures."""
+    arrays: dict[str, Any] = {}
+    for name in views[0]._array_names():
+        arrays[name] = np.concatenate([getattr(view, name) for view in views])
     return replace(views[0], **arrays, pictures=None)
 
 
 def times_of(numbers: NDArray[np.int64], fps: float | None) -> Array:
-    """Return when frames come (T,), in seconds, at a rate; where it is unknown 30 a second."""
+    """Return the times (T,) of frames in seconds, at 30 per second if `fps` is None."""
     return np.asarray(numbers / (fps or FPS))
 
 
 def unpacked(bits: NDArray[np.uint8], size: tuple[int, int]) -> Mask:
     """Return the mask (height, width) of a frame's bits."""
     width, height = size
-    return (
-        np.unpackbits(bits, count=width * height).reshape(height, width).view(np.bool_)
-    )
+    pixels = np.unpackbits(bits, count=width * height)
+    return pixels.reshape(height, width).view(np.bool_)
 
 
 def border_of(planes: Planes, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Return the pixels (T, n) along the border of masks, of which nothing else is decoded."""
+    """Return the pixels (T, n) along the border of masks, without decoding the rest."""
     width, height = size
     places = np.arange(width * height).reshape(height, width)
-    places = np.concatenate([places[[0, -1]].ravel(), places[:, [0, -1]].ravel()])
-    return np.asarray(planes[:, places >> 3] >> (7 - (places & 7)) & 1 > 0)
+    border = np.concatenate([places[[0, -1]].ravel(), places[:, [0, -1]].ravel()])
+    octets = planes[:, border >> 3]  # (T, n): the byte that holds each pixel
+    # `packbits` stores the first pixel in the highest bit
+    shift = 7 - (border & 7)
+    return np.asarray(octets >> shift & 1 > 0)
 
 
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:
-    """Return room for so many masks. Raises InputError where that is more memory than this process may have."""
+    """Return uninitialised planes for `count` masks.
+
+    Raises:
+        InputError: The planes need more memory than this process may use.
+
+    """
     octets = (size[0] * size[1] + 7) // 8
     most = allowed_bytes()
     if count * octets > most:
         raise InputError(
-            f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of memory, "
-            f"got {count} of {size[0]}x{size[1]} pixels"
+            f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of "
+            f"memory, got {count} of {size[0]}x{size[1]} pixels"
         )
     return np.empty((count, octets), dtype=np.uint8)
 
 
 def full_planes(count: int, size: tuple[int, int]) -> Planes:
-    """Return so many masks that cover the picture."""
+    """Return planes of `count` masks in which every pixel is set."""
     planes = empty_planes(count, size)
     planes[:] = np.packbits(np.ones(size[0] * size[1], dtype=bool))
     return planes
@@ -152,16 +167,18 @@ def undistorted(
     maps: tuple[Any, Any],
     straight: Camera | None = None,
 ) -> View:
-    """Return a view, and its landmarks, as of a pinhole camera; pixels that the lens did not cover are unknown.
+    """Return a view without lens distortion, as a pinhole camera sees it.
+
+    Its landmarks are straightened, too. Pixels that the lens did not cover are unknown.
 
     Args:
-        view: Of the camera that was calibrated.
-        calibration: That camera's.
-        maps: The calibration's, for pictures of the view's size and for `straight`.
-        straight: The pinhole camera; by default the calibration's, of the view's size.
+        view: What the calibrated camera saw.
+        calibration: The calibration of that camera.
+        maps: The calibration's pixel maps from the view's size to `straight`.
+        straight: The pinhole camera. By default the calibration's, at the view's size.
 
     Returns:
-        A view of the size of `maps`.
+        A view with the size of `maps`.
 
     """
     size = (maps[0].shape[1], maps[0].shape[0])
@@ -169,11 +186,11 @@ def undistorted(
     known = empty_planes(len(view), size)
     for k in range(len(view)):
         silhouette = view.silhouette(k)
-        # between four pixels the border is where half of them is the person
-        share = cv2.remap(
-            255 * silhouette.mask.astype(np.uint8), *maps, cv2.INTER_LINEAR
-        )
-        covered = cv2.remap(silhouette.valid.astype(np.uint8), *maps, cv2.INTER_NEAREST)
+        levels = 255 * silhouette.mask.astype(np.uint8)
+        valid = silhouette.valid.astype(np.uint8)
+        share = cv2.remap(levels, *maps, cv2.INTER_LINEAR)
+        covered = cv2.remap(valid, *maps, cv2.INTER_NEAREST)
+        # interpolated between four pixels, the outline is where half of them are person
         bits[k] = np.packbits(share > 127)
         known[k] = np.packbits(covered != 0)
     landmarks = view.landmarks
@@ -183,20 +200,27 @@ def undistorted(
 
 
 class Observations(Sequence[Observation]):
-    """The observations of views of the same frames, whose masks are decoded when they are searched first.
+    """The observations of several views of the same frames, decoded on demand.
 
-    A frame is usable where one camera saw enough; the silhouette of a camera that did not is unknown then. `yaws` (T,)
-    are radians: about which way the person faces, NaN where unknown; empty where no frame's is known.
+    A frame is usable if at least one camera saw enough of the person; the silhouettes
+    of the other cameras are then unknown.
     """
 
     def __init__(self, views: Sequence[View], yaws: Array | None = None) -> None:
+        """Pair the frames of views.
+
+        Args:
+            views: One view per camera, starting at the same frame.
+            yaws: (T,) about which way the person faces, in radians. NaN if unknown for
+                a frame; None if unknown for all.
+
+        """
         self.views = views
         self.yaws = np.empty(0) if yaws is None else yaws
         self._count = min(map(len, views))
         self.usable = np.any([view.usable[: self._count] for view in views], axis=0)
         pixels = sum(view.size[0] * view.size[1] for view in views)
-        # of a silhouette: two arrays of bytes, and two of bits
-        self._most = max(DECODED_BYTES // int(2.25 * pixels), 1)
+        self._most = max(DECODED_BYTES // int(BYTES_PER_PIXEL * pixels), 1)
         self._decoded = OrderedDict[int, list[Silhouette]]()
 
     def __reduce__(self) -> Any:
@@ -209,37 +233,41 @@ class Observations(Sequence[Observation]):
         if not 0 <= k < len(self):
             raise IndexError(k)
         known = k < len(self.yaws) and np.isfinite(self.yaws[k])
-        landmarks = None
-        if any(view.landmarks is not None for view in self.views):
-            unknown = np.zeros((len(JOINTS), 3))
-            landmarks = np.array(
-                [
-                    unknown if view.landmarks is None else view.landmarks[k]
-                    for view in self.views
-                ]
-            )
-        yaw = float(self.yaws[k]) if known else None
         return Observation(
             _Silhouettes(self, k),
             usable=bool(self.usable[k]),
-            yaw=yaw,
-            landmarks=landmarks,
+            yaw=float(self.yaws[k]) if known else None,
+            landmarks=self._landmarks(k),
         )
+
+    def _landmarks(self, k: int) -> Array | None:
+        """Return the landmarks (views, 27, 3) of frame k; None if no view has any."""
+        if all(view.landmarks is None for view in self.views):
+            return None
+        landmarks = np.zeros((len(self.views), len(JOINTS), 3))
+        for place, view in enumerate(self.views):
+            if view.landmarks is not None:
+                landmarks[place] = view.landmarks[k]
+        return landmarks
 
     @property
     def first(self) -> int:
-        """The first frame usable in all cameras, or else in one. Raises InputError where there is none."""
+        """The first frame that is usable in all cameras, or else in any camera.
+
+        Raises InputError if no frame is usable.
+        """
         usable = np.array([view.usable[: len(self)] for view in self.views])
         for enough in (usable.all(axis=0), usable.any(axis=0)):
             if enough.any():
                 return int(enough.argmax())
         view = self.views[0]
         raise InputError(
-            f"{view.name}, frame {view.numbers[0]}: expected a frame that is usable, got none from there on"
+            f"{view.name}, frame {view.numbers[0]}: expected a frame that is usable, "
+            "got none from there on"
         )
 
     def silhouettes(self, k: int) -> list[Silhouette]:
-        """Return the silhouettes of the frame at place k, one a view. Those that were used last are kept."""
+        """Return the silhouettes of frame k, one per view. The latest are cached."""
         kept = self._decoded.pop(k, None)
         if kept is None:
             kept = [self._silhouette(view, k) for view in self.views]
@@ -256,7 +284,10 @@ class Observations(Sequence[Observation]):
 
 
 class _Silhouettes(Sequence[Silhouette]):
-    """The silhouettes of one frame, decoded when they are used: whether it is usable needs none of them."""
+    """The silhouettes of one frame, decoded on first use.
+
+    Whoever only asks whether a frame is usable decodes nothing.
+    """
 
     def __init__(self, observations: Observations, k: int) -> None:
         self._observations = observations
@@ -273,14 +304,23 @@ class _Silhouettes(Sequence[Silhouette]):
 
 
 def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
-    """Return start and stop of a range of `count` frames, whose numbers begin at `first`, as indices.
+    """Return the indices (start, stop) of a range of frame numbers.
 
-    Negative ends count from the last frame. Raises InputError where the range holds none.
+    Args:
+        frames: First number and the number after the last. Negative ones count from the
+            end; None means the first or the last frame.
+        count: How many frames there are.
+        first: Number of the first frame.
+
+    Raises:
+        InputError: The range contains no frame.
+
     """
-    ends = [
-        None if end is None else end if end < 0 else max(end - first, 0)
-        for end in frames
-    ]
+    ends = list[int | None]()
+    for end in frames:
+        if end is not None and end >= 0:
+            end = max(end - first, 0)
+        ends.append(end)
     start, stop, _ = slice(*ends).indices(count)
     if start >= stop:
         low, high = ("" if value is None else value for value in frames)

@@ -59,7 +59,7 @@ def test_several_files_of_pages_are_what_several_cameras_took(
     assert sources_of(films) == [(films[0],), (films[1],)]
     single = tmp_path / f"c{suffix}"
     first.save(single)
-    with pytest.raises(InputError, match=f"got .*c{suffix} beside such a file"):
+    with pytest.raises(InputError, match=f"got .*c{suffix} with only one page"):
         sources_of([*films, single])
 
 

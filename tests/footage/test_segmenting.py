@@ -132,8 +132,7 @@ def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_th
         ("mediapipe", "mixture") if cameras == 1 else ("mixture", "mediapipe")
     )
     exchanged = any(
-        f"{second} took the person out, instead of {first}: " in text
-        for text in scene.warnings
+        f"segmented by {second} instead of {first}: " in text for text in scene.warnings
     )
     assert exchanged == (used == second)
 
@@ -412,7 +411,7 @@ def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None
         (
             masks,
             moved,
-            "expected cameras that see one person, got views that pass each other by 1.5 m",
+            "expected cameras that see one person, got views that disagree by 1.5 m",
         ),
     ):
         for path, part in zip(sources, shown, strict=True):
