@@ -268,7 +268,7 @@ def _nearest_bone(x, y, first, cones, discs):
 
 @inlined
 def _write_neighbours(bone, discs, neighbours):
-    """Write which other bones have a disc that meets the bone's, and return how many."""
+    """Write which other bones have discs that meet the bone's. Return their number."""
     count = 0
     for b in range(discs.shape[0]):
         reach = discs[b, 2] + discs[bone, 2]
