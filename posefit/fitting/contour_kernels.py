@@ -36,7 +36,7 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
 NUMBERS = 3 + ANGLES  # of a place and a pose
-# the error of a point of the border is the sum of two, with these standard deviations
+# a point of the border has two independent errors, with these standard deviations
 BORDER_DEVIATION = 0.01  # metres
 PIXEL_DEVIATION = 0.5  # pixels
 # metres: a border of this length shares its error, and counts as one measurement
@@ -348,8 +348,7 @@ def _accumulate_point(disc, normal, length, contour, scale, bones, products):
 
     `disc` is a share of the bone, and the centre and radius there. The point is where
     the `normal` meets the border of this disc. It represents a `length` of border, in
-    pixels. A point that is hidden, or outside
-    the field, adds nothing.
+    pixels. A point that is hidden, or outside the field, adds nothing.
     """
     share, u, v, radius = disc
     nx, ny = normal

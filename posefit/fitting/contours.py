@@ -1,7 +1,7 @@
 """Moves poses until the contours of a body match the contours of masks.
 
-The fit is by least squares, of one frame. For many frames, `contour_squares` returns
-the sums.
+The fit is by least squares. `contour_fit` fits one frame. `contour_squares` returns the
+sums for a fit of many frames.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,8 +27,7 @@ from posefit.silhouette.mask import (
 )
 from posefit.silhouette.sharing import shares_of, work_through
 
-# pixels of a metre; of a finer mask only every second pixel is used, or every third, and
-# so on
+# pixels of a metre; of a finer mask only every second, third or later pixel is used
 FINE_PIXELS = 80.0
 FIELD_MARGIN = 48  # pixels: distances are known up to this margin around a mask
 
@@ -227,6 +226,9 @@ def contour_squares(
         scale: metres. Larger distances count less.
         grown: for each view, the derivatives of joints (T, F, 27, 3) and radii
             (F, 26, 2) by the factors. If it is empty, there are no factors.
+
+    Returns:
+        The halved Hessians and gradients of the squares.
     """
     skeleton = body.skeleton
     count = len(poses)
@@ -273,7 +275,7 @@ def fitted(
 
     Args:
         body: the person's.
-        views: the contours that each camera shows.
+        views: the contours that each camera shows in this frame.
         start: the poses and the places to begin with. The prior pulls the places to
             these.
         means: the poses (n, 66) to which the prior pulls the angles.
