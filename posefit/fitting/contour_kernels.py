@@ -201,9 +201,9 @@ def cone_distance(x, y, cone):
 def accumulate(products, share, slope, residual, weight):
     """Add the products of a residual to the products of its bone. contour (5).
 
-    They are 24 products of the residual and its derivatives. `slope` has the derivatives
-    by the column, the row and the radius of the disc at a `share` of the bone, from 0
-    at its start to 1 at its end. The derivatives by the first disc are `slope` times
+    They are 24 products of the residual and its derivatives. `slope` has derivatives by
+    the column, the row and the radius of the disc at a `share` of the bone, from 0 at
+    its start to 1 at its end. The derivatives by the first disc are `slope` times
     1 - share. The derivatives by the last disc are `slope` times share.
     """
     rest = 1.0 - share
