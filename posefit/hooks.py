@@ -52,7 +52,7 @@ class RegisterOptimiser(Protocol):
         Args:
             name: how users name it.
             factory: takes (space, rng) and keyword-only settings.
-            next_frame: what becomes of it in the next frame.
+            next_frame: what happens to the optimiser in the next frame.
             needs: a module that the factory imports, and what to install for it.
         """
 
@@ -132,7 +132,7 @@ class RegisterSegmenter(Protocol):
 
 
 class RegisterDevice(Protocol):
-    """Registers a device: its name, its factory, which raises InputError if there is none, and what it needs."""
+    """Registers a device, which draws poses."""
 
     def __call__(
         self,
@@ -141,7 +141,13 @@ class RegisterDevice(Protocol):
         *,
         needs: Needs | None = None,
     ) -> None:
-        """Register a device."""
+        """Register a device.
+
+        Args:
+            name: how users name it.
+            factory: takes nothing. Raises InputError if the machine has no such device.
+            needs: a module that the factory imports, and what to install for it.
+        """
 
 
 RegisterCommand: TypeAlias = Callable[["click.Command"], None]
@@ -189,7 +195,10 @@ def posefit_register_segmenters(register: RegisterSegmenter) -> Any:
 
 @hookspec
 def posefit_register_devices(register: RegisterDevice) -> Any:
-    """Call `register(name, factory)` for each device that draws poses; see `posefit.silhouette.mask.Device`."""
+    """Call `register(name, factory)` for each device that draws poses.
+
+    See `posefit.silhouette.mask.Device`.
+    """
 
 
 @hookspec

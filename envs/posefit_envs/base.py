@@ -460,13 +460,14 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """Set an attribute of each environment, as Gymnasium's own vectors do.
 
         Args:
-            name: any name. What the environments have in common, such as `world`, stays common to all.
-            values: a list or a tuple has a value for each environment; anything else is the value of all.
+            name: Any name. An attribute that all environments share, such as `world`,
+                stays shared.
+            values: A list or a tuple with a value for each environment, or one value
+                for all.
 
         Raises:
-            gymnasium.error.Error: there is another number of values, values that must be common differ, or the
-                attribute is one that `reset` sets, such as `number`.
-
+            gymnasium.error.Error: If the number of values is wrong, values of a shared
+                attribute differ, or `reset` sets the attribute, such as `number`.
         """
         if not isinstance(values, list | tuple):
             values = [values] * self.num_envs

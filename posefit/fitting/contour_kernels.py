@@ -1,20 +1,27 @@
-"""Gauss-Newton on contours, in numba: how far the border of a drawn body is from a mask's, and what moves it there.
+"""Gauss-Newton on contours, compiled by numba.
 
-docs/background/contour-fit.md derives the method; its equations have numbers, which are on the lines here, as in
-`# contour (3)`. In short:
+The residuals are distances between the border of a drawn body and the border of a mask.
+A step moves the body so that they shrink. docs/background/contour-fit.md derives the
+method. Its equations are numbered, and comments such as `# contour (3)` refer to them.
+In short:
 
-- A bone is drawn as a tapered cone, which six numbers place in the picture: two joints (u, v) and two radii. A distance
-  between the borders is one residual. It changes with the disc at one share of the bone, and by that share with the
-  discs at both ends (1) to (4).
-- The residuals of a bone are summed up to a 6 x 6 Hessian and a gradient (5) by a weight that bounds outliers (6). Both
-  consist of 24 sums of products, which are expanded once all residuals are added.
-- A twist, velocity and rotation, moves a bone. The chain rule makes of both a spatial Hessian and a spatial force over
-  twists (7) to (9), as a rigid body has a spatial inertia.
-- An angle turns everything beyond its joint. So it meets the sum over these bones, which the composite-rigid-body
-  algorithm forms from the ends of the limbs to the root (10) to (13).
-- A step of one frame is the solution of the normal equations with a prior, by elimination (15), (16).
+- A bone is drawn as a tapered cone. Six numbers place it in the picture: two joints
+  (u, v) and two radii. Each residual is a distance between the borders. It depends on
+  the disc at one share of the bone, and through that share on the discs at both ends
+  (1) to (4).
+- The residuals of a bone are summed to a 6 x 6 Hessian and a gradient (5), with a
+  weight that bounds outliers (6). Both consist of 24 sums of products, which are
+  expanded once all residuals are added.
+- A twist, velocity and rotation, moves a bone. The chain rule turns the Hessian and
+  the gradient into a spatial Hessian and a spatial force over twists (7) to (9), as a
+  rigid body has a spatial inertia.
+- An angle turns all bones beyond its joint. Its derivatives need the sums over these
+  bones. The composite-rigid-body algorithm forms them from the ends of the limbs to
+  the root (10) to (13).
+- A step of one frame solves the normal equations with a prior, by elimination (15),
+  (16).
 
-Shapes are checked by the callers.
+The callers check shapes.
 """
 
 import math
@@ -29,36 +36,42 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
 NUMBERS = 3 + ANGLES  # of a place and a pose
-# metres that a point of the border may be off: standard deviation, as the next
-BORDER_DEVIATION = 0.01
-PIXEL_DEVIATION = 0.5  # pixels, besides
-# metres of the border that are off together, so that they are one measurement
+# a point of the border has two independent errors, with these standard deviations
+BORDER_DEVIATION = 0.01  # metres
+PIXEL_DEVIATION = 0.5  # pixels
+# metres: a border of this length shares its error, and counts as one measurement
 CORRELATION_LENGTH = 0.09
-MIN_ROBUST_SCALE = 3.0  # pixels: what is farther off counts less
-CAP = 2  # points on a half of the disc's arc at a bone's end
-# pixels within another bone from which on a point of a bone's border is hidden
+MIN_ROBUST_SCALE = 3.0  # pixels: larger distances count less
+CAP = 2  # points on one half of the arc at a bone's end
+# a point of a bone's border is hidden if it lies deeper than this, in pixels, within
+# another bone
 COVERED = 0.25
 TINY = 1e-9
-# columns of a row of `cones`: the first disc; by how much the last one is off it, and its radius is less; the length of
-# the bone, and that of the cone's sides, which is 0 if one of its discs covers the other
+# columns of a row of `cones`: centre and radius of the first disc; the offset from its
+# centre to the last disc's; how much less the last radius is; the length of the bone;
+# and the length of the cone's sides, 0 if one disc covers the other
 X0, Y0, R0, DX, DY, TAPER, LENGTH, SIDE = range(8)
-PRODUCTS = 24  # of a bone's residuals, see `accumulate`
+PRODUCTS = 24  # sums of products of a bone's residuals, see `accumulate`
 
 
 class Contour(NamedTuple):
     """The border of the mask of one frame."""
 
-    field: NDArray[np.float32]  # (h, w) pixels outside the mask, below 0 within
+    field: NDArray[np.float32]  # (h, w) pixels outside the mask, negative within
     corner: NDArray[np.int64]  # (2,) column and row of the field's first pixel
     size: NDArray[np.int64]  # (2,) rows and columns of the field
     points: Array  # (n, 2) pixels of the border
     step: float  # pixels of the border that a point represents
-    # (n,) the bone nearest to each point in the step before, -1 at first; overwritten
+    # (n,) the bone nearest to each point in the step before, at first -1; each step
+    # overwrites them
     owners: NDArray[np.int64]
 
 
 class Contours(NamedTuple):
-    """The borders of the masks of T frames, or one that all frames share, as `MaskContours` has them."""
+    """The borders of the masks of T frames, or a single border that all frames share.
+
+    The fields are the same as in `MaskContours`.
+    """
 
     fields: NDArray[np.float32]  # (T, h, w)
     corners: NDArray[np.int64]  # (T, 2)
@@ -84,9 +97,12 @@ class Views(NamedTuple):
 
 
 class Prior(NamedTuple):
-    """What is known before a fit of the m numbers of n places and poses that may change."""
+    """What is known of n places and poses before a fit.
 
-    free: NDArray[np.int64]  # (m,) which of the 69 numbers they are
+    A place and a pose have 69 numbers, of which m may change.
+    """
+
+    free: NDArray[np.int64]  # (m,) indices of the numbers that may change
     means: Array  # (n, m)
     precisions: Array  # (m,)
 
@@ -95,31 +111,41 @@ class Bones(NamedTuple):
     """The drawn bones of one view."""
 
     cones: Array  # (B, 8) with columns from X0 to SIDE
-    discs: Array  # (B, 3) a disc about each bone: its middle and radius
-    neighbours: NDArray[np.int64]  # (n,) those that may hide a bone's border
+    discs: Array  # (B, 3) a disc around each bone: its centre and radius
+    neighbours: NDArray[np.int64]  # (n,) bones that may hide a bone's border
 
 
 class Growth(NamedTuple):
-    """What changes with F factors of the build, and the normal equations by them; F may be 0."""
+    """Derivatives by F factors of the build, and the factors' normal equations.
 
-    joints: Array  # (F, 27, 3), or (T, F, 27, 3): how joints change
-    radii: Array  # (F, 26, 2): how radii change
-    # (1 + F, 1 + F): in its first column half the gradient, in the rest half the second
-    # derivatives
+    F may be 0.
+    """
+
+    joints: Array  # (F, 27, 3), or (T, F, 27, 3): derivatives of joints
+    radii: Array  # (F, 26, 2): derivatives of radii
+    # (1 + F, 1 + F): half the gradient in the first column, half the second derivatives
+    # in the others
     squares: Array
 
 
 class BoneSquares(NamedTuple):
-    """Spatial Hessians and forces of the bone that ends in each joint, or those of T frames, halved."""
+    """Spatial Hessians and forces, halved, of the bone that ends in each joint.
+
+    They are of one frame, or of T frames.
+    """
 
     hessians: Array  # (27, 6, 6), or (T, 27, 6, 6)
-    # (27, 6, 1 + F), or (T, 27, 6, 1 + F): the gradient, and its derivatives by F factors
+    # (27, 6, 1 + F), or (T, 27, 6, 1 + F): the gradient, and its derivatives by the F
+    # factors
     forces: Array
 
 
 @jit
 def write_cones(parents, centres, radii, cones, discs):
-    """Write what distances from bones need (B, 8), and a disc about each bone (B, 3): its middle and radius."""
+    """Write `cones` (B, 8), from which distances follow, and `discs` (B, 3).
+
+    A disc encloses its bone. Its three numbers are its centre and radius.
+    """
     for b in range(parents.size):
         x = centres[parents[b], 0]
         y = centres[parents[b], 1]
@@ -146,7 +172,10 @@ def write_cones(parents, centres, radii, cones, discs):
 
 @inlined
 def cone_distance(x, y, cone):
-    """Return how far a point is outside a cone, below 0 within, the share of the bone it is at, and its normal."""
+    """Return a point's distance from a cone, its share of the bone, and the normal.
+
+    The distance is negative within the cone.
+    """
     x0 = cone[X0]
     y0 = cone[Y0]
     r0 = cone[R0]
@@ -170,10 +199,12 @@ def cone_distance(x, y, cone):
 
 @inlined
 def accumulate(products, share, slope, residual, weight):
-    """Add the products of a residual and its derivatives to those of a bone (24,). contour (5).
+    """Add the products of a residual to the products of its bone. contour (5).
 
-    The residual changes by `slope` with the column, the row and the radius of the disc at a `share` of the bone, from
-    0 at its start to 1 at its end. It changes by 1 - share of that with the first disc, and by share with the last.
+    They are 24 products of the residual and its derivatives. `slope` has derivatives by
+    the column, the row and the radius of the disc at a `share` of the bone, from 0 at
+    its start to 1 at its end. The derivatives by the first disc are `slope` times
+    1 - share. The derivatives by the last disc are `slope` times share.
     """
     rest = 1.0 - share
     near = rest * rest
@@ -194,7 +225,10 @@ def accumulate(products, share, slope, residual, weight):
 
 @inlined
 def expand(products, hessians, gradients):
-    """Add the products of bones (B, 24) to their Hessians (B, 6, 6) and gradients (B, 6), halved. contour (5)."""
+    """Add the products of bones (B, 24) to their Hessians and gradients. contour (5).
+
+    The Hessians (B, 6, 6) and gradients (B, 6) are halved.
+    """
     # the numbers of each end: column, row and radius
     numbers = np.empty((2, 3), np.int64)
     for end in range(2):
@@ -216,7 +250,7 @@ def expand(products, hessians, gradients):
 
 @inlined
 def _nearest_bone(x, y, first, cones, discs):
-    """Return the bone whose border is nearest to a point; begin with `first`."""
+    """Return the bone with the border nearest to a point, searching from `first` on."""
     least = cone_distance(x, y, cones[first])[0]
     bone = first
     for b in range(discs.shape[0]):
@@ -233,7 +267,7 @@ def _nearest_bone(x, y, first, cones, discs):
 
 @inlined
 def _write_neighbours(bone, discs, neighbours):
-    """Write the other bones whose discs meet that of a bone, and return how many they are."""
+    """Write which other bones have discs that meet the bone's. Return their number."""
     count = 0
     for b in range(discs.shape[0]):
         reach = discs[b, 2] + discs[bone, 2]
@@ -246,7 +280,7 @@ def _write_neighbours(bone, discs, neighbours):
 
 @inlined
 def visible(x, y, bones):
-    """Return whether a point of a bone's border is not covered by one of its neighbours."""
+    """Return whether a point of a bone's border is visible: no neighbour covers it."""
     cones = bones.cones
     discs = bones.discs
     shown = True
@@ -262,11 +296,12 @@ def visible(x, y, bones):
 
 @jit
 def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradients):
-    """Add the squared distances of the mask's border from the body's, and of the body's border from the mask's.
+    """Add the squared distances between the mask's border and the body's, both ways.
 
-    Each bone gets its own, as half a Hessian (B, 6, 6) and half a gradient (B, 6) by the column and row of its two
-    joints, and by both radii. Distances beyond `scale` pixels count less. The owners of the contour's points are
-    replaced by the bones that are nearest now.
+    They are added for each bone, as half a Hessian (B, 6, 6) and half a gradient (B, 6)
+    by the column and row of its two joints and by both radii. Distances beyond `scale`
+    pixels count less. The owners of the contour's points become the bones that are
+    nearest now.
     """
     count = parents.size
     cones = np.empty((count, 8))
@@ -276,7 +311,7 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     _accumulate_mask_border(contour, scale, cones, discs, products)
     neighbours = np.empty(count, np.int64)
     for b in range(count):
-        # else one of its discs covers the other
+        # otherwise one disc covers the other
         if cones[b, LENGTH] > abs(cones[b, TAPER]) + TINY:
             others = neighbours[: _write_neighbours(b, discs, neighbours)]
             bones = Bones(cones, discs, others)
@@ -289,7 +324,8 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
 def _accumulate_mask_border(contour, scale, cones, discs, products):
     """Add the squared distances of the mask's border from the nearest bones.
 
-    The bone that was nearest in the step before most often still is, and a search that begins with it is short.
+    Most points keep their nearest bone from one step to the next, so a search that
+    begins with it is short.
     """
     owners = contour.owners
     bone = 0
@@ -307,10 +343,11 @@ def _accumulate_mask_border(contour, scale, cones, discs, products):
 
 @inlined
 def _accumulate_point(disc, normal, length, contour, scale, bones, products):
-    """Add the squared distance of a point of a bone's border from the mask's, if it is visible.
+    """Add the squared distance of a visible point of a bone's border from the mask's.
 
-    The point is where the `normal` meets the border of a disc: its share of the bone, its centre and radius. It
-    represents a `length` of border, in pixels.
+    `disc` is a share of the bone, and the centre and radius there. The point is where
+    the `normal` meets the border of this disc. It represents a `length` of border, in
+    pixels. A point that is hidden, or outside the field, adds nothing.
     """
     share, u, v, radius = disc
     nx, ny = normal
@@ -325,7 +362,10 @@ def _accumulate_point(disc, normal, length, contour, scale, bones, products):
 
 @inlined
 def side_points(cone, contour, scale, bones, products):
-    """Add the squared distances of points of both sides of a bone's border, its tangent segments."""
+    """Add the squared distances of points on the two sides of a bone's border.
+
+    The sides are the segments that touch both discs.
+    """
     length = cone[LENGTH]
     dx = cone[DX] / length
     dy = cone[DY] / length
@@ -334,7 +374,7 @@ def side_points(cone, contour, scale, bones, products):
     pieces = max(int(length / (2.0 * contour.step)) + 1, 2)
     for i in range(pieces + 1):
         share = i / pieces
-        # the first and the last point have a neighbour on one side only
+        # the first and the last point have only one neighbour: half a piece each
         piece = length * sine / pieces * (0.5 if i in (0, pieces) else 1.0)
         radius = cone[R0] - share * cone[TAPER]
         u = cone[X0] + share * cone[DX]
@@ -348,14 +388,14 @@ def side_points(cone, contour, scale, bones, products):
 
 @inlined
 def cap_points(cone, contour, scale, bones, products):
-    """Add the squared distances of points of the arcs of both discs of a bone's border."""
+    """Add the squared distances of points on the two arcs of a bone's border."""
     length = cone[LENGTH]
     dx = cone[DX] / length
     dy = cone[DY] / length
-    # from the axis to the normal of the cone's side
+    # the angle from the axis to the normal of the cone's side
     tilt = math.acos(cone[TAPER] / length)
     for i in range(2 * CAP):
-        # the last disc, then the first
+        # the arc of the last disc comes before the arc of the first
         last = i < CAP
         share = 1.0 if last else 0.0
         start = 0.0 if last else tilt
@@ -376,7 +416,10 @@ def cap_points(cone, contour, scale, bones, products):
 
 @inlined
 def field_distance(x, y, contour):
-    """Return whether a point lies in the field, how far it is from the mask's border there, and the slope of that."""
+    """Return whether the field covers a point, its distance there, and the slope (2,).
+
+    The distance is from the mask's border, in pixels, and negative within the mask.
+    """
     known = False
     off = 0.0
     across = 0.0
@@ -403,9 +446,10 @@ def field_distance(x, y, contour):
 
 @inlined
 def _project_joints(camera, frames, centres, scales, moves):
-    """Write where joints are in the picture (27, 2), the pixels of a metre there (27,), and how both change.
+    """Write the joints' pixels (27, 2), the pixels of a metre there (27,), and `moves`.
 
-    The derivatives by a joint's place are (3, 3): of its column, of its row, and of the pixels of a metre.
+    `moves` (27, 3, 3) has the derivatives by a joint's place: of its column, of its
+    row, and of the pixels of a metre.
     """
     rotation, translation, focal, centre = camera
     for j in range(frames.shape[0]):
@@ -442,13 +486,16 @@ def _project_joints(camera, frames, centres, scales, moves):
 
 @inlined
 def _end_of(k, b, parent):
-    """Return the joint that the k-th of a bone's six numbers belongs to."""
+    """Return the joint to which the k-th of a bone's six numbers belongs."""
     return parent if k in (0, 1, 4) else b + 1
 
 
 @inlined
 def _write_twist_rows(b, parent, radii, frames, moves, rows):
-    """Write the derivatives (6, 6) of a bone's six numbers by a twist: velocity, then rotation. contour (8)."""
+    """Write the derivatives (6, 6) of a bone's six numbers by a twist. contour (8).
+
+    A twist is a velocity, then a rotation.
+    """
     for k in range(6):
         j = _end_of(k, b, parent)
         which = k % 2 if k < 4 else 2
@@ -470,7 +517,10 @@ def _write_twist_rows(b, parent, radii, frames, moves, rows):
 
 @inlined
 def _accumulate_twists(rows, drawn, worth, work, hessian, force):
-    """Add a bone's Hessian and gradient by six numbers, `drawn`, to those over twists. contour (9)."""
+    """Add a bone's Hessian and gradient to its spatial ones, over twists. contour (9).
+
+    `drawn` has the Hessian and the gradient by the bone's six numbers.
+    """
     block, gradient = drawn
     for i in range(6):
         for j in range(6):
@@ -492,9 +542,9 @@ def _accumulate_twists(rows, drawn, worth, work, hessian, force):
 
 @jit
 def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
-    """Add the squares of one view to those of the bones, `sums`. `frames` (27, 4, 3) are of the joints.
+    """Add the squares of one view to the `sums` of the bones.
 
-    A distance counts less beyond `reach` metres.
+    `frames` (27, 4, 3) are of the joints. Distances beyond `reach` metres count less.
     """
     hessians, forces = sums
     count = parents.size
@@ -506,7 +556,7 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     for b in range(count):
         drawn_radii[b, 0] = scales[parents[b]] * radii[b, 0]
         drawn_radii[b, 1] = scales[b + 1] * radii[b, 1]
-    metre = scales[0]  # pixels, where the root is
+    metre = scales[0]  # pixels of a metre at the root
     scale = max(reach * metre, MIN_ROBUST_SCALE)
     blocks = np.zeros((count, 6, 6))
     gradients = np.zeros((count, 6))
@@ -525,7 +575,10 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
 
 @jit
 def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
-    """Add the derivatives of bone b's residuals by factors of the build, see `add_view`. contour (14)."""
+    """Add bone b's normal equations by factors of the build. contour (14).
+
+    See `add_view`.
+    """
     block, gradient = drawn
     factors = len(grown.joints)
     changes = np.zeros((6, 1 + factors))
@@ -552,11 +605,15 @@ def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
 
 @jit
 def write_screws(chain, frames, sines, cosines, screws):
-    """Write the twist (69, 6) of the place's axes, velocity then rotation, and of each angle. contour (10)."""
+    """Write the twists (69, 6) of the place's axes and of the angles. contour (10).
+
+    A twist is a velocity, then a rotation.
+    """
     screws[:] = 0.0
     root = frames[0, 3]
     axes = np.empty((3, 3))
-    # yaw turns about the world's vertical, pitch about the axis that yaw has turned, roll about the body's own
+    # yaw turns about the world's vertical, pitch about an axis that yaw has turned, and
+    # roll about an axis of the body
     axes[0, 0] = 0.0
     axes[0, 1] = 1.0
     axes[0, 2] = 0.0
@@ -588,7 +645,10 @@ def write_screws(chain, frames, sines, cosines, screws):
 
 @inlined
 def _screw(screw, axis, pivot):
-    """Write the twist of a turn about an axis through a point: the velocity of the world's origin, and the axis."""
+    """Write the twist of a turn about an axis through a point.
+
+    It is the velocity of the world's origin, and the axis.
+    """
     screw[0] = pivot[1] * axis[2] - pivot[2] * axis[1]
     screw[1] = pivot[2] * axis[0] - pivot[0] * axis[2]
     screw[2] = pivot[0] * axis[1] - pivot[1] * axis[0]
@@ -599,11 +659,19 @@ def _screw(screw, axis, pivot):
 
 @jit
 def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
-    """Write the second derivatives (69, 69), their lower half, and the gradient and those by factors (69, 1 + F).
+    """Write the derivatives by a place and a pose, from the bones' Hessians and forces.
 
-    This is the composite-rigid-body algorithm, with spatial Hessians for spatial inertias. The derivatives are by a
-    place and a pose, whose twists are `screws` (69, 6), 0 for what is held. The `hessians` and `forces` of bones are
-    replaced by those of all that moves with a joint.
+    This is the composite-rigid-body algorithm, with spatial Hessians in place of
+    spatial inertias.
+
+    Args:
+        chain: the skeleton's.
+        screws: twists (69, 6) of the place and the pose, 0 for a number that is held.
+        hessians: spatial Hessians of the bones. Each is overwritten with the sum over
+            all bones that move with the joint.
+        forces: spatial forces of the bones, overwritten in the same way.
+        matrix: second derivatives (69, 69); only the lower half is written.
+        gradients: the gradient and its derivatives by factors (69, 1 + F).
     """
     parents = chain.parents
     # from the ends of the limbs to the root, contour (11)
@@ -631,7 +699,7 @@ def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
                     gradients[a, f] += (
                         screws[a, i] * forces[joint, i, f]
                     )  # contour (12)
-            # the numbers of the joint and of those between it and the root
+            # the numbers of the joint and of all joints between it and the root
             other = joint
             while True:
                 start, many = _numbers(chain, other)
@@ -647,7 +715,7 @@ def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
 
 @inlined
 def _numbers(chain, joint):
-    """Return the first of the numbers that turn or move a joint, and how many there are."""
+    """Return the first of the numbers that turn or move a joint, and their count."""
     if joint == 0:
         return 0, 6
     a = chain.angles[joint - 1]
@@ -656,7 +724,10 @@ def _numbers(chain, joint):
 
 @jit
 def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
-    """Add the squares of one view of T frames, with joints (T, 27, 4, 3), to those of the bones, see `add_view`."""
+    """Add the squares of one view of T frames to the `sums` of the bones.
+
+    `frames` (T, 27, 4, 3) are of the joints. See `add_view`.
+    """
     starts = contours.starts
     for i in range(len(frames)):
         k = min(i, len(starts) - 2)
@@ -677,9 +748,10 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
 
 @jit
 def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
-    """Move poses (n, 66) and places (n, 3) to the contours of one frame, a step for each of `reaches`, metres.
+    """Move poses (n, 66) and places (n, 3) to the contours of one frame.
 
-    Each is a Gauss-Newton step, with a `prior`. No angle turns farther than `max_turn`, radians, in one.
+    One Gauss-Newton step with a `prior` is made for each of `reaches`, in metres. In a
+    step no angle turns by more than `max_turn`, in radians.
     """
     free = prior.free
     count = poses.shape[0]
@@ -714,7 +786,10 @@ def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
 
 @inlined
 def _add_views(parents, radii, views, frames, owners, reach, bones):
-    """Write the squares of one frame's views to those of the bones, see `add_view`. `owners` (n,) are of all points."""
+    """Overwrite the squares of the bones with the sums over one frame's views.
+
+    `owners` (n,) are of the points of all views. See `add_view`.
+    """
     bones.hessians[:] = 0.0
     bones.forces[:] = 0.0
     joints = parents.size + 1
@@ -744,7 +819,10 @@ def _add_views(parents, radii, views, frames, owners, reach, bones):
 
 @inlined
 def _write_equations(numbers, prior, means, derivatives, matrix, right):
-    """Write the normal equations of a step (m, m), the upper half, and (m,). contour (15)."""
+    """Write the normal equations of a step, `matrix` and `right`. contour (15).
+
+    Of the matrix (m, m) only the upper half is written. The right side is (m,).
+    """
     place, pose = numbers
     hessian, gradient = derivatives
     free = prior.free
@@ -760,7 +838,10 @@ def _write_equations(numbers, prior, means, derivatives, matrix, right):
 
 @inlined
 def _subtract(numbers, free, step, max_turn):
-    """Subtract a step (m,) from the free numbers of a place and a pose."""
+    """Subtract a step (m,) from the free numbers of a place and a pose.
+
+    No angle changes by more than `max_turn`.
+    """
     place, pose = numbers
     for a in range(free.size):
         number = free[a]
@@ -772,9 +853,10 @@ def _subtract(numbers, free, step, max_turn):
 
 @jit
 def solve_symmetric(matrix, right):
-    """Solve for a vector (m,), in its place, by elimination in the upper half of a positive definite matrix (m, m).
+    """Solve a positive definite system by elimination, in place. contour (16).
 
-    Both are overwritten. contour (16).
+    Only the upper half of the matrix (m, m) is read. The matrix is overwritten, and the
+    right side (m,) becomes the solution.
     """
     m = right.size
     for k in range(m):
@@ -792,10 +874,15 @@ def solve_symmetric(matrix, right):
 
 @jit
 def add_all_bones(chain, placed, bones, free, out):
-    """Write what `composite_hessian` gives in T frames, of those numbers of a frame, `free` (m,), that may change.
+    """Write the results of `composite_hessian` for T frames.
 
-    `placed` are frames, sines and cosines of `place_frames`, and `bones` Hessians and forces. `out` are second
-    derivatives (T, m, m) and gradients with derivatives by factors (T, m, 1 + F).
+    Args:
+        chain: the skeleton's.
+        placed: frames, sines and cosines from `place_frames`.
+        bones: spatial Hessians and forces, which are overwritten.
+        free: indices (m,) of the numbers of a frame that may change.
+        out: the arrays to write. Second derivatives (T, m, m), and gradients with their
+            derivatives by factors (T, m, 1 + F).
     """
     frames, sines, cosines = placed
     hessians, forces = bones

@@ -1,4 +1,8 @@
-"""Poses moved until the contours of a body are those of masks, by least squares: one frame, or the sums for many."""
+"""Moves poses until the contours of a body match the contours of masks.
+
+The fit is by least squares. `contour_fit` fits one frame. `contour_squares` returns the
+sums for a fit of many frames.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,9 +27,9 @@ from posefit.silhouette.mask import (
 )
 from posefit.silhouette.sharing import shares_of, work_through
 
-# pixels of a metre; of finer masks only every second pixel, third, ... is used
+# pixels of a metre; of a finer mask only every second, third or later pixel is used
 FINE_PIXELS = 80.0
-FIELD_MARGIN = 48  # pixels around a mask whose distance from it is known
+FIELD_MARGIN = 48  # pixels: distances are known up to this margin around a mask
 
 Distances = NDArray[np.float32]
 Integers = NDArray[np.int64]
@@ -33,17 +37,21 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class MaskContours:
-    """What one camera shows of the border in T frames; a frame that shows too little has no points."""
+    """The border of a person in T frames of one camera.
 
-    camera: Camera  # whose pixels these are: of fine masks a coarser one than theirs
-    metres: Array  # (T,) pixels of a metre where the person is
+    A frame that shows too little has no points.
+    """
+
+    # all pixels below are this camera's; for fine masks it is coarser than the masks'
+    camera: Camera
+    metres: Array  # (T,) pixels of a metre at the person's distance
     step: float  # pixels of the border that a point represents
-    # (T, h, w) pixels outside the mask, below 0 within; 0 where it is unknown
+    # (T, h, w) pixels outside the mask, negative within, and 0 if unknown
     fields: Distances = field(repr=False)
     # (T, 2) column and row of each field's first pixel
     corners: Integers = field(repr=False)
     sizes: Integers = field(repr=False)  # (T, 2) rows and columns of each field
-    # (n, 2) pixels: of the borders, frame after frame
+    # (n, 2) pixels of the borders, frame after frame
     points: Array = field(repr=False)
     # (T + 1,) where the points of each frame begin
     starts: Integers = field(repr=False)
@@ -57,9 +65,15 @@ class MaskContours:
         places: Array,
         spacing: float = 0.0,
     ) -> Self:
-        """Return the borders of a person whose root is about at `places` (T, 3), from a camera, number `view`.
+        """Return the borders of a person from the masks of one camera.
 
-        Points are about `spacing` metres apart, but at least a pixel.
+        Args:
+            camera: the camera.
+            view: its number.
+            observations: the frames.
+            places: places (T, 3) of the person's root, roughly.
+            spacing: metres between two points of a border, roughly. Points are at least
+                a pixel apart.
         """
         far = np.maximum(camera.project(places)[1], 0.1)
         metres = np.sqrt(camera.focal.prod()) / far
@@ -89,7 +103,7 @@ class MaskContours:
         )
 
     def seen_by(self, camera: Camera) -> Self:
-        """Return the same borders as a camera sees them that stands and looks elsewhere."""
+        """Return the same borders, seen with the position and rotation of `camera`."""
         return replace(
             self,
             camera=replace(
@@ -105,7 +119,10 @@ class MaskContours:
         grown: kernels.Growth,
         sums: kernels.BoneSquares,
     ) -> None:
-        """Add the squares of the distances between these borders and those of bodies, see `kernels.add_frames`."""
+        """Add the squared distances between these borders and the borders of bodies.
+
+        See `kernels.add_frames`.
+        """
         camera = tuple(
             writeable(getattr(self.camera, name))
             for name in ("rotation", "translation", "focal", "centre")
@@ -128,7 +145,10 @@ class MaskContours:
 def _border(
     observation: Observation, view: int, factor: int, step: int
 ) -> tuple[Array, tuple[int, int], Distances]:
-    """Return every `step`th point of a mask's border (n, 2), and the corner and the distances about it."""
+    """Return every `step`th point of a mask's border (n, 2), a corner, and distances.
+
+    The corner is the column and row of the first pixel of the distances.
+    """
     nothing = np.empty((0, 2)), (0, 0), np.zeros((1, 1), dtype=np.float32)
     if not observation.usable:
         return nothing
@@ -141,7 +161,7 @@ def _border(
     )
     mask = without_small_pieces(mask)
     box = rows, columns = padded_box(mask, FIELD_MARGIN)
-    mask, around = mask[box], valid[box] & ~mask[box]  # the background there is known
+    mask, around = mask[box], valid[box] & ~mask[box]  # around: known background
     if not mask.any() or not around.any():
         return nothing
     pixels = np.concatenate(
@@ -152,7 +172,11 @@ def _border(
 
 
 def distances_outside(mask: Mask, around: Mask) -> Distances:
-    """Return how far pixels (h, w) are outside a mask's border, below 0 within, and 0 where neither is true."""
+    """Return how far pixels (h, w) are outside a mask's border.
+
+    Distances are negative within the mask, and 0 where neither `mask` nor `around` is
+    true.
+    """
     out, within = (
         cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) - 0.5
         for part in (mask, around)
@@ -163,16 +187,17 @@ def distances_outside(mask: Mask, around: Mask) -> Distances:
 
 
 def _between(mask: Mask, around: Mask) -> Array:
-    """Return the middles (n, 2) of edges between a pixel of the mask and its neighbour to the side."""
+    """Return the middles (n, 2) of the upright edges between the mask and `around`."""
     meet = (mask[:, 1:] & around[:, :-1]) | (mask[:, :-1] & around[:, 1:])
     rows, columns = np.nonzero(meet)
     return np.column_stack([columns + 1.0, rows + 0.5])
 
 
 class ContourSquares(NamedTuple):
-    """Half the Hessians and half the gradients of the squared distances between borders.
+    """Half the Hessians and gradients of the squared distances between borders.
 
-    They are by n numbers of each frame, the root's place and the free angles, and by F factors that frames share.
+    They are by n numbers of each frame, the root's place and the free angles, and by F
+    factors that all frames share.
     """
 
     hessians: Array  # (T, n, n)
@@ -190,10 +215,20 @@ def contour_squares(
     scale: float,
     grown: Sequence[tuple[Array, Array]] = (),
 ) -> ContourSquares:
-    """Return the squares of the distances between the borders of masks and those of a body in T poses at places.
+    """Return the squared distances between the borders of masks and of a body.
 
-    Views have T frames, or one that all poses belong to. Distances beyond `scale` metres count less. `grown` says of
-    each view how joints (T, F, 27, 3) and radii (F, 26, 2) change with the factors; without it there are none.
+    Args:
+        body: the person's.
+        views: the contours that each camera shows, of T frames, or of a single frame
+            that all poses share.
+        poses: poses (T, 66).
+        places: places (T, 3).
+        scale: metres. Larger distances count less.
+        grown: for each view, the derivatives of joints (T, F, 27, 3) and radii
+            (F, 26, 2) by the factors. If it is empty, there are no factors.
+
+    Returns:
+        The halved Hessians and gradients of the squares.
     """
     skeleton = body.skeleton
     count = len(poses)
@@ -217,12 +252,13 @@ def contour_squares(
     )
 
 
-# metres, step by step: what is farther off counts less, as it may be another person's, or a bag's
+# metres, step by step: larger distances count less, because that border may belong to
+# another person, or to a bag
 ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
-MAX_ANGLE_STEP = np.radians(20.0)  # of a step
-# metres, about, between two points of a mask's border, where one frame is fitted
+MAX_ANGLE_STEP = np.radians(20.0)  # in one step
+# metres between two points of a mask's border, roughly, in the fit of one frame
 POINT_SPACING = 0.04
-# that a step of one frame counts as; docs/studies/follow.py measures how many it takes
+# the evaluations that a step of one frame counts as, measured by docs/studies/follow.py
 STEP_EVALUATIONS = 27.0
 
 
@@ -235,10 +271,17 @@ def fitted(
     scales: Sequence[float],
     threads: int = 1,
 ) -> tuple[Array, Array]:
-    """Return poses (n, 66) and places (n, 3) after a step to the contours of one frame for each of `scales`.
+    """Return poses (n, 66) and places (n, 3) fitted to the contours of one frame.
 
-    Angles are pulled to `means` (n, 66), places to where they `start`, with `precisions` (69,) of places and angles.
-    Contours farther off than a scale, metres, count less. The result is the same with any number of `threads`.
+    Args:
+        body: the person's.
+        views: the contours that each camera shows in this frame.
+        start: the poses and the places to begin with. The prior pulls the places to
+            these.
+        means: the poses (n, 66) to which the prior pulls the angles.
+        precisions: the prior's precisions (69,) of places and angles.
+        scales: metres, one for each step. Larger distances count less.
+        threads: number of threads. Does not change the result.
     """
     free = np.flatnonzero(np.append([True] * 3, body.skeleton.free))
     poses = writeable(start[0].copy())
@@ -265,7 +308,7 @@ def fitted(
 
 
 def _stacked(views: Sequence[MaskContours]) -> kernels.Views:
-    """Return the borders of one frame's masks, as its kernel wants them."""
+    """Return the borders of one frame's masks in the form that `fit_poses` takes."""
     cameras = [view.camera for view in views]
     size = np.max([view.fields.shape[1:] for view in views], axis=0)
     fields = np.zeros((len(views), *size), dtype=np.float32)
@@ -286,8 +329,8 @@ def _stacked(views: Sequence[MaskContours]) -> kernels.Views:
     )
 
 
-# the steps of each round of a race, by their scales, and the share of the poses that
-# takes part in it, the cheapest ones
+# for each round of a race, the scales of its steps and the share of the poses that take
+# part: the cheapest ones
 ROUNDS: Sequence[tuple[Sequence[float], float]] = (
     ((0.09, 0.065), 1.0),
     ((0.065, 0.045, 0.045), 0.33),
@@ -296,7 +339,11 @@ ROUNDS: Sequence[tuple[Sequence[float], float]] = (
 
 
 def race_count(evaluations: float) -> int:
-    """Return how many poses can race within so many evaluations, and have their costs at the end; 0 if not even one."""
+    """Return how many poses can race within a number of evaluations.
+
+    The evaluations include the poses' costs at the end. The count is 0 if they do not
+    suffice for one pose.
+    """
     count = 0
     while _race_evaluations(count + 1) <= evaluations:
         count += 1
@@ -319,20 +366,20 @@ def contour_race(
     weights: Array,
     cost: Callable[[Array, Array], Array],
 ) -> tuple[Array, Array, int]:
-    """Return poses (n, 66) and places (n, 3) fitted to the contours of a frame in rounds, the cheapest of them longest.
+    """Return poses (n, 66) and places (n, 3) fitted to a frame's contours in rounds.
 
-    The right pose is seldom the cheapest before it is fitted, and a wrong one seldom becomes as cheap as the right one.
+    The cheapest poses are fitted longest. The right pose is seldom the cheapest before
+    it is fitted, and a wrong one seldom becomes as cheap as the right one.
 
     Args:
         body: the person's.
         views: the contours that each camera shows.
         start: the poses and the places to begin with.
         weights: the precisions (69,) of places and angles, see `precisions`.
-        cost: returns the costs (n,) of poses at places; each counts as an evaluation.
+        cost: returns the costs (n,) of poses at places. Each counts as an evaluation.
 
     Returns:
-        All poses and places, and the evaluations, of which each step counts as 27.
-
+        All poses and places, and the number of evaluations. A step counts as 27.
     """
     poses, places = (array.copy() for array in start)
     evaluations = 0
@@ -350,7 +397,10 @@ def contour_race(
 
 
 def precisions(turn: float, shift: float) -> Array:
-    """Return the precisions (69,) of a place and of angles with standard deviations, metres and radians."""
+    """Return the precisions (69,) of a place and of angles.
+
+    The standard deviations are `shift`, in metres, and `turn`, in radians.
+    """
     return np.concatenate([np.full(3, shift**-2.0), np.full(ANGLES, turn**-2.0)])
 
 
@@ -361,10 +411,21 @@ def contour_fit(
     deviations: tuple[float, float],
     evaluations: int,
 ) -> tuple[Array, Array, int]:
-    """Return a pose (66,) and a place (3,) moved until the body's contours are those of the masks, and what it costs.
+    """Return a pose and a place fitted to the contours of the masks, and the cost.
 
-    `start` is the pose and the place to begin with, which angles and place are off by about `deviations`, radians and
-    metres. Up to twelve Gauss-Newton steps are made, each of which costs as much as 27 evaluations.
+    Up to twelve Gauss-Newton steps are made. Each costs as much as 27 evaluations.
+
+    Args:
+        task: the body and the cameras.
+        observation: the frame.
+        start: the pose (66,) and the place (3,) to begin with.
+        deviations: the expected errors of the start's angles, in radians, and of its
+            place, in metres.
+        evaluations: the most that the fit may cost.
+
+    Returns:
+        The pose (66,), the place (3,), and the number of evaluations that the steps
+        cost.
     """
     pose, place = (np.array(part, dtype=np.float64)[None] for part in start)
     scales = ROBUST_SCALES[: max(int(evaluations // STEP_EVALUATIONS), 0)]

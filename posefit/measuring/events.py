@@ -25,7 +25,7 @@ MIN_FPS = 2.0 * CUTOFF_HZ  # frames per second: the Nyquist rate
 SWAY_HZ = 0.3
 # metres that a foot must swing relative to the pelvis, for an event
 MIN_FOOT_SWING = 0.1
-MIN_SWING_SHARE = 0.2  # and the least share of the range of all its swings
+MIN_SWING_SHARE = 0.2  # and at least this share of the range of all its swings
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +115,11 @@ def _tops(series: Array) -> Array:
 
 
 def _peaks(series: Array) -> list[tuple[int, float]]:
-    """Return where a series is higher than beside, and by how much it falls from there before it is higher again.
+    """Return the local maxima of a series, each with its prominence.
 
-    Of several equal highest values side by side the middle one counts. The fall is the lesser of both sides'.
+    The prominence is how far the series falls from a maximum before it rises above it
+    again, on the side where it falls less. Of several equal highest values in a row,
+    the middle one counts.
     """
     starts = np.flatnonzero(np.append(True, np.diff(series) != 0.0))
     values = series[starts]
