@@ -66,7 +66,7 @@ class Calibration:
 
     @property
     def position(self) -> Array | None:
-        """The position (3,) in the file's world, or None if the camera is not placed."""
+        """The position (3,) in the file's world, or None if it is not known."""
         if self.rotation is None or self.translation is None:
             return None
         return np.asarray(-self.rotation.T @ self.translation)
