@@ -1,6 +1,6 @@
 """EasyMocap's intri.yml and extri.yml.
 
-Either may be given; the other is read from the same folder.
+Either may be given; the other is read from the same folder. Lengths are metres.
 """
 
 from collections.abc import Mapping

@@ -1,6 +1,7 @@
 """Kalibr's camchain.yaml.
 
-Each camera's place is relative to the previous camera, or to the IMU.
+Each camera's place is relative to the previous camera, or to the IMU. Lengths are
+metres.
 """
 
 from collections.abc import Mapping
@@ -26,7 +27,7 @@ LENSES = {"radtan": False, "none": False, "equidistant": True}
 KEYS = {
     *("camera_model", "intrinsics", "distortion_model", "distortion_coeffs"),
     *("resolution", CHAINED, FROM_IMU),
-    # when the pictures came, and by which topic
+    # the pictures' topic, overlap and timing
     *("rostopic", "cam_overlaps", "timeshift_cam_imu", "line_delay"),
     # Kalibr does not write these; users add them
     *("rvec", "tvec"),

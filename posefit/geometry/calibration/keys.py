@@ -1,4 +1,4 @@
-"""Decides from the name of an unknown key whether it may describe the lens or the place.
+"""Unknown keys: whether their names say that they describe the lens or the place.
 
 The keys that a program writes are listed with its dialect. Users choose names too, or
 add values. An unknown key that holds numbers is an error, unless its name says that

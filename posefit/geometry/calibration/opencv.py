@@ -104,7 +104,7 @@ def _read(stored: Stored) -> list[Calibration]:
         inner = list[tuple[str, Mapping[str, Any]]]()
         for name, table in tables:
             table = _whole(table)
-            # a camera may be called K or D: its table is no matrix
+            # a camera may be called K or D: its table is not a matrix
             known = {
                 plain(key): value
                 for key, value in table.items()
@@ -136,7 +136,7 @@ def _has_tables(value: Any) -> bool:
 
 
 def _whole(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a camera's table with its tables `intrinsics` and `extrinsics` merged in."""
+    """Return a camera's table, with its `intrinsics` and `extrinsics` merged in."""
     whole = dict[str, Any]()
     for key, value in table.items():
         inner = isinstance(value, dict) and not any(map(_has_tables, value.values()))

@@ -1,4 +1,4 @@
-"""The world of several cameras: which way is up, and whether their places are possible."""
+"""The world of several cameras: its up direction, and a check of their places."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -28,8 +28,8 @@ AIMED = 0.5
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
-    The up direction is `up` if it is given, or +y if the file states it. Otherwise it is
-    the axis, in either direction, that is nearest to the up direction of the images.
+    The up direction is `up` if it is given, or +y if the file states it. Otherwise it
+    is the axis, in either direction, that is nearest to the up direction of the images.
     Raises InputError if `up` is not an axis.
     """
     if up is not None and up not in TURNS:
@@ -71,7 +71,7 @@ def guessed_up(calibrations: Sequence[Calibration]) -> str:
 
 
 def _image_up(calibrations: Sequence[Calibration]) -> Array | None:
-    """Return the images' up direction (3,) in the world, or None without placed cameras."""
+    """Return the images' up direction (3,) in the world, or None without places."""
     placed = [camera.rotation for camera in calibrations if camera.rotation is not None]
     return -np.sum([rotation[1] for rotation in placed], axis=0) if placed else None
 
