@@ -93,7 +93,7 @@ def _moved(place: Place, rotation: Array, translation: Array, scale: float) -> P
 
 
 def _camera(name: str, sensor: Any, place: Place, scale: Any) -> Calibration:
-    # the last calibration is the adjusted one
+    # if there are two calibrations, the second is the adjusted one
     found = sensor.findall("calibration")
     if not found:
         raise InputError(f"the sensor of {quoted(name)} without a calibration")

@@ -88,7 +88,7 @@ def _read(stored: Stored) -> list[Calibration]:
 
 
 def _names(paths: Sequence[str]) -> list[str]:
-    """Return file names without folder and suffix; the whole path if two are the same."""
+    """Return file names without folder and suffix, or the path if two are equal."""
     stems = [PurePosixPath(path).stem for path in paths]
     seen = Counter(stems)
     return [

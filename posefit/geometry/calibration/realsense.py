@@ -21,10 +21,10 @@ from posefit.geometry.calibration.values import (
 from posefit.reading import quoted
 
 REQUIRED = {"ppx", "ppy", "fx", "fy"}
-# `depth_scale` is the unit of depth pictures
+# `depth_scale` is for depth pictures
 KEYS = REQUIRED | {"width", "height", "model", "coeffs", "depth_scale"}
-# OpenCV's lens models, and whether each is a fisheye. RealSense's other models distort in
-# another way, or describe how to remove the distortion.
+# OpenCV's lens models, and whether each is a fisheye. RealSense's other models distort
+# in another way, or describe how to remove the distortion.
 LENSES = {"none": False, "brownconrady": False, "kannalabrandt4": True}
 
 

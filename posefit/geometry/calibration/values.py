@@ -19,7 +19,7 @@ from posefit.errors import InputError
 from posefit.reading import parsed_json, parsed_toml, quoted
 
 LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
-# OpenCV's element types of less than 64 bits: numbers are rounded to them when read
+# OpenCV's short floating-point types: numbers are rounded to them when they are read
 _ROUNDED = {"f": np.float32, "h": np.float16}
 _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
 

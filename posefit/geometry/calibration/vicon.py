@@ -47,7 +47,7 @@ SAMPLES = 50
 def _read(stored: Stored) -> list[Calibration]:
     cameras = list(stored.root.findall("Camera"))
     filming = [camera for camera in cameras if camera.get("SYSTEM") == VIDEO]
-    # a camera that was not calibrated has no key frame
+    # a camera that saw nothing during the calibration has no key frame
     return [
         _camera(camera, frames[0])
         for camera in filming or cameras
@@ -107,8 +107,8 @@ def _lens(frame: Any, centre: Array, focal: float, size: Array) -> Array:
 def _turned_around(radial: ArrayLike, focal: float, reach: float) -> Array:
     """Return OpenCV's eight numbers of a lens.
 
-    `radial` leads from the distorted picture to the straight one. `reach` is the largest
-    distance from the centre, in pixels, at which the numbers are fitted.
+    `radial` leads from the distorted picture to the straight one. `reach` is the
+    largest distance from the centre, in pixels, at which the numbers are fitted.
     """
     radial = np.asarray(radial, dtype=np.float64)
     if not radial.any():
