@@ -8,7 +8,7 @@ from posefit.geometry.calibration.lens import Calibration, numbers_of, stated
 from posefit.geometry.calibration.values import Stored, check_keys, matrix_of
 
 REQUIRED = {"K", "distCoef", "R", "t", "resolution"}
-# the others say which of the dome's cameras it is
+# the other keys say which of the dome's cameras it is
 KEYS = REQUIRED | {"name", "type", "panel", "node"}
 
 

@@ -81,7 +81,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         content = stored(path, text)
         dialect = dialect_of(content)
         written_by = f" of {dialect.program}"
-        # no warnings: the checks say more about numbers that are or become infinite
+        # no warnings: the checks say more about numbers that are not finite
         with np.errstate(all="ignore"):
             calibrations = dialect.read(content)
             check_places(calibrations)
