@@ -2,19 +2,22 @@
 
 | looking for | file |
 |---|---|
-| which program wrote a file: the table that a dialect joins by a line | read.py |
-| what recognises a dialect, what it reads, which keys it knows | a file a program, such as kalibr.py |
-| what a file says of one camera, its lens, and pictures without distortion | lens.py |
+| which program wrote a file; the list of dialects | read.py |
+| how one program's files are recognised and read | one file each, such as kalibr.py |
+| one camera, its lens, and pictures without distortion | lens.py |
 | which way is up in the cameras' world | world.py |
 | text, numbers and tables in YAML, JSON, TOML and XML | values.py |
+| unknown keys: whether they may describe the lens or the place | keys.py |
 
-A file holds one camera or several; `cameras.toml:left` is one of them by its name. All become
-camera_from_world in OpenCV's frame, x right, y down and z forward. Which way is up in their world
-differs, and is turned to +y: the axis that the images of all cameras see pointing up, unless `up`
-names one. Lengths are in the file's own unit, see `footage/cameras.py`, and metres where a program
-always writes one unit.
+A file holds one camera or several; `cameras.toml:left` is the camera named left. All
+cameras become camera_from_world in OpenCV's frame: x right, y down and z forward.
 
-What a dialect does not know it refuses by its name. Messages of errors complete `expected a
+The up direction of the file's world is turned to +y. It is `up` if that is given, or
+else the axis that points up in the images of all cameras. Lengths are metres if the
+program always writes one unit, and in the file's own unit otherwise; see
+`footage/cameras.py`.
+
+An unknown key is an error that names the key. Messages of errors complete `expected a
 calibration ..., got ...`.
 """
 

@@ -1,6 +1,8 @@
-"""TOML of Anipose, and what writes as it does: Pose2Sim, FreeMoCap, Caliscope; the AIST database has the same in JSON.
+"""Anipose's TOML, which Pose2Sim, FreeMoCap and Caliscope write too.
 
-A table a camera, or a table of these: a rotation about an axis and a translation, from the world to the camera.
+The AIST database has the same keys in JSON. Each camera is a table, at the top or in
+another table, with a rotation about an axis and a translation, both from the world to
+the camera.
 """
 
 from collections.abc import Iterator, Mapping
@@ -14,9 +16,9 @@ from posefit.geometry.calibration.values import Stored, matrix_of
 
 KEYS = {
     *("name", "size", "matrix", "distortions", "rotation", "translation", "fisheye"),
-    # FreeMoCap's, which follow from the rotation and the translation
+    # FreeMoCap: they follow from the rotation and the translation
     *("world_position", "world_orientation"),
-    # Caliscope's, of how its pictures were taken
+    # Caliscope: how the pictures were taken
     *("ignore", "cam_id", "port", "error", "grid_count", "rotation_count"),
     *("exposure", "verified_resolutions", "nickname"),
 }
@@ -30,7 +32,7 @@ def _recognises(stored: Stored) -> bool:
 def _tables(
     values: Mapping[str, Any], levels: int = 2
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the tables of cameras, and those in lists and other tables."""
+    """Yield the names and tables of cameras, also in lists and in other tables."""
     for key, value in values.items():
         entries = value if isinstance(value, list) else [value]
         for number, table in enumerate(entries):
@@ -53,7 +55,7 @@ def _read(stored: Stored) -> list[Calibration]:
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
     check_others(name, {key: value for key, value in table.items() if key not in KEYS})
-    # Caliscope's of a camera that is not placed yet
+    # Caliscope writes null for the place of a camera that it has not placed yet
     table = {key: value for key, value in table.items() if value != "null"}
     place: Place | None = None
     if "rotation" in table and "translation" in table:

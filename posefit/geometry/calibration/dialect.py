@@ -1,4 +1,4 @@
-"""What a reader of one program's calibration files offers."""
+"""The interface of a reader of one program's calibration files."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,8 +10,9 @@ from posefit.geometry.calibration.values import Stored
 class Dialect(NamedTuple):
     """How one program writes calibrations."""
 
-    program: str  # as messages call it
-    # whether a file is of this program
+    program: str  # its name in messages
+    # returns whether this program wrote a file
     recognises: Callable[[Stored], bool]
-    # its cameras; raises InputError that completes `expected a calibration ..., got`
+    # Returns a file's cameras. The message of an InputError completes `expected a
+    # calibration ..., got`.
     read: Callable[[Stored], list[Calibration]]

@@ -1,4 +1,7 @@
-"""EasyMocap's intri.yml and extri.yml: either is the file, and the other is beside it; lengths in metres."""
+"""EasyMocap's intri.yml and extri.yml.
+
+Either may be given; the other is read from the same folder. Lengths are metres.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +19,7 @@ from posefit.geometry.calibration.values import (
 )
 from posefit.reading import read_text
 
-# kinds of values, each with an underscore and the camera's name; ccm corrects colours
+# A key is one of these, an underscore and the camera's name; ccm corrects colours.
 KINDS = ("K", "dist", "Rot", "R", "T", "H", "W", "ccm")
 
 

@@ -1,4 +1,8 @@
-"""Kalibr's camchain.yaml: lengths in metres; each camera is placed from the one before it, or from the IMU."""
+"""Kalibr's camchain.yaml.
+
+Each camera's place is relative to the previous camera, or to the IMU. Lengths are
+metres.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,17 +20,16 @@ from posefit.geometry.calibration.lens import (
 )
 from posefit.geometry.calibration.values import Stored, check_keys, matrix_of, plain
 
-# matrices (4, 4), points of the second name to those of the first: the camera before
-# this one, and the IMU
+# keys of matrices (4, 4): from the previous camera, or from the IMU, to this camera
 CHAINED = "T_cn_cnm1"
 FROM_IMU = "T_cam_imu"
 LENSES = {"radtan": False, "none": False, "equidistant": True}
 KEYS = {
     *("camera_model", "intrinsics", "distortion_model", "distortion_coeffs"),
     *("resolution", CHAINED, FROM_IMU),
-    # when and over what the pictures came
+    # the pictures' topic, overlap and timing
     *("rostopic", "cam_overlaps", "timeshift_cam_imu", "line_delay"),
-    # which Kalibr does not write, and users add
+    # Kalibr does not write these; users add them
     *("rvec", "tvec"),
 }
 
@@ -35,7 +38,7 @@ def _recognises(stored: Stored) -> bool:
     return any(
         isinstance(table, dict)
         and (CHAINED in table or "camera_model" in table)
-        # users have a matrix under that name
+        # users of OpenCV name a matrix `intrinsics`; Kalibr has four numbers
         and isinstance(table.get("intrinsics"), list)
         and len(table["intrinsics"]) == 4
         for table in stored.values.values()
@@ -54,7 +57,11 @@ def _read(stored: Stored) -> list[Calibration]:
 
 
 def _places(tables: Mapping[str, Any]) -> list[Place | None]:
-    """Return where cameras stand: from the first of a chain, or else from the IMU, where all of them state it."""
+    """Return the cameras' places, or None for each if the file has none.
+
+    They are relative to the first camera of a chain, or to the IMU if every camera
+    states its place from there. If every camera has rvec and tvec, these are used.
+    """
     if all({"rvec", "tvec"} <= table.keys() for table in tables.values()):
         return [
             (matrix_of(one["rvec"]), matrix_of(one["tvec"])) for one in tables.values()

@@ -1,4 +1,4 @@
-"""What a calibration file says of one camera, and the pictures that its lens would take without distortion."""
+"""One camera's calibration, and how to remove the distortion from its pictures."""
 
 import math
 from collections.abc import Sequence
@@ -13,60 +13,67 @@ from posefit.errors import InputError
 from posefit.geometry.camera import Camera, check_focal, is_focal
 from posefit.reading import quoted
 
-# Of the lengths in a file: metres; a unit that is recognised by how large people are; or any multiple of a metre, where
-# a scene was reconstructed from pictures alone.
+# The unit of the lengths in a file. "metres": metres. "open": a unit that is recognised
+# by how large people are. "free": any multiple of a metre, for a scene that was
+# reconstructed from pictures alone.
 Scale = Literal["metres", "open", "free"]
 # rotation and translation, camera_from_world
 Place = tuple[Any, Any]
-# of cameras that look along -z with y up, as OpenGL's and Qualisys' do, to ours
+# turns the axes of cameras that look along -z with y up (OpenGL, Qualisys) to ours
 OPENGL = np.diag([1.0, -1.0, -1.0])
-DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by
-BLOCK = 16  # pixels: codecs fill pictures up to a multiple of it
+DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV's lens models have
+BLOCK = 16  # pixels: codecs pad a picture's sides to a multiple of this
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 FULL_TURN = 2.0 * math.pi  # radians, and no rotation vector is longer
-SKEWED = 2e-3  # of the focal length: pixels whose sides lean by less change nothing
-# of a picture's sides: a principal point is in the middle half
+SKEWED = 2e-3  # share of the focal length: a smaller skew changes nothing
+# shares of a picture's sides: a principal point lies in the middle half
 MIDDLE = 0.25, 0.75
-# by how much of a picture's sides it may be off the centre by equal shares of both, as a picture that was scaled has it
+# Shares of a picture's sides. A principal point that is off the centre by more than
+# SCALED along both sides, at shares that differ by less than EQUAL, belongs to pictures
+# of another scale.
 SCALED = 0.1
 EQUAL = 0.03
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """One camera's entry in a calibration file. Lengths are metres, or the file's unit, and pixels."""
+    """One camera's entry in a calibration file.
+
+    Lengths in pictures are pixels; other lengths are metres, or the file's unit.
+    """
 
     name: str
-    # width, height; None where the file does not state it: that of its pictures
+    # width, height; None if the file does not state them: then those of the pictures
     size: tuple[int, int] | None
-    # (3, 3) of the pinhole, a skew of next to nothing ignored; pixel centres at 0, as OpenCV counts them
+    # (3, 3) of the pinhole; a negligible skew is ignored, and the centre of the first
+    # pixel is 0, as in OpenCV
     matrix: Array = field(repr=False)
-    # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; none is all 0
+    # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; all 0 for no distortion
     distortion: Array = field(repr=False)
-    # (3, 3) camera_from_world; None where the file does not place it
+    # (3, 3) camera_from_world; None if the file does not place the camera
     rotation: Array | None = field(repr=False)
     translation: Array | None = field(repr=False)  # (3,)
     fisheye: bool = False
-    # whether +y is known to be up in its world, as in our own files
+    # whether +y is known to be up in the file's world, as in our own files
     upright: bool = False
-    # what is known of the unit of its places
+    # what is known of the unit of the translation
     scale: Scale = "open"
 
     @property
     def distorted(self) -> bool:
-        """Whether the lens bends straight lines; a fisheye does so by itself."""
+        """Whether the lens bends straight lines; a fisheye always does."""
         return self.fisheye or bool(np.any(self.distortion))
 
     @property
     def position(self) -> Array | None:
-        """Where (3,) it stands in the world of its file; None where this does not place it."""
+        """The position (3,) in the file's world, or None if it is not known."""
         if self.rotation is None or self.translation is None:
             return None
         return np.asarray(-self.rotation.T @ self.translation)
 
     @classmethod
     def of(cls, camera: Camera, name: str = "camera") -> "Calibration":
-        """Return what a file would say of a camera, whose lens does not bend straight lines."""
+        """Return the calibration of a camera, which has no distortion."""
         matrix = pinhole_matrix(camera.focal, camera.centre - HALF)
         return cls(
             name,
@@ -80,15 +87,20 @@ class Calibration:
         )
 
     def in_metres(self, metres: float) -> "Calibration":
-        """Return the calibration in metres, where the unit of its file is so many, unless it is in metres already."""
+        """Return the calibration in metres.
+
+        `metres` is the length of the file's unit. A calibration that is in metres
+        already, or that has no place, is returned as it is.
+        """
         if self.translation is None or self.scale == "metres":
             return self
         return replace(self, translation=metres * self.translation)
 
     def camera(self, size: tuple[int, int], world: Array) -> Camera:
-        """Return the camera of pictures scaled to `size` without their distortion; `world` (3, 3) turns its up to +y.
+        """Return the camera of pictures scaled to `size`, without distortion.
 
-        A camera that the file does not place stands at the origin and looks level along -z.
+        `world` (3, 3) turns the up direction of the file's world to +y. A camera that
+        the file does not place is at the origin and looks level along -z.
         """
         scale = np.array(size) / (self.size or size)
         rotation = OPENGL if self.rotation is None else self.rotation @ world.T
@@ -98,11 +110,13 @@ class Calibration:
         return Camera(*size, focal, centre, orthonormal(rotation), translation)
 
     def padded(self, size: tuple[int, int]) -> "Calibration | None":
-        """Return the calibration of pictures of another size that only have rows or columns more or less at their end.
+        """Return the calibration for pictures with a few more or fewer rows or columns.
 
-        Codecs fill up a picture to blocks of 16 pixels, so that 1080 rows become 1088, and some programs leave them
-        there. None where the sizes differ otherwise; a calibration of no size fits where its centre is in the middle
-        half of the picture.
+        Codecs pad a picture to blocks of 16 pixels, so that 1080 rows become 1088, and
+        some programs keep the padding. The difference is at the end of the rows or
+        columns, so that only the size changes. Return None if the sizes differ by
+        anything else. A calibration without a size fits if its principal point is in
+        the middle half of the picture and its focal length is possible.
         """
         if self.size is None:
             fits = is_central(self.matrix, size) and is_focal(
@@ -119,15 +133,17 @@ class Calibration:
     def maps(
         self, size: tuple[int, int], straight: Camera | None = None
     ) -> tuple[Any, Any]:
-        """Return the maps with which cv2.remap makes pictures of a camera without distortion.
+        """Return the maps with which cv2.remap removes the distortion from pictures.
 
         Args:
-            size: Width and height of the pictures that are straightened.
-            straight: The camera that they become, with this calibration's view; by default that of `size`. It may have
-                square pixels where these are not square.
+            size: Width and height of the distorted pictures.
+            straight: The camera of the straight pictures, which has this calibration's
+                view; by default the camera for `size`. It may have square pixels even
+                if the distorted pictures do not.
 
         Returns:
-            Columns and rows in the pictures, each (height, width) of `straight`.
+            Columns and rows in the distorted pictures, each (height, width) of
+            `straight`.
 
         """
         lens = self.distortion[: 4 if self.fisheye else None]
@@ -158,7 +174,8 @@ class Calibration:
         Args:
             points: Columns, rows and a third number (..., 3) in pictures of `size`.
             size: Width and height of the pictures.
-            straight: The camera whose columns and rows are returned; by default that of `size`.
+            straight: The camera whose columns and rows are returned; by default the
+                camera for `size`.
 
         Returns:
             Points (..., 3).
@@ -177,7 +194,10 @@ class Calibration:
 
 
 def is_central(matrix: Array, size: Sequence[float]) -> bool:
-    """Return whether a principal point may be that of pictures of a size, and not of larger or smaller ones."""
+    """Return whether a principal point is plausible for pictures of a size.
+
+    It is not if it seems to belong to larger or smaller pictures.
+    """
     across, down = matrix[:2, 2] / size
     low, high = MIDDLE
     if not (low < across < high and low < down < high):
@@ -199,40 +219,47 @@ def stated(
     cropped: bool = False,
     scale: Scale = "open",
 ) -> Calibration:
-    """Return what a file states of a camera, checked.
+    """Check the values that a file states for a camera, and return its calibration.
 
     Args:
-        name: What the file calls the camera.
-        size: Width and height of its pictures; None where the file does not state them.
-        matrix: Pinhole (3, 3), the centre of the first pixel at 0.
+        name: The camera's name in the file.
+        size: Width and height of its pictures; None if the file does not state them.
+        matrix: Pinhole matrix (3, 3), with the centre of the first pixel at 0.
         distortion: OpenCV's k1, k2, p1, p2, k3, ..., or k1 to k4 of a fisheye.
-        place: Rotation, as a matrix or as an axis as long as its angle, and translation, from the world to the camera.
+        place: Rotation and translation from the world to the camera; None if the file
+            does not state them. The rotation is a matrix, or an axis as long as its
+            angle.
         fisheye: Whether the lens is OpenCV's fisheye.
-        cropped: Whether pictures are a part of the sensor's, so that their centre may be anywhere.
+        cropped: Whether the pictures show a part of the sensor, so that the principal
+            point may be anywhere.
         scale: What is known of the unit of `place`.
 
     Returns:
         The calibration.
 
     Raises:
-        InputError: No camera can be so; the message completes `expected a calibration ..., got ...`.
+        InputError: No camera can have these values. The message completes `expected a
+            calibration ..., got ...`.
 
     """
     if size is not None:
         size = _whole(size)
     if abs(matrix[1, 0]) > 1e-6 or np.abs(matrix[2] - [0.0, 0.0, 1.0]).max() > 1e-6:
         raise InputError(
-            f"a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: {quoted(matrix.tolist())}"
+            "a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: "
+            f"{quoted(matrix.tolist())}"
         )
     check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
     if abs(matrix[0, 1]) > SKEWED * matrix[0, 0]:
         raise InputError(
-            f"a skew of {matrix[0, 1]:g} pixels, which is not read: pictures must have upright pixels"
+            f"a skew of {matrix[0, 1]:g} pixels, which is not read: pictures must have "
+            "upright pixels"
         )
     if size is not None and not cropped and not is_central(matrix, size):
         centre = " and ".join(f"{value:g}" for value in matrix[:2, 2])
         raise InputError(
-            f"a centre of {centre} in pictures of {size[0]}x{size[1]}: it is of pictures of another size"
+            f"a centre of {centre} in pictures of {size[0]}x{size[1]}: it is of "
+            "pictures of another size"
         )
     rotation, translation = (None, None) if place is None else place
     return Calibration(
@@ -269,14 +296,18 @@ def _lens(distortion: Any, fisheye: bool) -> Array:
 
 
 def rotation_of(rotation: Any) -> Array:
-    """Return the matrix (3, 3) of a rotation: nine numbers, or three, its axis as long as its angle in radians."""
+    """Return the matrix (3, 3) of a rotation.
+
+    `rotation` has nine numbers, or three: its axis, as long as its angle in radians.
+    """
     if np.size(rotation) == 3:
         vector = numbers_of(np.ravel(rotation), (3,))
         angle = float(np.linalg.norm(vector))
         if angle > FULL_TURN:
             raise InputError(
-                f"a rotation of {angle:g} radians about an axis, more than a full turn: are {quoted(vector.tolist())} "
-                "degrees, or angles about three axes?"
+                f"a rotation of {angle:g} radians about an axis, more than a full "
+                f"turn: are {quoted(vector.tolist())} degrees, or angles about three "
+                "axes?"
             )
         return np.asarray(cv2.Rodrigues(vector)[0])
     if np.shape(rotation) == (9,):
@@ -285,19 +316,24 @@ def rotation_of(rotation: Any) -> Array:
 
 
 def placed_at(rotation: Array, position: Any) -> Place:
-    """Return the place of a camera (3, 3) from the world that stands at a position (3,) of the world."""
+    """Return the place of a camera with a rotation (3, 3) and a position (3,).
+
+    The rotation is from the world to the camera; the position is in the world.
+    """
     return rotation, -rotation @ numbers_of(np.ravel(position), (3,))
 
 
 def seen_from(matrix: Any, axes: Array | None = None) -> Place:
     """Return the place of a camera from its matrix (4, 4) to the world.
 
-    `axes` (3, 3) turns the axes of the file's cameras to ours, x right, y down and z forward.
+    `axes` (3, 3) turns the axes of the file's cameras to ours, x right, y down and z
+    forward.
     """
     to_world = numbers_of(matrix, (4, 4))
     if np.abs(to_world[3] - [0.0, 0.0, 0.0, 1.0]).max() > 1e-6:
         raise InputError(
-            f"a matrix to the world whose last row is not 0 0 0 1: {quoted(to_world.tolist())}"
+            "a matrix to the world whose last row is not 0 0 0 1: "
+            f"{quoted(to_world.tolist())}"
         )
     rotation = to_world[:3, :3].T if axes is None else axes @ to_world[:3, :3].T
     return placed_at(rotation, to_world[:3, 3])
@@ -313,11 +349,12 @@ def pinhole_matrix(
 
 
 def numbers_of(values: Any, shape: tuple[int, ...]) -> Array:
-    """Return finite numbers of a shape. Raises InputError where they are others."""
+    """Return finite numbers of a shape. Raises InputError for any others."""
     numbers = np.asarray(values, dtype=np.float64)
     if numbers.shape != shape or not np.isfinite(numbers).all():
         raise InputError(
-            f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be"
+            f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should "
+            "be"
         )
     return numbers
 

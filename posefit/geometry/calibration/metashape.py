@@ -1,7 +1,9 @@
-"""Agisoft Metashape's cameras.xml: cameras from which a chunk was reconstructed; x right, y down, z forward.
+"""Agisoft Metashape's cameras.xml.
 
-A transform (4, 4) leads from the camera to the chunk; the chunk's own leads from there to metres, where it has one. The
-principal point is counted from the middle of the picture, and the centre of the first pixel is 0.5.
+The file has the cameras from which a chunk was reconstructed, with x right, y down and
+z forward. A camera's transform (4, 4) leads from the camera to the chunk. The chunk's
+transform, if it has one, leads from the chunk to metres. The principal point is counted
+from the middle of the picture, and the centre of the first pixel is 0.5.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,10 +28,11 @@ from posefit.geometry.calibration.values import Stored, counts, number_of
 from posefit.geometry.calibration.xml_tags import numbers_in, tag_of
 from posefit.reading import quoted
 
-# in the order of OpenCV's k1, k2, p1, p2, k3: Metashape has p1 across, and p2 down
+# In the order of OpenCV's k1, k2, p1, p2, k3. Metashape swaps p1 and p2: its p1 is
+# across, its p2 down.
 LENS = ("k1", "k2", "p2", "p1", "k3")
 CALIBRATION = {*LENS, "resolution", "f", "cx", "cy", "b1"}
-# metres from the origin: on the globe
+# metres from the origin: a chunk farther away has coordinates of the globe
 FARTHEST = 100_000.0
 
 
@@ -39,7 +42,7 @@ def _read(stored: Stored) -> list[Calibration]:
     for chunk in stored.root.iter("chunk"):
         worlds = dict(_worlds(chunk))
         for camera in chunk.iter("camera"):
-            # one that was not aligned has no transform
+            # a camera that was not aligned has no transform
             if camera.find("transform") is None:
                 continue
             world = worlds.get(camera.get("component_id"), worlds.get(None))
@@ -58,7 +61,11 @@ def _read(stored: Stored) -> list[Calibration]:
 
 
 def _worlds(chunk: Any) -> Iterator[tuple[str | None, tuple[Array, Array, float]]]:
-    """Yield the rotation, translation and scale from a chunk's components to the world; of the chunk itself as None."""
+    """Yield the transforms of a chunk and its components to the world.
+
+    Each comes with the component's id, or None for the chunk itself. A transform is a
+    rotation, a translation and a scale.
+    """
     holders = [(None, chunk)] if chunk.find("transform") is not None else []
     holders += [(part.get("id"), part) for part in chunk.iter("component")]
     for name, holder in holders:
@@ -69,20 +76,24 @@ def _worlds(chunk: Any) -> Iterator[tuple[str | None, tuple[Array, Array, float]
         translation = numbers_of(numbers_in(transform.findtext("translation")), (3,))
         if np.linalg.norm(translation) > FARTHEST:
             raise InputError(
-                "a chunk that is placed on the globe, which is not read: give it local coordinates"
+                "a chunk that is placed on the globe, which is not read: give it local "
+                "coordinates"
             )
         yield name, (rotation, translation, number_of(transform.findtext("scale")))
 
 
 def _moved(place: Place, rotation: Array, translation: Array, scale: float) -> Place:
-    """Return the place of a camera in the world where `rotation`, `translation` and `scale` lead from the chunk."""
+    """Return a camera's place in the world, from its place in the chunk.
+
+    `rotation`, `translation` and `scale` lead from the chunk to the world.
+    """
     turn, moved = place
     position = rotation @ (-scale * turn.T @ moved) + translation
     return placed_at(turn @ rotation.T, position)
 
 
 def _camera(name: str, sensor: Any, place: Place, scale: Any) -> Calibration:
-    # the second of two was adjusted
+    # if there are two calibrations, the second is the adjusted one
     found = sensor.findall("calibration")
     if not found:
         raise InputError(f"the sensor of {quoted(name)} without a calibration")

@@ -1,7 +1,8 @@
-"""transforms.json of instant-ngp, nerfstudio and their relatives: a camera a frame; lengths have no unit.
+"""transforms.json of instant-ngp, nerfstudio and similar programs.
 
-`transform_matrix` (4, 4) is camera_to_world of a camera that looks along -z with y up, as OpenGL has it. The centre of
-the first pixel is 0.5, as COLMAP counts, from which these files are made.
+Each frame has a camera. Lengths have no unit. `transform_matrix` (4, 4) is
+camera_to_world of a camera that looks along -z with y up, as in OpenGL. The centre of
+the first pixel is 0.5, as in COLMAP, from which these files are made.
 """
 
 import math
@@ -41,22 +42,22 @@ LENSES = {
     "opencvfisheye": True,
 }
 LENS_KEYS = ("k1", "k2", "k3", "k4", "p1", "p2")
-# of one frame, or of all of them
+# keys of a frame, or of the file for all frames
 VIEW_KEYS = {
     *("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_angle_y", "K"),
     *("camera_model", "is_fisheye", *LENS_KEYS),
 }
 FRAME_KEYS = {
     *(MATRIX, "file_path", *VIEW_KEYS),
-    # which picture it is, and what is beside it
+    # the picture's identity, and the files that belong to it
     *("sharpness", "depth_file_path", "depth_path", "mask_path", "colmap_im_id"),
     *("time", "timestamp", "timestep_index", "camera_index", "camera_id", "cam_id"),
-    # of Blender's example scenes: how far a turntable went on
+    # Blender's example scenes: the turntable's angle from one frame to the next
     *("rotation",),
 }
 FILE_KEYS = {
     *("frames", *VIEW_KEYS),
-    # how a radiance field is trained, and what was applied to the matrices already
+    # how a radiance field is trained, and what was already applied to the matrices
     *("aabb_scale", "scale", "offset", "aabb", "render_aabb", "up"),
     *("applied_transform", "applied_scale", "orientation_override"),
     *("ply_file_path", "fps", "white_transparent", "black_transparent"),
@@ -87,7 +88,7 @@ def _read(stored: Stored) -> list[Calibration]:
 
 
 def _names(paths: Sequence[str]) -> list[str]:
-    """Return the names of files without folder and suffix, where these are names of one file each."""
+    """Return file names without folder and suffix, or the path if two are equal."""
     stems = [PurePosixPath(path).stem for path in paths]
     seen = Counter(stems)
     return [
@@ -113,7 +114,7 @@ def _camera(
         )
     fisheye = LENSES[model] or str(values.get("is_fisheye")).lower() in ("true", "1")
     k1, k2, k3, k4, p1, p2 = (number_of(values.get(key, 0.0)) for key in LENS_KEYS)
-    # OpenCV's polynomial has no fourth number, and its fisheye none across
+    # OpenCV's polynomial has no k4, and its fisheye has no p1 and p2
     for key in ("p1", "p2") if fisheye else ("k4",):
         if counts(values.get(key, 0.0)):
             raise InputError(f"the lens key {quoted(key)}, which is not read")

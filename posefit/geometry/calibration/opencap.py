@@ -1,6 +1,7 @@
-"""OpenCap's cameraIntrinsicsExtrinsics, converted to JSON: a rotation and a translation in millimetres.
+"""OpenCap's cameraIntrinsicsExtrinsics, converted to JSON; lengths in millimetres.
 
-OpenCap writes a pickle. This may run any code when it is read, so that it is refused, with how to convert it.
+OpenCap writes a pickle. Reading a pickle may run any code, so that posefit refuses it
+with a message that says how to convert it.
 """
 
 import numpy as np
@@ -11,15 +12,16 @@ from posefit.geometry.calibration.lens import Calibration, Place, numbers_of, st
 from posefit.geometry.calibration.values import Stored, matrix_of
 
 PICKLES = (".pickle", ".pkl")
-# what a message about a pickle says
+# part of the message that refuses a pickle
 HOW = (
     "a pickle, which may run any code: where you trust it, write it as JSON, "
-    "json.dump({key: numpy.asarray(value).tolist() for key, value in pickle.load(file).items()}, ...)"
+    "json.dump({key: numpy.asarray(value).tolist() "
+    "for key, value in pickle.load(file).items()}, ...)"
 )
 REQUIRED = {"intrinsicMat", "imageSize"}
 KEYS = {
     *("distortion", "rotation", "translation", *REQUIRED),
-    # it follows from the rotation
+    # this follows from the rotation
     "rotation_EulerAngles",
 }
 
@@ -30,7 +32,8 @@ def _read(stored: Stored) -> list[Calibration]:
     check_others(name, {key: value for key, value in values.items() if key not in KEYS})
     matrix = numbers_of(matrix_of(values["intrinsicMat"]), (3, 3))
     size = np.ravel(matrix_of(values["imageSize"]))
-    # its height comes first where its pictures are tall: the centre says which side is which
+    # The height comes first if the pictures are tall. The principal point shows which
+    # side is which.
     off = [np.abs(matrix[:2, 2] / sides - 0.5).max() for sides in (size, size[::-1])]
     place: Place | None = None
     if "rotation" in values and "translation" in values:

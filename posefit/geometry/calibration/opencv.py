@@ -1,10 +1,13 @@
-"""Cameras as OpenCV's FileStorage and its users write them: YAML, JSON, XML or TOML, under the names that they chose.
+"""Cameras in YAML, JSON, XML or TOML, as users of OpenCV write them.
 
-A camera is a table with a camera matrix, or fx, fy and its centre; a file is one, or has several in
-tables or lists. Rotation and translation are from the world to the camera. What a key says is decided
-by its name alone, in small letters and without signs between. A key that is not known is refused by
-its name where it holds numbers, unless its name says that they describe neither the lens nor the
-place, see keys.py.
+Users choose the names of the keys, so that many names are read for each value. A key's
+name alone decides what it means; capital letters, and signs between letters, make no
+difference. A camera is a table with a camera matrix, or with fx, fy and its centre. A
+file is one camera, or has several in tables or lists. Rotation and translation are from
+the world to the camera.
+
+An unknown key that holds numbers is an error, unless its name says that they describe
+neither the lens nor the place; see keys.py.
 """
 
 import re
@@ -69,7 +72,8 @@ ROTATION = (
     *("rotmat", "rotvec"),
 )
 TRANSLATION = "t", "translation", "tvec", "translationvector", "transvec"
-# of a chessboard there are many; a single one is the camera's place
+# Calibration with a chessboard writes one pair for each picture of the board. A single
+# pair is the camera's place.
 BOARDS = (
     ("rvecs", "tvecs"),
     ("rotationvectors", "translationvectors"),
@@ -84,23 +88,23 @@ _POLYNOMIALS = (
     *("pinhole", "perspective", "opencv", "fullopencv", "polynomial"),
     *("rationalpolynomial", "radtan", "radialtangential", "standard"),
 )
-# models not read
+# lens models that are not read
 _OTHERS = re.compile(
     "omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular"
 )
 
 
 def _read(stored: Stored) -> list[Calibration]:
-    """Return the camera that values describe by their keys, or those of their tables, and of the tables in these."""
+    """Return the cameras in a file's values, its tables, and the tables in these."""
     cameras = list[Calibration]()
-    # of tables that hold those of cameras
+    # values of the tables that contain the cameras' tables
     around = dict[str, Any]()
     tables: list[tuple[str, Mapping[str, Any]]] = [(stored.path.stem, stored.values)]
     for _ in range(3):
         inner = list[tuple[str, Mapping[str, Any]]]()
         for name, table in tables:
             table = _whole(table)
-            # a camera may be called K or D
+            # a camera may be called K or D: its table is not a matrix
             known = {
                 plain(key): value
                 for key, value in table.items()
@@ -110,12 +114,13 @@ def _read(stored: Stored) -> list[Calibration]:
                 cameras.append(_camera(name, table, known))
             elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
                 raise InputError(
-                    f"{quoted(name)} without camera_matrix, image_width and image_height"
+                    f"{quoted(name)} without camera_matrix, image_width and "
+                    "image_height"
                 )
             else:
                 around |= {k: v for k, v in table.items() if not _has_tables(v)}
                 inner += _tables(table)
-        # as an alias of YAML may give the same one again and again
+        # aliases in YAML may repeat one table again and again
         if len(inner) > MOST_TABLES:
             raise InputError(f"a file of more than {MOST_TABLES:,} tables")
         tables = inner
@@ -131,7 +136,7 @@ def _has_tables(value: Any) -> bool:
 
 
 def _whole(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a table with what its tables `intrinsics` and `extrinsics` say of the same camera."""
+    """Return a camera's table, with its `intrinsics` and `extrinsics` merged in."""
     whole = dict[str, Any]()
     for key, value in table.items():
         inner = isinstance(value, dict) and not any(map(_has_tables, value.values()))
@@ -143,7 +148,7 @@ def _whole(table: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _is_camera(value: Any) -> bool:
-    """Return whether a value is a table that describes a camera, whatever this is called."""
+    """Return whether a value is a table that describes a camera."""
     if not isinstance(value, dict):
         return False
     names = {plain(name) for name in value}
@@ -151,7 +156,7 @@ def _is_camera(value: Any) -> bool:
 
 
 def _tables(values: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the tables among values, and those in lists, with their names."""
+    """Yield the names and tables among values, and among the entries of lists."""
     for key, value in values.items():
         if isinstance(value, dict) and key != "metadata":
             yield str(value.get("name", key)), value
@@ -164,7 +169,10 @@ def _tables(values: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]
 
 
 def _pinhole(known: Mapping[str, Any]) -> Array | None:
-    """Return the matrix (3, 3) of focal lengths and a centre that are stated one by one; None where they are not."""
+    """Return the matrix (3, 3) from fx, fy and the two coordinates of the centre.
+
+    Return None if one of these keys is missing.
+    """
     for centre in CENTRES:
         if {*FOCAL, *centre} <= known.keys():
             return pinhole_matrix(
@@ -177,7 +185,7 @@ def _pinhole(known: Mapping[str, Any]) -> Array | None:
 def _camera(
     name: str, values: Mapping[str, Any], known: Mapping[str, Any]
 ) -> Calibration:
-    """Return the camera that values describe, whose keys in small letters and digits are those of `known`."""
+    """Return the camera of a table; `known` has its values by their `plain` keys."""
     fisheye = _is_fisheye(known)
     numbered = NUMBERED_FISHEYE if fisheye else NUMBERED
     lens = _first(known, LENS)
@@ -219,7 +227,7 @@ def _matrix(known: Mapping[str, Any]) -> Array:
 
 
 def _place(known: Mapping[str, Any]) -> Place | None:
-    """Return the rotation and the translation that values state; None of a camera that they do not place."""
+    """Return the rotation and the translation, or None if the table has neither."""
     rotation = _first(known, ROTATION)
     translation = _first(known, TRANSLATION)
     if rotation is not None and translation is not None:
@@ -234,12 +242,15 @@ def _place(known: Mapping[str, Any]) -> Place | None:
 
 
 def _first(known: Mapping[str, Any], names: Sequence[str]) -> Any:
-    """Return the value of the first name that is known; None where none is."""
+    """Return the value of the first name in `known`, or None if it has none of them."""
     return next((known[name] for name in names if name in known), None)
 
 
 def _is_fisheye(known: Mapping[str, Any]) -> bool:
-    """Return whether the lens is OpenCV's fisheye. Raises InputError for a model that OpenCV has not."""
+    """Return whether the lens is OpenCV's fisheye.
+
+    Raises InputError for a lens model that OpenCV does not have.
+    """
     for key in (name for name in MODEL if name in known):
         model = plain(known[key])
         if model in _FISHEYES:

@@ -1,6 +1,7 @@
-"""openMVG's sfm_data.json: a camera a view, where it stands and which way it looks; lengths have no unit.
+"""openMVG's sfm_data.json.
 
-A point of the world is R (x - centre) in the camera.
+Each view has a camera, with its position and its rotation. A point x of the world is
+R (x - centre) in the camera. Lengths have no unit.
 """
 
 from collections.abc import Mapping
@@ -27,8 +28,8 @@ from posefit.geometry.calibration.values import (
 from posefit.reading import quoted
 
 REQUIRED = {"views", "intrinsics", "extrinsics"}
-# by a model's name: the key of its numbers, and where each of them is among k1, k2, p1,
-# p2, k3 of OpenCV
+# For each lens model: the key of its numbers, and the position of each number in
+# OpenCV's k1, k2, p1, p2, k3.
 LENSES: Mapping[str, tuple[str, tuple[int, ...]]] = {
     "pinhole": ("", ()),
     "pinhole_radial_k1": ("disto_k1", (0,)),
@@ -46,7 +47,8 @@ def _by_key(entries: Any) -> dict[int, Mapping[str, Any]]:
 def _read(stored: Stored) -> list[Calibration]:
     intrinsics = _by_key(stored.values["intrinsics"])
     extrinsics = _by_key(stored.values["extrinsics"])
-    # a name is written where a model comes first, and later the model's number alone
+    # the first camera of a model has the model's name and number, the others only the
+    # number
     models = {
         value["polymorphic_id"] & ~(1 << 31): value["polymorphic_name"]
         for value in intrinsics.values()
@@ -75,7 +77,7 @@ def _camera(
     if model not in LENSES:
         raise InputError(f"the lens model {quoted(model)}, which is not known")
     key, order = LENSES[model]
-    # newer versions have what all models share in a table
+    # newer versions have the keys that all models share in a table
     data = {**data, **data.get("value0", {})}
     check_keys(data, {*KEYS, key}, name, "openMVG")
     lens = np.zeros(4 if model == "fisheye" else 5)

@@ -1,4 +1,4 @@
-"""Cameras of posefit, as `Camera.to_json` writes them."""
+"""posefit's own cameras, as `Camera.to_json` writes them."""
 
 from posefit.geometry.calibration.dialect import Dialect
 from posefit.geometry.calibration.lens import Calibration

@@ -1,4 +1,4 @@
-"""CMU Panoptic's calibration_*.json: lengths in centimetres, -y up."""
+"""CMU Panoptic's calibration_*.json: lengths in centimetres, and -y is up."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,7 +8,7 @@ from posefit.geometry.calibration.lens import Calibration, numbers_of, stated
 from posefit.geometry.calibration.values import Stored, check_keys, matrix_of
 
 REQUIRED = {"K", "distCoef", "R", "t", "resolution"}
-# which of the dome's cameras it is
+# the other keys say which of the dome's cameras it is
 KEYS = REQUIRED | {"name", "type", "panel", "node"}
 
 

@@ -1,6 +1,7 @@
-"""Qualisys' calibration in XML: millimetres, and lengths on the sensor in 64ths of a pixel.
+"""Qualisys' calibration in XML.
 
-Its cameras look along -z with y up. `fov_video` is the part of the sensor that the video shows.
+Lengths are millimetres, and 64ths of a pixel on the sensor. The cameras look along -z
+with y up. `fov_video` is the part of the sensor that the video shows.
 """
 
 from typing import Any
@@ -29,7 +30,7 @@ LENS = (
 )
 INTRINSICS = {
     *("focalLengthU", "focalLengthV", "centerPointU", "centerPointV", *LENS),
-    # of the lens in millimetres, and of the whole sensor
+    # the focal length in millimetres, and the sides of the whole sensor
     *("focallength", "sensorMinU", "sensorMaxU", "sensorMinV", "sensorMaxV"),
 }
 
@@ -50,7 +51,8 @@ def _camera(camera: Any, name: str) -> Calibration:
             raise InputError(f"the lens key {quoted(key)}, which is not known")
     if counts(camera.get("viewrotation", "0")):
         raise InputError(
-            f"the key 'viewrotation' of {quoted(name)}, which is not read: calibrate with views that are not rotated"
+            f"the key 'viewrotation' of {quoted(name)}, which is not read: calibrate "
+            "with views that are not rotated"
         )
     left, top, right, bottom = (
         float(view.get(side, "")) for side in ("left", "top", "right", "bottom")
@@ -69,7 +71,7 @@ def _camera(camera: Any, name: str) -> Calibration:
         pinhole_matrix(focal, centre - (left, top)),
         [float(lens.get(key, "0")) for key in LENS],
         placed_at(OPENGL @ turned, position),
-        # the video may be any part of the sensor
+        # the video may show any part of the sensor
         cropped=True,
         scale="metres",
     )

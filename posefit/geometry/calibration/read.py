@@ -1,4 +1,4 @@
-"""Which program wrote a calibration file, and its cameras."""
+"""Finds out which program wrote a calibration file, and reads its cameras."""
 
 from pathlib import Path
 
@@ -27,7 +27,8 @@ from posefit.geometry.calibration.voxelpose import VOXELPOSE
 from posefit.geometry.calibration.world import check_places
 from posefit.reading import cut, quoted, read_text
 
-# A program joins by a line; the first that recognises a file reads it, OpenCV's users last, who choose their names.
+# To add a program, add its dialect here. The first dialect that recognises a file reads
+# it. OpenCV is last, because its users choose the names of their keys.
 DIALECTS: tuple[Dialect, ...] = (
     OWN,
     QUALISYS,
@@ -45,13 +46,22 @@ DIALECTS: tuple[Dialect, ...] = (
     ANIPOSE,
     OPENCV,
 )
-MESSAGE = 300  # characters of what is wrong
+MESSAGE = 300  # most characters of the reason in a message
 
 
 def read_calibrations(path: str | Path) -> list[Calibration]:
-    """Return the cameras of a calibration file, in its order; of `FILE:NAME` that of this name.
+    """Return the cameras of a calibration file.
 
-    Raises InputError naming the file and what is wrong.
+    Args:
+        path: The file, or `FILE:NAME` for one of its cameras.
+
+    Returns:
+        The cameras in the file's order, or only those called `NAME`.
+
+    Raises:
+        InputError: The file is not a calibration, or has no camera of that name. The
+            message names the file and says what is wrong.
+
     """
     path = Path(path)
     chosen = ""
@@ -71,7 +81,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         content = stored(path, text)
         dialect = dialect_of(content)
         written_by = f" of {dialect.program}"
-        # of numbers that are not finite, or become so, a check says more
+        # no warnings: the checks say more about numbers that are not finite
         with np.errstate(all="ignore"):
             calibrations = dialect.read(content)
             check_places(calibrations)
@@ -96,7 +106,8 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     names = [calibration.name for calibration in calibrations]
     if chosen and chosen not in names:
         raise InputError(
-            f"{path}: expected the name of a camera, {cut(', '.join(names))}, got {quoted(chosen)}"
+            f"{path}: expected the name of a camera, {cut(', '.join(names))}, got "
+            f"{quoted(chosen)}"
         )
     return [
         calibration for calibration in calibrations if chosen in ("", calibration.name)
@@ -104,7 +115,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
 
 
 def dialect_of(file: Stored) -> Dialect:
-    """Return how a file is written. Raises InputError where no dialect is recognised."""
+    """Return a file's dialect. Raises InputError if no dialect recognises it."""
     for dialect in DIALECTS:
         if dialect.recognises(file):
             return dialect

@@ -1,4 +1,7 @@
-"""Intrinsics of a RealSense camera, as `pyrealsense2.intrinsics` names them: one camera, which it does not place."""
+"""Intrinsics of a RealSense camera, named as in `pyrealsense2.intrinsics`.
+
+They do not place the camera.
+"""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -18,15 +21,15 @@ from posefit.geometry.calibration.values import (
 from posefit.reading import quoted
 
 REQUIRED = {"ppx", "ppy", "fx", "fy"}
-# `depth_scale` is of pictures of depths
+# `depth_scale` is for depth pictures
 KEYS = REQUIRED | {"width", "height", "model", "coeffs", "depth_scale"}
-# models that are OpenCV's, and whether they are of a fisheye; the others bend pictures in
-# another way, or state how to bend them back
+# OpenCV's lens models, and whether each is a fisheye. RealSense's other models distort
+# in another way, or describe how to remove the distortion.
 LENSES = {"none": False, "brownconrady": False, "kannalabrandt4": True}
 
 
 def _tables(stored: Stored) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the camera of a file, or those of its tables, such as color and depth."""
+    """Yield a file's camera, and the cameras in its tables, such as color and depth."""
     if stored.values.keys() >= REQUIRED:
         yield stored.path.stem, stored.values
     for name, table in stored.values.items():

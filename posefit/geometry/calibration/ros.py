@@ -1,6 +1,7 @@
-"""ROS' camera_info, as a YAML file or as the message: one camera, which it does not place.
+"""ROS' camera_info, as a YAML file or as the message.
 
-The matrix and the size are those of the whole sensor; `roi` and the binning say which part of it the pictures show.
+It describes one camera and does not place it. The matrix and the size are for the whole
+sensor; `roi` and the binning say which part of it the pictures show.
 """
 
 from collections.abc import Mapping
@@ -29,13 +30,13 @@ from posefit.geometry.calibration.values import (
 from posefit.reading import quoted
 
 LENSES = {"plumbbob": False, "rationalpolynomial": False, "equidistant": True}
-# of files, and of messages
+# each key's name in files, and in messages
 MATRIX = "cameramatrix", "k"
 LENS = "distortioncoefficients", "d"
 KEYS = {
     *("distortionmodel", "roi", "binningx", "binningy", *MATRIX, *LENS),
     *("imagewidth", "width", "imageheight", "height"),
-    # of pictures that were rectified already
+    # these are for pictures that are rectified
     *("rectificationmatrix", "r", "projectionmatrix", "p"),
     *("cameraname", "header"),
 }
@@ -92,7 +93,10 @@ def _first(known: Mapping[str, Any], names: tuple[str, ...]) -> Any:
 def _region(
     known: Mapping[str, Any], matrix: Array, size: list[float]
 ) -> tuple[Array, list[float]]:
-    """Return the matrix and the size of the pictures that a camera sends, of those of its whole sensor."""
+    """Return the matrix and the size of the pictures that a camera sends.
+
+    `matrix` and `size` are for its whole sensor.
+    """
     region = known.get("roi")
     part = {}
     if isinstance(region, dict):
@@ -103,7 +107,7 @@ def _region(
         )
     offset = np.array([number_of(part.get(f"{axis}offset", 0)) for axis in "xy"])
     sides = [number_of(part.get(side, 0)) for side in ("width", "height")]
-    # 0 stands for 1, and for the whole sensor
+    # a binning of 0 means 1, and sides of 0 mean the whole sensor
     bins = np.array([number_of(known.get(f"binning{axis}", 0)) or 1.0 for axis in "xy"])
     if all(sides):
         size = sides

@@ -1,7 +1,8 @@
-"""The text of a calibration file as texts, numbers, lists and dictionaries, or as the tree of an XML file.
+"""Parses the text of a calibration file: YAML, JSON, TOML or XML.
 
-OpenCV's own reader is not used, as it trusts the file: here nothing is expanded, and a matrix is as
-large as the numbers that are there.
+The result is texts, numbers, lists and dictionaries, or the tree of an XML file.
+OpenCV's own reader is not used, because it trusts the file. Here nothing is expanded,
+and a matrix is only as large as the numbers in the file.
 """
 
 import math
@@ -18,14 +19,17 @@ from posefit.errors import InputError
 from posefit.reading import parsed_json, parsed_toml, quoted
 
 LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
-# the letters of OpenCV's element types whose numbers are rounded when they are read
+# OpenCV's short floating-point types: numbers are rounded to them when they are read
 _ROUNDED = {"f": np.float32, "h": np.float16}
 _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
 
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """What a calibration file holds: values by name, or the tree of an XML file that is not OpenCV's."""
+    """The content of a calibration file.
+
+    It is values by name, or the tree of an XML file that OpenCV did not write.
+    """
 
     path: Path
     values: Mapping[str, Any]
@@ -33,7 +37,7 @@ class Stored:
 
 
 def stored(path: Path, text: str) -> Stored:
-    """Return what a file holds. Raises InputError where it is none of the four formats."""
+    """Parse a file's text. Raises InputError if it is in none of the four formats."""
     start = text.lstrip()[:100]
     if path.suffix.lower() == ".toml":
         return Stored(path, parsed_toml(text))
@@ -46,10 +50,11 @@ def stored(path: Path, text: str) -> Stored:
         start.startswith(("{", "[", "%")) or path.suffix.lower() in (".yml", ".yaml")
     ):
         raise InputError(
-            f"a file that is none of them, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml"
+            f"a file that is none of them, {path.suffix or 'without a suffix'}; "
+            "YAML is .yml or .yaml"
         )
     values = parsed_json(text) if start.startswith(("{", "[")) else _yaml(text)
-    if isinstance(values, list):  # of cameras, as those of the AIST database
+    if isinstance(values, list):  # a list of cameras, as in the AIST database
         values = {"camera": values}
     if not isinstance(values, dict):
         raise InputError(f"a file without names, {quoted(values)}")
@@ -57,12 +62,15 @@ def stored(path: Path, text: str) -> Stored:
 
 
 def plain(key: object) -> str:
-    """Return a key in small letters and digits alone: Camera_Matrix is cameramatrix."""
+    """Return a key with only its letters, in lower case, and its digits.
+
+    `Camera_Matrix` becomes `cameramatrix`.
+    """
     return re.sub(r"[^a-z0-9]", "", str(key).lower())
 
 
 def counts(value: Any) -> bool:
-    """Return whether a value is a number, or numbers, that are not all 0."""
+    """Return whether a value is a number or numbers, and not all are 0."""
     try:
         return bool(matrix_of(value).any())
     except (ValueError, TypeError, KeyError):
@@ -70,7 +78,7 @@ def counts(value: Any) -> bool:
 
 
 def says(value: Any) -> bool:
-    """Return whether a value says something: neither 0, nor false, nor empty."""
+    """Return whether a value states anything: it is not 0, false or empty."""
     if isinstance(value, str):
         return plain(value) not in ("", "0", "00", "false", "no", "none", "null")
     return counts(value) or (isinstance(value, list | dict) and bool(value))
@@ -79,16 +87,21 @@ def says(value: Any) -> bool:
 def check_keys(
     table: Mapping[str, Any], known: Collection[str], name: str, program: str
 ) -> None:
-    """Raise InputError for the first key of a table that is not known, and says something."""
+    """Raise InputError for the first unknown key that states anything."""
     for key, value in table.items():
         if key not in known and says(value):
             raise InputError(
-                f"the key {quoted(key)} of {quoted(name)}, which {program} is not known to write"
+                f"the key {quoted(key)} of {quoted(name)}, which {program} is not "
+                "known to write"
             )
 
 
 def matrix_of(value: Any) -> Array:
-    """Return a matrix, or numbers in one row. Raises InputError where there are none, too many, or another number."""
+    """Return a matrix, or numbers in one row.
+
+    Raises InputError if a value is not a number, or if the count of numbers does not
+    match the stated shape.
+    """
     stated = value if isinstance(value, dict) and "data" in value else {"data": value}
     cells = np.array(
         stated["data"].split() if isinstance(stated["data"], str) else stated["data"],
@@ -115,13 +128,14 @@ def matrix_of(value: Any) -> Array:
         side.is_integer() and side > 0 for side in shape
     ) or numbers.size != math.prod(shape):
         raise InputError(
-            f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with {numbers.size} numbers"
+            f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with "
+            f"{numbers.size} numbers"
         )
     return numbers.reshape([int(side) for side in shape])
 
 
 def number_of(value: Any) -> float:
-    """Return a number, which may be text. Raises InputError where it is none."""
+    """Return a number or a text as a float. Raises InputError if it is not a number."""
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):
@@ -129,10 +143,10 @@ def number_of(value: Any) -> float:
 
 
 def _yaml(text: str) -> Any:
-    """Return what a YAML text holds: texts, lists and dictionaries alone, whatever tags it has."""
+    """Parse YAML into texts, lists and dictionaries only; tags are ignored."""
     import yaml
 
-    # OpenCV writes %YAML:1.0 where the directive is %YAML 1.0
+    # OpenCV writes %YAML:1.0; the correct directive is %YAML 1.0
     text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
     try:
         return yaml.load(text, Loader=yaml.BaseLoader)
@@ -150,7 +164,10 @@ def _of_opencv(root: Any) -> dict[str, Any]:
 
 
 def _xml_of(text: str) -> Any:
-    """Return the root of an XML text. Raises InputError where it is broken or has a document type, which may expand."""
+    """Return the root of an XML text.
+
+    Raises InputError if it is broken, or has a document type, which may expand.
+    """
     from xml.etree.ElementTree import ParseError
 
     from defusedxml import DefusedXmlException
@@ -162,6 +179,6 @@ def _xml_of(text: str) -> Any:
         raise InputError(
             "an XML file with a document type, which is not read"
         ) from None
-    # ValueError: an encoding that contradicts the text's
+    # ValueError: the text declares an encoding that it does not have
     except (ParseError, ValueError, RecursionError) as error:
         raise InputError(f"XML that is broken: {error}") from None

@@ -1,8 +1,9 @@
-"""Vicon's calibration, .xcp: millimetres; its cameras look along z with y down.
+"""Vicon's calibration, .xcp; lengths in millimetres.
 
-A lens is described from the picture to the straight one: a pixel at a distance r from the centre belongs at
-r (1 + k1 r^2 + k2 r^4 + k3 r^6), lengths in pixels. OpenCV describes it the other way around, by a quotient of two such
-forms, whose numbers are fitted.
+The cameras look along z with y down. The lens' numbers lead from the distorted picture
+to the straight one: a pixel at a distance r from the centre belongs at
+r (1 + k1 r^2 + k2 r^4 + k3 r^6), with lengths in pixels. OpenCV's numbers lead the
+other way, by a quotient of two such polynomials. They are fitted.
 """
 
 from typing import Any
@@ -26,7 +27,7 @@ from posefit.geometry.calibration.xml_tags import numbers_in
 from posefit.reading import quoted
 
 MILLIMETRES = 0.001
-# cameras of this system take videos, the others see markers alone
+# cameras of this system take videos; the others only see markers
 VIDEO = "DV"
 CAMERA = {
     *("DEVICEID", "SENSOR_SIZE", "PIXEL_ASPECT_RATIO", "SYSTEM"),
@@ -37,7 +38,8 @@ FRAME = {
     *("FOCAL_LENGTH", "ORIENTATION", "POSITION", "PRINCIPAL_POINT"),
     *("VICON_RADIAL", "VICON_RADIAL2", "FRAME", "IMAGE_ERROR", "WORLD_ERROR"),
 }
-# pixels: how far the fitted lens may be off, and its centre beside the principal point
+# pixels: largest error of the fitted lens, and largest distance of the lens' centre
+# from the principal point
 TOLERANCE = 0.25
 SAMPLES = 50
 
@@ -45,7 +47,7 @@ SAMPLES = 50
 def _read(stored: Stored) -> list[Calibration]:
     cameras = list(stored.root.findall("Camera"))
     filming = [camera for camera in cameras if camera.get("SYSTEM") == VIDEO]
-    # one that was not seen while it was calibrated has no key frame
+    # a camera that saw nothing during the calibration has no key frame
     return [
         _camera(camera, frames[0])
         for camera in filming or cameras
@@ -94,7 +96,8 @@ def _lens(frame: Any, centre: Array, focal: float, size: Array) -> Array:
         radial = numbers[2:]
         if radial.any() and np.abs(middle - centre).max() > TOLERANCE:
             raise InputError(
-                f"the key 'VICON_RADIAL2', whose centre {quoted(middle.tolist())} is not the principal point"
+                f"the key 'VICON_RADIAL2', whose centre {quoted(middle.tolist())} is "
+                "not the principal point"
             )
     else:
         radial = numbers_in(frame.get("VICON_RADIAL", "0 0"))
@@ -102,7 +105,11 @@ def _lens(frame: Any, centre: Array, focal: float, size: Array) -> Array:
 
 
 def _turned_around(radial: ArrayLike, focal: float, reach: float) -> Array:
-    """Return OpenCV's eight numbers of a lens whose radial ones lead from the picture to the straight one."""
+    """Return OpenCV's eight numbers of a lens.
+
+    `radial` leads from the distorted picture to the straight one. `reach` is the
+    largest distance from the centre, in pixels, at which the numbers are fitted.
+    """
     radial = np.asarray(radial, dtype=np.float64)
     if not radial.any():
         return np.zeros(8)
@@ -111,7 +118,8 @@ def _turned_around(radial: ArrayLike, focal: float, reach: float) -> Array:
     straight = bent * (1.0 + powers @ radial)
     if not (np.diff(straight) > 0.0).all():
         raise InputError("a lens that folds the picture over")
-    # bent (1 + k4 s^2 + k5 s^4 + k6 s^6) = straight (1 + k1 s^2 + k2 s^4 + k3 s^6) with s = straight / focal
+    # Least squares for k1 to k6, with s = straight / focal:
+    # bent (1 + k4 s^2 + k5 s^4 + k6 s^6) = straight (1 + k1 s^2 + k2 s^4 + k3 s^6)
     form = (straight / focal)[:, None] ** [2.0, 4.0, 6.0]
     columns = np.hstack([straight[:, None] * form, -bent[:, None] * form])
     k1, k2, k3, *below = np.linalg.lstsq(columns, bent - straight, rcond=None)[0]
@@ -119,7 +127,8 @@ def _turned_around(radial: ArrayLike, focal: float, reach: float) -> Array:
     off = float(np.abs(straight * ratio - bent).max())
     if not off <= TOLERANCE:
         raise InputError(
-            f"a lens of which OpenCV's numbers are {off:.2g} pixels off, {quoted(radial.tolist())}"
+            f"a lens of which OpenCV's numbers are {off:.2g} pixels off, "
+            f"{quoted(radial.tolist())}"
         )
     return np.array([k1, k2, 0.0, 0.0, k3, *below])
 

@@ -1,7 +1,8 @@
-"""Calibrations of Shelf and Campus as VoxelPose and mmpose have them: T is the camera's place, in millimetres.
+"""Calibrations of Shelf and Campus in the form of VoxelPose and mmpose.
 
-A point of the world is R (x - T) in the camera. The keys `k` and `p`, the lens' radial and tangential
-numbers, tell such a file from one whose T is a translation.
+T is the camera's position, in millimetres: a point x of the world is R (x - T) in the
+camera. The keys `k` and `p` are the lens' radial and tangential numbers. They tell such
+a file from other files with an R and a T, where T is a translation.
 """
 
 from collections.abc import Mapping

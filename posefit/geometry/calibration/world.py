@@ -1,4 +1,4 @@
-"""The world of several calibrations: which way is up in it, and whether its cameras can stand as they do."""
+"""The world of several cameras: its up direction, and a check of their places."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -11,24 +11,26 @@ from posefit.geometry.calibration.lens import Calibration
 from posefit.reading import quoted
 
 Up = Literal["x", "y", "z"]
-# The rotation of the world that turns an axis to +y.
+# rotations of the world that turn an axis to +y
 TURNS = {
     "x": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
     "y": np.eye(3),
     "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
 }
-# of the images' up direction: where less of it is along the axis that a file says is
-# up, it is doubted
+# share of the images' up direction: if less of it is along the axis that a file says is
+# up, the file is doubted
 LEVEL = 0.5
-# of its distance: how far the point that cameras look at may be beside their axes
+# share of a point's distance: it may be this far off the cameras' axes to be the point
+# that they look at
 AIMED = 0.5
 
 
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
-    It is `up`, or else +y where the file states it; otherwise the axis, in either direction, that points up in the
-    images most. Raises InputError where `up` is none.
+    The up direction is `up` if it is given, or +y if the file states it. Otherwise it
+    is the axis, in either direction, that is nearest to the up direction of the images.
+    Raises InputError if `up` is not an axis.
     """
     if up is not None and up not in TURNS:
         raise InputError(f"up must be one of x, y, z, got {quoted(up)}")
@@ -47,20 +49,29 @@ def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
 
 
 def guessed_up(calibrations: Sequence[Calibration]) -> str:
-    """Return what `upright` assumes of calibrations without `up`, as a message says it; "" where nothing is."""
+    """Return what `upright` assumes without `up`, as a sentence for a message.
+
+    Return "" if it assumes nothing.
+    """
     image_up = _image_up(calibrations)
     if image_up is None:
         return ""
     axis = _axis(image_up)
     if not any(camera.upright for camera in calibrations):
-        return f"{'+' if image_up['xyz'.index(axis)] > 0.0 else '-'}{axis} is up in the cameras' world"
+        return (
+            f"{'+' if image_up['xyz'.index(axis)] > 0.0 else '-'}{axis} is up in the "
+            "cameras' world"
+        )
     if image_up[1] < LEVEL * np.linalg.norm(image_up):
-        return f"+y is up in the cameras' world, as posefit's own files have it, though {axis} is in their images"
+        return (
+            "+y is up in the cameras' world, as posefit's own files have it, though "
+            f"{axis} is in their images"
+        )
     return ""
 
 
 def _image_up(calibrations: Sequence[Calibration]) -> Array | None:
-    """Return the images' up direction in the world (3,); None where no camera is placed."""
+    """Return the images' up direction (3,) in the world, or None without places."""
     placed = [camera.rotation for camera in calibrations if camera.rotation is not None]
     return -np.sum([rotation[1] for rotation in placed], axis=0) if placed else None
 
@@ -71,12 +82,15 @@ def _axis(direction: Array) -> Up:
 
 
 def check_places(cameras: Sequence[Calibration]) -> None:
-    """Raise InputError where translations seem to be the cameras' places.
+    """Raise InputError if the translations seem to be the cameras' positions.
 
-    Keys do not tell. Cameras of one scene see one point in front of them. Where they do not, but do so
-    once translations are read as places, and these are above the floor, places are meant. Of random rigs
-    of two cameras one of 500 is refused wrongly, and of those that have places four of five are
-    recognised where the origin is on the floor.
+    The names of keys do not tell which of the two a file has. Cameras of one scene look
+    at one point in front of them. The translations are taken for positions if the
+    cameras look at no such point, but would if the translations were positions, all
+    above the floor.
+
+    Of random rigs of two cameras, one in 500 is refused wrongly. Of such rigs with
+    positions in the file, four in five are recognised if the origin is on the floor.
     """
     placed = [
         (camera.rotation, camera.translation)
@@ -95,13 +109,17 @@ def check_places(cameras: Sequence[Calibration]) -> None:
         and (translations @ up > 0.0).all()
     ):
         raise InputError(
-            "translations that seem to be the places of cameras: T must be -R times the place, from the "
-            "world to the camera"
+            "translations that seem to be the places of cameras: T must be -R times "
+            "the place, from the world to the camera"
         )
 
 
 def _see_one_point(rotations: Array, positions: Array, aimed: float) -> bool:
-    """Return whether the axes of cameras pass one point, ahead of all and nearer than a share of its distance."""
+    """Return whether all cameras look at one point.
+
+    The point is ahead of every camera. It is off a camera's axis by less than `aimed`
+    times its distance from the camera.
+    """
     ahead = rotations[:, 2]
     across = np.eye(3) - np.einsum("ni,nj->nij", ahead, ahead)
     point, _, rank, _ = np.linalg.lstsq(
@@ -109,5 +127,5 @@ def _see_one_point(rotations: Array, positions: Array, aimed: float) -> bool:
     )
     depths = np.einsum("ni,ni->n", ahead, point - positions)
     misses = np.linalg.norm(np.einsum("nij,nj->ni", across, point - positions), axis=1)
-    # axes of one direction have no such point
+    # parallel axes determine no point
     return bool(rank == 3 and (depths > 0.0).all() and (misses < aimed * depths).all())

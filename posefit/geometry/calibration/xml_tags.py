@@ -1,4 +1,4 @@
-"""What readers of XML share: tags that must be there, and numbers in a text."""
+"""Functions that the readers of XML share: required tags, and numbers in a text."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from posefit.geometry.calibration.values import matrix_of
 
 
 def tag_of(parent: Any, path: str) -> Any:
-    """Return a tag in another. Raises InputError where it is missing."""
+    """Return a tag inside another. Raises InputError if it is missing."""
     tag = parent.find(path)
     if tag is None:
         raise InputError(f"a camera without {path}")
