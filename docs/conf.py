@@ -41,7 +41,7 @@ html_theme_options = {"navigation_with_keys": True}
 
 
 def setup(app: Any) -> None:
-    """Write the generated pages, and have docstrings read as the plain text they are."""
+    """Write the generated pages, and have docstrings read as plain text."""
     generator.write()
     app.connect("autodoc-process-docstring", _restructure)
     app.connect("autodoc-process-signature", _shorten)
@@ -56,5 +56,5 @@ def _restructure(
 def _shorten(
     _app: Any, _what: str, _name: str, _object: Any, _options: Any, *texts: str | None
 ) -> tuple[str | None, ...]:
-    """Return a signature, and what it returns, in which arrays are called as the code calls them."""
+    """Return a signature and its result with arrays named as in the code."""
     return tuple(None if text is None else shortened(text) for text in texts)

@@ -36,7 +36,7 @@ class InputError(ValueError):
 
 
 class NoPersonError(InputError):
-    """Masks show no person, or not the one who is meant; another segmenter may find them."""
+    """Masks do not show the person; another segmenter may find them."""
 
 
 class PluginWarning(UserWarning):

@@ -12,7 +12,7 @@ An optimiser uses four members of its space: `dimensions`, `start`, `periodic` a
 | tracker | `Tracker`: `Observation`s in, `Frame`s out | `posefit_register_trackers` |
 | start | `Initialiser`: `Observation` in, `Posterior` out | `posefit_register_starts` |
 | segmenter | `Segmenter` of a `Film` | `posefit_register_segmenters` |
-| device | `Device`, which draws poses and counts their areas | `posefit_register_devices` |
+| device | `Device`, which rasterises poses | `posefit_register_devices` |
 | command | a `click.Command` | `posefit_register_commands` |
 
 A name is imported when it is first used, so that a command that lists plugins is quick.

@@ -1,4 +1,4 @@
-"""The list of settings of every optimiser, prior, tracker, start, segmenter and device of posefit.
+"""The list of settings of everything that a plugin of posefit registers.
 
 It is read from the code. Optimisers that only adapt a library are listed by name.
 """

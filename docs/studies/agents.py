@@ -164,7 +164,7 @@ def constant(training: Training) -> Policy:
 
 
 def looked_up(training: Training) -> Policy:
-    """Return the policy that proposes the truths of the training instances with the nearest silhouettes."""
+    """Return a policy that proposes the truths of the nearest training silhouettes."""
     env = made(training, LOOKED_UP_AT_ONCE)
     silhouettes = []
     truths = []

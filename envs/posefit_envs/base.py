@@ -473,7 +473,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             values = [values] * self.num_envs
         if len(values) != self.num_envs:
             raise error.Error(
-                f"values must be one for each of the {self.num_envs} environments, got {len(values)}"
+                f"values must be one for each of the {self.num_envs} environments, "
+                f"got {len(values)}"
             )
         if name in self.row_attributes:
             raise error.Error(f"{name} must be set by the options of reset")

@@ -4,7 +4,8 @@ It needs no still background. C. Lugaresi et al., MediaPipe: a framework for bui
 perception pipelines, 2019; V. Bazarevsky et al., BlazePose: on-device real-time body
 pose tracking, 2020. Version 0.10.14 includes the weights, so nothing is downloaded.
 Install it with `pip install 'posefit[mediapipe]'`. The handbook's page "How do I track
-a person in a video?" shows how to install it without the parts that posefit does not need.
+a person in a video?" shows how to install it without the parts that posefit does not
+need.
 
 >>> from posefit.registry import registry
 >>> offer = registry().offers["segmenter"]["mediapipe"]

@@ -233,7 +233,7 @@ TRACK: tuple[Any, ...] = (
         "--write",
         default="",
         metavar="KIND,...",
-        help="Write only these files, such as bvh,trc,html, and summary.json. Default: all.",
+        help="Write only summary.json and these files, such as bvh,trc. Default: all.",
     ),
     _result("--force", is_flag=True, help="Replace earlier results in DIR."),
     _result(

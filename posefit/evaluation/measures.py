@@ -76,7 +76,7 @@ class Effort:
 
     seconds: float
     cpu_seconds: float
-    # of each stage: first_pose, build, frames, later_passes; empty where all are of the frames
+    # of each stage: first_pose, build, frames, later_passes; empty if all are of frames
     evaluations: Mapping[str, int] = field(default_factory=dict)
 
 

@@ -2,8 +2,8 @@
 
 Besides the overlap with the masks they are size, depth, standing feet, motion in the
 pictures, and others. Each sign has a limit from which the track is doubtful, and one
-from which it is unusable. docs/howto/trust.md has the limits, and the footage from which
-they come.
+from which it is unusable. docs/howto/trust.md has the limits, and the footage from
+which they come.
 """
 
 from collections import deque

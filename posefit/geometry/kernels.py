@@ -345,7 +345,7 @@ def joint_positions(chain, poses, places):
 
 @jit
 def write_mean_distances(joints, targets, distances):
-    """Write the mean distances (n, K) of the joints (n, 27, 3) of some bodies from those of others (K, 27, 3)."""
+    """Write the mean distances (n, K) of joints (n, 27, 3) from others (K, 27, 3)."""
     count = joints.shape[1]
     for i in range(joints.shape[0]):
         for k in range(targets.shape[0]):

@@ -204,7 +204,7 @@ def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
 
 
 def _check_memory(poses: int, fps: float, most: int) -> None:
-    """Raise InputError if learning from poses would take more memory than `most` bytes."""
+    """Raise InputError if learning from poses takes more than `most` bytes."""
     if poses * POSE_BYTES > most:
         took = f"{poses * POSE_BYTES / 1e9:.1f} GB for {poses:,} poses"
         raise InputError(

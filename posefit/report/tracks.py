@@ -140,8 +140,8 @@ SCORE = Score(
     "errors are many times as large as the others.",
     leaderboard="Each figure is the mean of a method's runs. In the error with losses "
     "a lost frame counts at least as much as the mean training pose. First come the "
-    "methods that are not worse than the one of the lowest error (p not below 0.05), those "
-    "that lost the fewest tracks first; then the others by their error. Skill is "
+    "methods that are not worse than the one of the lowest error (p not below 0.05), "
+    "those that lost the fewest tracks first; then the others by their error. Skill is "
     "1 − error with losses / baseline: 0 is no better than the baseline, which uses "
     "the true root and translation. ",
 )

@@ -377,7 +377,7 @@ class TrackOptions:
         live=False,
     )
     # `VIEW` has all options above this line
-    method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(
+    method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(  # noqa: E501
         None,
         "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker; see `posefit plugins`. "
         "Default: exemplars, or annealed@pca for a built-in motion. In Python also a "
