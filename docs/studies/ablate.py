@@ -1,14 +1,14 @@
-"""What each mechanism and constant of the default tracker is worth: it is switched off, halved and doubled.
+"""What each mechanism and constant of the default tracker is worth.
 
     python docs/studies/ablate.py --ledger ablated.jsonl
     python docs/studies/ablate.py --constants --ledger ablated.jsonl
 
-Recorded people who are left out of the library are tracked as in people.py, by one
-camera and by two, with several seeds. A line is a change of the tracker: the mean
-difference of the error from the tracker as it is, over the same clips and seeds, with
-its 95 % interval, and the ratio of CPU times. If a change makes no difference in any
-column, its mechanism can go. Finished tracks are kept in a file, where the same command
-continues.
+A mechanism is switched off; a constant is halved and doubled. Recorded people who are
+left out of the library are tracked as in people.py, by one camera and by two, with
+several seeds. A line is a change of the tracker: the mean difference of the error from
+the tracker as it is, over the same clips and seeds, with its 95 % interval, and the
+ratio of CPU times. If a change makes no difference in any column, its mechanism can go.
+Finished tracks are kept in a file, where the same command continues.
 """
 
 import importlib
@@ -100,7 +100,7 @@ def constants() -> dict[str, Change]:
             if not name.isupper() or not is_number or value == 0:
                 continue
             place = f"{module}.{name}"
-            # one imported from another module is changed with that
+            # one imported from another module is changed with that one
             if any(
                 place.endswith(f".{known.split('.')[1]}") for known in _seen(changes)
             ):
