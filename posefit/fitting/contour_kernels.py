@@ -96,7 +96,7 @@ class Views(NamedTuple):
     steps: Array  # (V,) pixels of the border that a point represents
 
 
-class Prior(NamedTuple):
+class Pulls(NamedTuple):
     """What is known of n places and poses before a fit.
 
     A place and a pose have 69 numbers, of which m may change.

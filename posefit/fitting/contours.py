@@ -296,7 +296,7 @@ def fitted(
             body.skeleton.chain,
             body.radii,
             stacked,
-            kernels.Prior(free, targets[part], precisions[free]),
+            kernels.Pulls(free, targets[part], precisions[free]),
             reaches,
             MAX_ANGLE_STEP,
             poses[part],

@@ -117,12 +117,13 @@ def with_another_bit(file: Path) -> None:
 
 def test_a_damaged_file_is_a_miss(run: Any, tmp_path: Path) -> None:
     run()
-    cases = [
-        (damage, pattern)
-        for damage in (emptied, cut, unreadable)
-        for pattern in ("*.nbi", "*.nbc")
-    ]
-    for damage, pattern in (*cases, (with_another_bit, "*.nbc"), (emptied, "*.nb?")):
+    # a checksum finds any difference: each kind of file, and each kind of damage once
+    for damage, pattern in (
+        (cut, "*.nbi"),
+        (unreadable, "*.nbc"),
+        (with_another_bit, "*.nbc"),
+        (emptied, "*.nb?"),
+    ):
         files = list((tmp_path / "cache").rglob(pattern))
         assert files
         for file in files:
