@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.geometry import kernels
 from posefit.geometry.body import Body
 from posefit.geometry.kernels import sine_cosine
 from posefit.geometry.rotation import rotation_from_joint_angles
@@ -152,3 +153,25 @@ def test_radii_are_checked() -> None:
         radii[3, 1] = bad
         with pytest.raises(ValueError, match=message):
             Body(skeleton, radii)
+
+
+def test_frames_of_any_number_of_poses_are_written_and_nothing_beyond_them() -> None:
+    skeleton = average_skeleton()
+    rng = np.random.default_rng(0)
+    poses = rng.uniform(-1.0, 1.0, (9, ANGLES))
+    places = rng.normal(size=(9, 3))
+    room = np.full((24, len(JOINTS), 4, 3), np.nan)
+    sines = np.full((24, ANGLES), np.nan)
+    cosines = np.full((24, ANGLES), np.nan)
+    kernels.place_frames(
+        skeleton.chain, poses, places, sines[:9], cosines[:9], room[:9]
+    )
+    np.testing.assert_allclose(room[:9, :, 3], skeleton.joints(poses, places))
+    for written in (room, sines, cosines):
+        assert np.isnan(written[9:]).all()
+
+
+def test_a_person_is_as_tall_as_people_are() -> None:
+    body = Body.of(average_skeleton())
+    assert 1.5 < body.stature < 2.0
+    assert body.scaled(2.0, 2.0).stature == pytest.approx(2.0 * body.stature)

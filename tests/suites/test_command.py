@@ -58,6 +58,8 @@ def test_the_functions_are_listed() -> None:
 
 def test_the_suite_has_the_form_of_iohs_registry() -> None:
     ioh = pytest.importorskip("ioh")
+    if not hasattr(ioh, "registry"):
+        pytest.skip("ioh has a registry since 0.4")
     theirs = ioh.registry()
     ours = suite_registry()
     assert ours["schema_version"] == theirs["schema_version"]
