@@ -617,7 +617,7 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
 
 
 def _instances(chosen: Any, count: int) -> list[int | None]:
-    """Return the instance of each environment, or None where one is to be drawn.
+    """Return the instance of each environment, or None to draw one.
 
     One number applies to all. Raises ArgumentError if the count is wrong, or an
     instance does not exist.

@@ -286,7 +286,7 @@ class Observations(Sequence[Observation]):
 class _Silhouettes(Sequence[Silhouette]):
     """The silhouettes of one frame, decoded on first use.
 
-    Whoever only asks whether a frame is usable decodes nothing.
+    To ask whether a frame is usable decodes nothing.
     """
 
     def __init__(self, observations: Observations, k: int) -> None:

@@ -149,6 +149,8 @@ def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
     named = {file: kind for kind, (file, _) in WRITERS.items()}
     words = [word.strip() for word in ",".join(parts).split(",")]
     kinds = {named.get(word, word) for word in words if word}
+    if any(parts) and not kinds:
+        raise InputError(f"write must name a file such as bvh, got {quoted(write)}")
     for kind in kinds:
         if kind not in WRITERS:
             hint = suggestion(kind, [*WRITERS, *named])

@@ -143,7 +143,11 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
             QUALISYS.replace("tangentalD", "tangentialD"),
             "the lens key 'tangentialDistortion1'",
         ),
-        ("a.xml", QUALISYS.replace('r11="1"', 'r11="3"'), "a rotation that is none"),
+        (
+            "a.xml",
+            QUALISYS.replace('r11="1"', 'r11="3"'),
+            "a matrix that is not a rotation",
+        ),
         (
             "a.yml",
             "%YAML:1.0\n---\nimage_width: 3\n",

@@ -525,6 +525,7 @@ def test_files_are_chosen_by_their_kinds_or_names(write: Any, kinds: Any) -> Non
         ("bvh,fbx", "write must be some of npz, asf, .*, html, got 'fbx'"),
         (["tracks.bvh"], "got 'tracks.bvh'; did you mean 'track.bvh'"),
         ([3], "write must be names of files, got"),
+        (" , ", "write must name a file such as bvh, got ' , '"),
         ("bvh", "write must be given with out, the folder of the track, got none"),
     ],
 )

@@ -364,5 +364,7 @@ def orthonormal(rotation: Array) -> Array:
     left, _, right = np.linalg.svd(rotation)
     nearest = left @ right
     if np.linalg.det(nearest) < 0.0 or np.abs(nearest - rotation).max() > 1e-2:
-        raise InputError(f"a rotation that is none: {quoted(rotation.tolist())}")
+        raise InputError(
+            f"a matrix that is not a rotation: {quoted(rotation.tolist())}"
+        )
     return np.asarray(nearest)

@@ -50,8 +50,7 @@ def stored(path: Path, text: str) -> Stored:
         start.startswith(("{", "[", "%")) or path.suffix.lower() in (".yml", ".yaml")
     ):
         raise InputError(
-            f"a file that is none of them, {path.suffix or 'without a suffix'}; "
-            "YAML is .yml or .yaml"
+            f"another file, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml"
         )
     values = parsed_json(text) if start.startswith(("{", "[")) else _yaml(text)
     if isinstance(values, list):  # a list of cameras, as in the AIST database

@@ -81,7 +81,9 @@ def _of_quaternion(numbers: Array) -> Array:
     """Return the rotation (3, 3) of a quaternion x, y, z, w."""
     length = float(np.linalg.norm(numbers))
     if abs(length - 1.0) > 1e-2:
-        raise InputError(f"an orientation that is none: {quoted(numbers.tolist())}")
+        raise InputError(
+            f"a quaternion whose length is not 1: {quoted(numbers.tolist())}"
+        )
     x, y, z, w = numbers / length
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + 2.0 * w * across + 2.0 * across @ across)
