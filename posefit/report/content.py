@@ -47,8 +47,8 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
         "answer": [answer],
         "header": _header(runs, contest),
         "methods": [
-            {"name": n, "settings": v["settings"]}
-            for n, v in zip(runs.methods, runs.variants, strict=True)
+            {"name": name, "settings": settings}
+            for name, settings in zip(runs.methods, runs.settings, strict=True)
         ],
         "instances": [{"name": name} for name in runs.instances],
         "baseline_names": kind.baselines,
@@ -126,21 +126,19 @@ def _problems(
         problems.append((text, [*details[:most], *more]))
 
     if runs.failures:
-        failures_by_method = Counter(failure["method"] for failure in runs.failures)
         reasons = Counter(
             reason for failure in runs.failures for reason in failure["reasons"]
         ).most_common()
-        text = "; ".join(
-            f"{name} {count}" for name, count in failures_by_method.items()
-        )
+        text = "; ".join(f"{name} {count}" for name, count in runs.failed.items())
         failed = counted(len(runs.failures), "cell")
         add(
             f"{failed} failed, left out of all figures: {text}",
             [f"{n} x {reason}" for reason, n in reasons],
             REASONS,
         )
-    if runs.unfinished:
-        names = "; ".join(runs.unfinished)
+    unfinished = [name for name in runs.failed if name not in runs.methods]
+    if unfinished:
+        names = "; ".join(unfinished)
         add(f"no cell finished, so not on the leaderboard: {names}", [], 0)
     if unpaired:
         add(unpaired, [], 0)

@@ -1,5 +1,6 @@
 """The table of a report's runs, the protocol of their kind, and their contest."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import printable
 from posefit.report.columns import Column, Score
+from posefit.settings import settings_text
 from posefit.statistics.paired import PairedTest, paired_tests
 from posefit.statistics.pairing import Shared
 
@@ -114,10 +117,6 @@ class Runs:
             `Kind.data`.
         warnings: The warnings of each row that has some, by its index.
         failures: The name, method, key, reasons and command of each quarantined cell.
-        failed: The number of each method's quarantined cells.
-        unfinished: The names of methods that have only quarantined cells.
-        heads: The beginnings of the commands that run rows again.
-        head: The index (n,) of each row's beginning.
     """
 
     kind: Kind
@@ -135,13 +134,22 @@ class Runs:
     data: dict[str, Any]
     warnings: Mapping[int, tuple[str, ...]]
     failures: tuple[dict[str, Any], ...]
-    failed: tuple[int, ...]
-    unfinished: tuple[str, ...]
-    heads: tuple[str, ...]
-    head: Array
 
     def __len__(self) -> int:
         return len(self.keys)
+
+    @property
+    def settings(self) -> list[str]:
+        """The settings of each method, as a text."""
+        return [
+            printable(", ".join(settings_text(variant["settings"])))
+            for variant in self.variants
+        ]
+
+    @cached_property
+    def failed(self) -> Counter[str]:
+        """The number of quarantined cells by the name of their method."""
+        return Counter(failure["method"] for failure in self.failures)
 
     @property
     def table_figures(self) -> list[str]:

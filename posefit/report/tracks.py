@@ -19,6 +19,7 @@ from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed, mean
 from posefit.report.kind import Contest, Kind, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
+from posefit.report.repeat import command_head
 from posefit.statistics.means import block_means
 from posefit.uncertainty.calibration import BINS
 
@@ -306,6 +307,7 @@ class Tracks:
                 "certainty": certainty,
             }
         numbers = [_exact(place["instance"]) for place in runs.places]
+        heads, head = _heads(runs)
         return {
             **part,
             "sections": sections,
@@ -317,14 +319,29 @@ class Tracks:
             "rows": {
                 "method": runs.method,
                 "instance": runs.instance,
-                "head": runs.head,
+                "head": head,
                 "seed": runs.seed,
                 **{name: runs.figures[name] for name in runs.table_figures},
                 "key": [key[:8] for key in runs.keys],
             },
             "seeds": [_exact(seed) for seed in runs.seeds],
-            "heads": runs.heads,
+            "heads": heads,
         }
+
+
+def _heads(runs: Runs) -> tuple[list[str], list[int]]:
+    """Return the beginnings of the commands that run rows again, and each row's index.
+
+    Rows that differ only in their last fields have the same beginning.
+    """
+    pairs = list(zip(runs.method.tolist(), runs.instance.tolist(), strict=True))
+    commands = {
+        (m, i): command_head({**runs.variants[m], **runs.places[i]})
+        for m, i in set(pairs)
+    }
+    heads = sorted(set(commands.values()))
+    index = {head: k for k, head in enumerate(heads)}
+    return heads, [index[commands[pair]] for pair in pairs]
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:

@@ -7,7 +7,6 @@ import hashlib
 import json
 import time
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -305,8 +304,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     for planned in cell.version.split(", "):
         if installed := other_version(planned):
             raise InputError(f"a worker must have {planned}, got {installed}")
-    with _guarded(cell):
-        figures = cell.measure()
+    figures = cell.measure()
     row = {
         "key": cell.key,
         "spec": cell.spec,
@@ -324,26 +322,21 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     return row
 
 
-def _guarded(cell: Cell) -> AbstractContextManager[None]:
-    """Return a context that undoes a plugin's changes to libraries.
-
-    posefit's own plugins change none, so that they need no such context.
-    """
-    from posefit.sweep.worker import functions_kept
-
-    if _own_origins().issuperset(cell.version.split(", ")[1:]):
-        return nullcontext()
-    return functions_kept()
+def foreign_plugins(version: str) -> str:
+    """Return the part of a cell's version that is about plugins from elsewhere."""
+    own = _own_origins()
+    return ", ".join(part for part in version.split(", ") if part not in own)
 
 
 @lru_cache(maxsize=1)
 def _own_origins() -> frozenset[str]:
-    """Return the origins of posefit's own plugins."""
+    """Return the origins of posefit and its own plugins."""
     from posefit.hooks import PROJECT
     from posefit.registry import registry
 
     offers = (offer for named in registry().offers.values() for offer in named.values())
-    return frozenset(offer.origin for offer in offers if offer.distribution == PROJECT)
+    own = (offer.origin for offer in offers if offer.distribution == PROJECT)
+    return frozenset([posefit_build(), *own])
 
 
 def other_version(origin: str) -> str | None:
