@@ -8,7 +8,7 @@ from typing import Any
 
 from posefit.errors import printable
 from posefit.reading import counted
-from posefit.report.kind import Contest, Runs
+from posefit.report.contest import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.page import COLOUR_COUNT
 from posefit.report.summary import leader_sentences, unpaired_sentence

@@ -4,7 +4,7 @@ import math
 from dataclasses import astuple
 from typing import Any
 
-from posefit.report.kind import Contest, Runs
+from posefit.report.contest import Contest, Runs
 from posefit.statistics.paired import SIGNIFICANCE
 from posefit.statistics.pairing import most_shared
 

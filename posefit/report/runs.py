@@ -10,7 +10,7 @@ import numpy as np
 from posefit.errors import InputError, printable
 from posefit.reading import quoted, suggestion
 from posefit.report.columns import listed
-from posefit.report.kind import Kind, Runs
+from posefit.report.contest import Kind, Runs
 from posefit.report.repeat import repeat_command
 from posefit.report.searches import SEARCHES
 from posefit.report.tracks import TRACKS

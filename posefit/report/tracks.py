@@ -17,7 +17,7 @@ from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed, mean
-from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
 from posefit.report.repeat import command_head
 from posefit.statistics.means import block_means
@@ -149,7 +149,18 @@ SCORE = Score(
 
 
 class Tracks:
-    """The kind of runs of tracks."""
+    """The kind of runs of tracks.
+
+    Attributes:
+        name: The kind's name, in the singular.
+        noun: Its runs, in the plural.
+        title: The title of the page.
+        columns: Its figures by name.
+        score: The figure that orders the methods.
+        named: The fields that an instance's name contains.
+        data: The names of a row's other data.
+        baselines: The label of each baseline by name.
+    """
 
     name = "track"
     noun = "tracks"
@@ -165,7 +176,10 @@ class Tracks:
     def read(
         self, row: Row, shared: dict[bytes, Any], /
     ) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data."""
+        """Return the figures of a row and its other data.
+
+        `shared` holds arrays that many rows have in common, to save memory.
+        """
         used = np.array(row["trace"]["evaluations"], np.float32)
         # many rows have the same evaluations in their traces
         used = shared.setdefault(used.tobytes(), used)
@@ -388,4 +402,4 @@ def _exact(number: int) -> int | str:
     return number if abs(number) < 2**53 else str(number)
 
 
-TRACKS: Kind = Tracks()
+TRACKS = Tracks()

@@ -14,7 +14,6 @@ from functools import partial
 from typing import Any
 
 from posefit.errors import InputError
-from posefit.sweep.cell import run_cell
 from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome, Run, text_of
 from posefit.sweep.pool import Pool
 from posefit.version import posefit_build
@@ -46,7 +45,7 @@ class Cluster:
         self,
         scheduler: str,
         limits: Limits,
-        run: Run = run_cell,
+        run: Run,
         patience: float = CONNECT_TIMEOUT_SECONDS,
     ) -> None:
         try:

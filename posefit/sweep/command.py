@@ -13,7 +13,7 @@ from posefit.progress import bars_shown
 from posefit.reading import counted, cut
 from posefit.sweep.cell import Cell, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
-from posefit.sweep.engine import Engine, Limits, Run
+from posefit.sweep.engine import Engine, Limits
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS
 from posefit.sweep.pool import Pool, cores
@@ -135,7 +135,6 @@ def done_elsewhere(out: Path) -> set[str]:
 
 def engine(
     limits: Limits,
-    run: Run = run_cell,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -144,7 +143,6 @@ def engine(
 
     Args:
         limits: The longest time and the most memory of a cell.
-        run: Called with each cell in a worker.
         workers: Number of processes on this machine, by default one per processor.
         scheduler: The address of a Dask scheduler whose workers run the cells instead.
 
@@ -165,8 +163,8 @@ def engine(
         if scheduler is not None:
             from posefit.sweep.cluster import Cluster
 
-            return Cluster(scheduler, limits, run)
-        return Pool(workers or cores(), limits, run)
+            return Cluster(scheduler, limits, run_cell)
+        return Pool(workers or cores(), limits, run_cell)
 
     return start
 

@@ -156,9 +156,6 @@ class Ledger:
     def __len__(self) -> int:
         return sum(done for _, done in self._places.values())
 
-    def __contains__(self, key: str) -> bool:
-        return self._places.get(key, (0, False))[1]
-
     def done(self) -> set[str]:
         """Return the keys of the finished cells."""
         return {key for key, (_, done) in self._places.items() if done}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.report.kind import Runs
+from posefit.report.contest import Runs
 from posefit.report.runs import distinct
 from posefit.report.tracks import TRACKS
 from tests.report.browser import ledger, result

@@ -104,7 +104,7 @@ def state() -> list[Any]:
 def leave_behind() -> None:
     """Note the state of this process and the number of another that sleeps, and change all of it."""
     sleeps = [sys.executable, "-c", "import time; time.sleep(600)"]
-    process = subprocess.Popen(sleeps, cwd="/")
+    process = subprocess.Popen(sleeps, cwd="/", start_new_session=True)
     # NumPy draws two of them, and keeps the second
     numbers = random.random(), np.random.standard_normal()  # noqa: NPY002
     with open(os.environ[LEFT], "a", encoding="utf-8") as file:
