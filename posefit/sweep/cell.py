@@ -18,6 +18,7 @@ from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.footage.scene import Scene
+    from posefit.registry import Offer
 
 ALL_AROUND = 180.0  # degrees; with an error this large the yaw is unknown
 RNG_STREAM_PERSON = 2001  # of the errors in a method's knowledge of the person
@@ -332,10 +333,8 @@ def foreign_plugins(version: str) -> str:
 def _own_origins() -> frozenset[str]:
     """Return the origins of posefit and its own plugins."""
     from posefit.hooks import PROJECT
-    from posefit.registry import registry
 
-    offers = (offer for named in registry().offers.values() for offer in named.values())
-    own = (offer.origin for offer in offers if offer.distribution == PROJECT)
+    own = [offer.origin for offer in _offers() if offer.distribution == PROJECT]
     return frozenset([posefit_build(), *own])
 
 
@@ -363,10 +362,14 @@ def installed() -> frozenset[str]:
 
     See `posefit.registry.Offer.origin`.
     """
+    return frozenset([posefit_build(), *(offer.origin for offer in _offers())])
+
+
+def _offers() -> list["Offer"]:
+    """Return what all plugins offer."""
     from posefit.registry import registry
 
-    offers = (offer for named in registry().offers.values() for offer in named.values())
-    return frozenset([posefit_build(), *(offer.origin for offer in offers)])
+    return [offer for named in registry().offers.values() for offer in named.values()]
 
 
 def cell_scene(cell: TrackCell) -> "Scene":

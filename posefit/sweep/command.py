@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -53,8 +52,7 @@ def swept(
     from tqdm.auto import tqdm
 
     with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
-        versions = Counter(spec["version"] for spec in ledger.old_specs())
-        for version, count in versions.items():
+        for version, count in ledger.versions().items():
             if any(map(other_version, version.split(", "))):
                 say(
                     f"{counted(count, 'row')} in {out} are of another version, "

@@ -174,13 +174,9 @@ class Ledger:
 
         Without finished rows, the installed version.
         """
-        query = (
-            "SELECT DISTINCT json_extract(spec, '$.version') FROM cells "
-            "WHERE status = 'done'"
-        )
         builds = set()
         for k in range(len(self._open)):
-            for (version,) in self._query(k, query):
+            for version, _ in self._query(k, VERSIONS):
                 # the versions of plugins follow after commas
                 builds.add(str(version).partition(", ")[0])
         if not builds:
@@ -248,6 +244,11 @@ class Ledger:
 
 
 SELECT = "SELECT key, spec, faults, row FROM cells"
+# the versions of the finished cells, with their numbers
+VERSIONS = """
+    SELECT json_extract(spec, '$.version'), count(*) FROM cells
+    WHERE status = 'done' AND json_valid(spec) GROUP BY 1
+"""
 
 
 def _parsed_row(
@@ -435,10 +436,9 @@ class Writer:
         )
         return self._db.execute(query).rowcount
 
-    def old_specs(self) -> Iterator[Mapping[str, Any]]:
-        """Return an iterator of the specs of finished cells."""
-        query = "SELECT spec FROM cells WHERE status = 'done'"
-        return (json.loads(spec) for (spec,) in self._db.execute(query))
+    def versions(self) -> dict[str, int]:
+        """Return the number of finished cells by their version."""
+        return dict(self._db.execute(VERSIONS).fetchall())
 
 
 def _files(path: Path) -> list[Path]:

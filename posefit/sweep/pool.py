@@ -50,12 +50,12 @@ class Pool:
 
     def submit(self, job: Any, tenant: str = "") -> None:
         """Start a job in an idle process of its tenant, or in a new one."""
-        idle = []
-        for worker in self._workers.copy():
-            if not worker.is_alive and not worker.is_busy:
+        idle = [worker for worker in self._workers if not worker.is_busy]
+        for worker in idle.copy():
+            # it may have been killed meanwhile
+            if not worker.is_alive:
                 self._end(worker)
-            elif not worker.is_busy:
-                idle.append(worker)
+                idle.remove(worker)
         mine = [worker for worker in idle if worker.tenant == tenant]
         if mine:
             worker = mine[-1]
@@ -80,7 +80,7 @@ class Pool:
             if outcome is not None:
                 outcomes.append(outcome)
             if not worker.is_alive:
-                self._workers.remove(worker)
+                self._end(worker)
         return outcomes
 
     def close(self) -> None:

@@ -153,6 +153,8 @@ class Worker:
 
     def end(self) -> None:
         """End the process and all processes that its jobs have started."""
+        if self.connection.closed:
+            return
         pid = self._process.pid
         assert pid is not None
         # a process that a job starts belongs to the worker's process group
