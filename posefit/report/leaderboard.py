@@ -100,9 +100,9 @@ def _effects(contest: Contest, first: int) -> dict[int, dict[str, float | None]]
     They are None for a method without a test.
     """
     place = contest.methods.index(first)
-    effects: dict[int, dict[str, float | None]] = {
-        m: dict.fromkeys(EFFECT) for m in range(len(contest.runs.methods))
-    }
+    effects: dict[int, dict[str, float | None]] = {}
+    for m in range(len(contest.runs.methods)):
+        effects[m] = dict.fromkeys(EFFECT)
     for pair in contest.comparisons:
         if place not in (pair.first, pair.second):
             continue
