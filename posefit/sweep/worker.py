@@ -50,9 +50,8 @@ class _Process(SpawnProcess):
     def _Popen(process: Any) -> Any:  # noqa: N802
         main = sys.modules["__main__"]
         with _starting, _interrupts_blocked():
-            before = {
-                name: getattr(main, name, None) for name in ("__file__", "__spec__")
-            }
+            names = ("__file__", "__spec__")
+            before = {name: getattr(main, name, None) for name in names}
             try:
                 vars(main).update(dict.fromkeys(before))
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
@@ -182,9 +181,10 @@ def functions_kept() -> Iterator[None]:
         if name in _functions or not isinstance(module, ModuleType):
             continue
         members = vars(module)
-        functions = {
-            member: value for member, value in members.items() if callable(value)
-        }
+        functions = {}
+        for member, value in members.items():
+            if callable(value):
+                functions[member] = value
         _functions[name] = members, functions
     try:
         yield
