@@ -50,11 +50,8 @@ NAMES = {
     "lowerneck": "Neck",
     "upperneck": "Neck1",
     "head": "Head",
-    **{
-        f"{side[0].lower()}{bone}": f"{side}{name}"
-        for side in ("Left", "Right")
-        for bone, name in _LIMBS.items()
-    },
+    **{f"l{bone}": f"Left{name}" for bone, name in _LIMBS.items()},
+    **{f"r{bone}": f"Right{name}" for bone, name in _LIMBS.items()},
     "lhipjoint": "LHipJoint",
     "rhipjoint": "RHipJoint",
 }

@@ -217,9 +217,8 @@ def _clips(
     source: Source, stated: FileOptions, followed: Source | None
 ) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
-        clips = [
-            clip for clip in recorded.named(source) if clip.name != _stem(followed)
-        ]
+        stem = _stem(followed)
+        clips = [clip for clip in recorded.named(source) if clip.name != stem]
         if not clips:
             raise InputError(
                 "train must hold another clip than the source, "
@@ -227,11 +226,10 @@ def _clips(
             )
         yield from (recorded_clip(clip) for clip in clips)
     elif not isinstance(source, Motion) and Path(source).is_dir():
-        paths = sorted(
-            path
-            for path in Path(source).iterdir()
-            if path.suffix.lower() in MOTIONS and path.is_file()
-        )
+        paths = []
+        for path in sorted(Path(source).iterdir()):
+            if path.suffix.lower() in MOTIONS and path.is_file():
+                paths.append(path)
         if not paths:
             raise InputError(
                 f"{source}: expected a folder of {' or '.join(MOTIONS)} files, "
