@@ -241,18 +241,18 @@ class Suite:
         instances = _numbers("instances", instances)
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
-        self.passed_over = tuple(
-            function
-            for function in chosen
-            if not set(dimensions) & set(function.dimensions)
-        )
+        passed_over = []
+        for function in chosen:
+            if not set(dimensions) & set(function.dimensions):
+                passed_over.append(function)
+        self.passed_over = tuple(passed_over)
         self.name = name
         self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget}
-        self._addresses = [
-            checked_address(name, function.number, instance, dimension)
-            for dimension, function, instance in product(dimensions, chosen, instances)
-            if dimension in function.dimensions
-        ]
+        self._addresses = []
+        for dimension, function, instance in product(dimensions, chosen, instances):
+            if dimension in function.dimensions:
+                address = checked_address(name, function.number, instance, dimension)
+                self._addresses.append(address)
         if not self._addresses:
             raise InputError(
                 "a suite must hold at least one problem, "
