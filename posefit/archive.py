@@ -125,11 +125,10 @@ def archived(
             archive = stack.enter_context(zipfile.ZipFile(file))
             file.longest = packed
             members = set(archive.namelist())
-            arrays = {
-                name: _stored(path, what, archive, name)
-                for name in names
-                if f"{name}.npy" in members
-            }
+            arrays = {}
+            for name in names:
+                if f"{name}.npy" in members:
+                    arrays[name] = _stored(path, what, archive, name)
             if (
                 single
                 and len(members) == 1

@@ -79,10 +79,12 @@ def settings_in(text: str) -> dict[str, tuple[str, str]]:
     the source's letter, and is "" if it is missing. Without a list the result is empty.
     """
     listed = _LIST.search(text)
-    entries = _ENTRY.findall(textwrap.dedent(listed[2])) if listed else []
-    return {
-        name: (symbol, " ".join(meaning.split())) for name, symbol, meaning in entries
-    }
+    if not listed:
+        return {}
+    meanings = {}
+    for name, symbol, meaning in _ENTRY.findall(textwrap.dedent(listed[2])):
+        meanings[name] = (symbol, " ".join(meaning.split()))
+    return meanings
 
 
 def without_settings(text: str) -> str:
