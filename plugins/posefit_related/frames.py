@@ -76,10 +76,8 @@ def place_of(
     if observation.translation is not None:
         return np.array(observation.translation, dtype=np.float64), 0
     for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True):
-        mask, drawn = (
-            _box(mask)
-            for mask in (silhouette.mask, project(task.body, camera, pose, place))
-        )
+        mask = _box(silhouette.mask)
+        drawn = _box(project(task.body, camera, pose, place))
         if mask is not None and drawn is not None:
             at = camera.rotation @ place + camera.translation
             depth = at[2] * (drawn[1] / mask[1])[1]
