@@ -160,11 +160,11 @@ class _ArchiveFile(io.FileIO):
 def _as_input_error(expected: str) -> Iterator[None]:
     """Turn any error of a damaged archive or array into an InputError.
 
-    Its message begins with what was expected.
+    Its message begins with `expected`.
     """
     try:
         yield
-    # whatever zipfile and NumPy stumble over, the file is the cause
+    # zipfile and NumPy raise many types of errors for a damaged file
     except Exception as error:
         text = " ".join(str(error).split()) or type(error).__name__
         came = f"a damaged one: {cut(text)}"

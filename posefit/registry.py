@@ -37,7 +37,7 @@ BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
 Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter", "device"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-# those that `posefit check` has rules for, and `posefit plugins new` a template
+# `posefit check` has rules for these kinds, `posefit plugins new` a template
 CHECKED_KINDS = tuple(kind for kind in KINDS if kind != "device")
 # distribution of an optimiser that no plugin but the program itself has registered
 OWN = "this process"
@@ -371,7 +371,7 @@ def load(
                     offers=tuple(methods),
                     commands=tuple(commands),
                 )
-            # whatever a plugin does, the others must work
+            # the others must work, no matter what a plugin does
             except (Exception, SystemExit) as error:
                 trace = "".join(traceback.format_exception(error))
                 plugin = plugin._replace(

@@ -128,7 +128,7 @@ def check(
 def planned(
     factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int
 ) -> dict[str, Any]:
-    """Return an optimiser's settings with those that follow from a search's budget.
+    """Return an optimiser's settings, with settings that a search's budget decides.
 
     These are `evaluations` itself, and `iterations`, the populations after the first,
     if the optimiser has these settings. Given values are kept.

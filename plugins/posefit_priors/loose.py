@@ -98,7 +98,7 @@ class Loose:
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, d) of joint angles (n, 63).
 
-        They are the components, then what is left over of the loose angles.
+        The components come first, then the remainders of the loose angles.
         """
         latents = self._pca.transform(angles)
         residual = np.asarray(angles) - self._pca.inverse_transform(latents)  # (n, 63)

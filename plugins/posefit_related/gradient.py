@@ -105,7 +105,7 @@ class Gradient:
 def predicted(latest: list[tuple[Array, Array]], damping: float) -> tuple[Array, Array]:
     """Return the pose and place predicted from the last two at constant velocity.
 
-    A single one is returned as it is.
+    A single pose and place are returned unchanged.
     """
     pose, place = latest[-1]
     before, place_before = latest[0]

@@ -8,7 +8,7 @@ are fixed.
 
 Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut
 a limb. Over the components of a prior, stages go from coarse to fine. Without a
-prediction, the search starts from the best of some random poses. The inertia is that of
+prediction, the search starts from the best of some random poses. The inertia follows
 the SAPSO paper. A particle that leaves the box or becomes infeasible moves towards the
 best of the previous stage.
 """

@@ -30,7 +30,7 @@ MIN_STEPS_SHARE = 1.0 / 3.0  # least share of the known time that the steps last
 # is wider
 MAX_STEP_WIDTH = 0.35
 RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
-# share of a stride; judged by the rearmost toes, a runner's foot stands shorter
+# share of a stride; judged by the rearmost toes, a runner's stance is shorter
 MIN_STANCE_SHARE = 0.57
 # ours: standard deviation over mean of strides in one place; a dance's differ more
 MAX_UNEVEN = 0.1
@@ -51,7 +51,7 @@ WARNING_SHARE = 0.05  # ours: share of frames from which a warning is given
 class Step:
     """A strike of a foot, with the step that it ends and the stride that it begins.
 
-    What is unknown is None. Seconds count from the first frame, lengths are metres.
+    Unknown values are None. Seconds count from the first frame, lengths are metres.
 
     Attributes:
         foot: "left" or "right".
@@ -62,7 +62,7 @@ class Step:
         step_width: between both ankles at the strike, across the way.
         stride_seconds: duration of the stride.
         stride_length: from this strike to the foot's next one.
-        stance_share: share of the stride in which the foot stands.
+        stance_share: share of the stride in which the foot is on the ground.
     """
 
     foot: str

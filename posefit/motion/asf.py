@@ -100,7 +100,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
         if guess is not None:
             wanted = metres_of(guess)
             came += (
-                f"; lengths are taken for {UNIT_NAMES[guess]}: "
+                f"; lengths are taken as {UNIT_NAMES[guess]}: "
                 f"{stature / metres * wanted:.2f} m; --unit sets it"
             )
         notes.append(came)

@@ -33,8 +33,8 @@ class FileOptions(NamedTuple):
     Attributes:
         asf: skeleton of an .amc file; None for the only .asf file in its folder.
         unit: length unit; None to recognise it.
-        up: axis that points up; None for y, or the axis that a .bvh's person stands
-            along.
+        up: axis that points up; None for y, or in a .bvh file for the axis along which
+            the person stands.
         rate: frames per second of an .amc file; None for what it states, or 120.
     """
 
@@ -149,14 +149,14 @@ def load_motion(
 
 
 def skeleton_file(amc: Path, asf: str | Path | None) -> Path:
-    """Return the .asf file of an .amc file: the given one, or the only one in reach."""
+    """Return the .asf file of an .amc file: `asf`, or the only one in its folder."""
     if asf is not None:
         return existing(Path(asf))
     existing(amc)
     found = sorted(amc.parent.glob("*.asf"))
     if len(found) != 1:
         raise InputError(
-            f"{amc}: expected --asf or exactly one .asf file beside it, "
+            f"{amc}: expected --asf or exactly one .asf file in its folder, "
             f"got {len(found)}"
         )
     return found[0]

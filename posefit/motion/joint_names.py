@@ -1,11 +1,11 @@
 """Recognises the joints of another program's skeleton by name and position in the tree.
 
-Names of many programs are known: those of Acclaim, the CMU conversions by cgspeed,
+The names of many programs are known: Acclaim, the CMU conversions by cgspeed,
 MotionBuilder and HumanIK, Mixamo, LAFAN1, Bandai Namco, 3ds Max's Biped, Biovision,
 Xsens, Poser, SMPL, Unreal, VRM, Blender and freemocap. Namespaces, prefixes, numbers
-and the way to write a side do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and
-`thigh.L` are the same joint. Limbs are found by the names of their joints; the spine is
-whatever lies between legs and arms.
+and the spelling of sides do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and
+`thigh.L` are the same joint. Limbs are found by the names of their joints; all joints
+between legs and arms are the spine.
 """
 
 import re
@@ -133,7 +133,7 @@ class Joints(NamedTuple):
 
 
 def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str]:
-    """Return a person's joints in a tree, or what the tree lacks.
+    """Return a person's joints in a tree, or the names of missing joints.
 
     Args:
         names: names of the nodes, "" for the end of a bone without a further joint.

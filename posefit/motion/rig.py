@@ -40,8 +40,8 @@ from posefit.motion.built_in import average_skeleton
 from posefit.motion.joint_names import Joints
 
 SAME_PLACE = 1e-4  # share of a leg within which two joints are at the same point
-# degrees: a foot, a clavicle or a bone of the spine that is so near to CMU's rest is
-# kept as it is in the file
+# degrees: a foot, a clavicle or a bone of the spine within this angle of CMU's rest
+# pose is not turned
 AS_IN_FILE = 20.0
 SAME_DIRECTION = 0.5  # degrees: the same for other bones
 UPRIGHT = 60.0  # degrees that legs and trunk may be off in a rest pose
@@ -172,7 +172,7 @@ class _Bone:
 
     @classmethod
     def between(cls, node: int, start: "_Bone", end: "_Bone", share: float) -> Self:
-        """Return the bone that a node carries, with an end between those of two others.
+        """Return the bone that a node carries, with an end between two other ends.
 
         The end is a share of the way from the first to the second. If these are
         unknown, it is unknown, too.
@@ -485,9 +485,9 @@ def _limbs(rig: Rig, side: str, average: Mapping[str, float]) -> dict[str, _Bone
 
 
 def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
-    """Return the three bones of the spine, whatever joints it has.
+    """Return the three bones of the spine, which may have any number of joints.
 
-    Of more than three joints the two with the steadiest distances are taken.
+    If there are more than three joints, the two with the steadiest distances count.
     """
     joints = rig.joints
     root = _Bone(joints.hips, rig.moving[1][joints.hips], rig.rest[1][joints.hips])
@@ -594,7 +594,7 @@ def _squared(left: Array, above: Array) -> Array:
 def upward(rig: Rig) -> tuple[int, float]:
     """Return the world's axis that legs and trunk point up along, and their cosine.
 
-    The axis is 0 to 2. The cosine is that of the worst limb: -1 is straight down.
+    The axis is 0 to 2. The worst limb decides the cosine: -1 is straight down.
     """
     places = rig.moving[1]
     limbs = rig.joints.limbs

@@ -308,7 +308,7 @@ def page_of(content: Content) -> str:
 def _filmed(scene: Scene, warnings: list[str]) -> Iterator[Image | None]:
     """Yield the picture of each frame, then None without end.
 
-    None stands for missing footage, or for footage that cannot be read to its end.
+    None if there is no footage, or if it cannot be read to its end.
     """
     if scene.pictures is not None:
         try:

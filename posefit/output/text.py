@@ -1,6 +1,6 @@
 """The text that a track prints.
 
-It compares the method with trivial ones, and names what was not determined and the
+It compares the method with trivial ones, and names everything undetermined and the
 budget.
 """
 
@@ -128,7 +128,7 @@ def held_frames(track: Content) -> str:
     show = "frame shows" if count == 1 else "frames show"
     return (
         f"{count} {show} too little of the person: the pose is held or carried on, "
-        "not searched, and may be wrong; the IoU is that of the other frames"
+        "not searched, and may be wrong; these frames are excluded from the IoU"
     )
 
 

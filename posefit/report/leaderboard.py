@@ -35,7 +35,7 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     1. Methods that are not shown to be worse than the method of the best score, with p
        of the paired test not below 0.05. They are sorted by the number of lost tracks,
        because no difference of their errors is shown. So no method that loses tracks is
-       ahead of one that is as good and loses none.
+       ahead of an equally good method that loses none.
     2. The other methods that take part, by their score.
     3. Methods that do not take part, with the averages of all their own runs.
 

@@ -137,13 +137,13 @@ SCORE = Score(
     "as much as the mean training pose. "
     "The line is its 95 % interval; dashed lines are baselines. In simulated studies "
     "the interval holds the true mean in 94 to 97 %, and in 88 to 91 % where a few "
-    "errors are many times as large as the others.",
+    "errors are many times larger than the others.",
     leaderboard="Each figure is the mean of a method's runs. In the error with losses "
     "a lost frame counts at least as much as the mean training pose. First come the "
-    "methods that are not worse than the one of the lowest error (p not below 0.05), "
-    "those that lost the fewest tracks first; then the others by their error. Skill is "
-    "1 − error with losses / baseline: 0 is no better than the baseline, which uses "
-    "the true root and translation. ",
+    "methods that are not shown to be worse than the method of the lowest error "
+    "(p at least 0.05), in order of lost tracks; then the others by their error. "
+    "Skill is 1 − error with losses / baseline: 0 is no better than the baseline, "
+    "which uses the true root and translation. ",
 )
 
 

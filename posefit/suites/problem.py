@@ -3,7 +3,7 @@
 Each is a `posefit.Problem` with a `SuiteCost` as its cost function. Its attributes have
 the same names as in COCO, so loops written for COCO run on it unchanged.
 
-A suite may get more problems, but nothing else about it ever changes.
+A suite may get more problems. Everything else about it stays the same for ever.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -111,11 +111,11 @@ class TrackCell(Cell):
         first_pose: "searched" or "given".
         hypotheses: How many times the motion is tracked, see
             `posefit.tracking.restarts`.
-        yaw_off_degrees: The largest error of the first frame's yaw, as it is given to
-            the method. At 180 the yaw is not given. The error depends on the instance
-            and the motion's name.
-        body_off_percent: The largest error of each bone's length and radii, as they are
-            given to the method. It depends on the same two.
+        yaw_off_degrees: The largest error of the first frame's yaw that the method
+            gets. At 180 it gets no yaw. The error depends on the instance and the
+            motion's name.
+        body_off_percent: The largest error of each bone's length and radii that the
+            method gets. It depends on the same two.
         seed: Of everything random.
         name: The method's name in reports.
         files: The SHA-256 of each motion file that is read, by path.
@@ -410,9 +410,9 @@ def cell_scene(cell: TrackCell) -> "Scene":
 
 
 def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
-    """Return the scene with the person as it is given to a method.
+    """Return the scene with the first yaw and the body that a method gets.
 
-    Their first yaw and their body have random errors up to the cell's limits.
+    Both have random errors up to the cell's limits.
     """
     import numpy as np
 

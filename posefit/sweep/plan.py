@@ -314,7 +314,7 @@ def _fields(field: str, entry: Any) -> Entry:
 def _listed(name: str, field: str, values: Any, first: int = 0) -> Sequence[Any]:
     """Return the entries of a list.
 
-    For instances and seeds a number N stands for the N numbers from `first` on.
+    For instances and seeds a number N means the N numbers from `first` on.
     """
     if field in ("instance", "seed") and type(values) is int:
         if values > MAX_CELLS:

@@ -117,7 +117,7 @@ def _exists(process: int) -> bool:
 
 @contextmanager
 def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards what the body changes in this process.
+    """Undo afterwards the changes that the body makes in this process.
 
     These are the folder, the environment variables, `sys.path`, the signal handlers,
     the global random numbers and NumPy's handling of floating-point errors. A worker
@@ -161,7 +161,7 @@ class _State:
             for number, before, now in zip(
                 _SIGNALS, self._handlers, handlers, strict=True
             ):
-                # None stands for a handler that Python did not install
+                # None means a handler that Python did not install
                 if before is not None and now != before:
                     signal.signal(number, before)
         random.setstate(self._numbers)

@@ -34,7 +34,7 @@ MAX_SHARE_OF_CHANCE = 0.95  # a cost beats chance if it is below this share of i
 SIDES_BUDGET = 2_440
 MAX_SHARE_AT_SIDES = 0.15
 SIDES_SEEDS = range(3)
-MAX_SECONDS = 0.05  # for a proposal: twenty thousand times what a pose costs
+MAX_SECONDS = 0.05  # a proposal: twenty thousand times a pose's cost
 TURNS = 24  # populations after which true costs must have helped
 LOADED = b"loaded"
 # the program of the new process; what the plugin prints goes to standard error
@@ -482,7 +482,7 @@ def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     for seed in SEEDS:
         lowest.append(case.best(space, evaluate, seed, BUDGET))
         if sum(cost < below for cost in lowest) > len(SEEDS) // 2:
-            # the median is below whatever the other seeds give
+            # the median is below, no matter what the other seeds give
             break
     best = float(np.median(lowest))
     expect(

@@ -198,7 +198,7 @@ def training_feasible(case: Case) -> str:
 
 
 def same_bits(case: Case) -> None:
-    """A row has the same bits whatever the other rows are."""
+    """A row has the same bits, independent of the other rows."""
     prior = case.fitted
     latents = case.latents
     whole = prior.inverse_transform(latents)
@@ -207,7 +207,7 @@ def same_bits(case: Case) -> None:
         same = np.array_equal(prior.inverse_transform(latents[rows]), whole[rows])
         expect(
             same,
-            "inverse_transform must give a row the same bits whatever the other rows, "
+            "inverse_transform must give a row the same bits with any other rows, "
             "got others",
         )
         expect(

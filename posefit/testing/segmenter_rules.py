@@ -23,7 +23,7 @@ SIZE = (320, 240)
 # the film shows an empty scene first, then a person who walks through it
 EMPTY = 8
 FRAMES = 40
-# IoU of mask and person: half of what a poor background model reaches
+# IoU of mask and person: half of a poor background model's
 OVERLAP = 0.3
 MAX_SECONDS = 1.0  # for a picture of SIZE
 # blue, green, red
@@ -48,7 +48,7 @@ class PaintedFilm:
         return (image.copy() for image in self.images[start:stop:step])
 
     def picture(self, _path: str) -> Image:
-        """Return the first frame, which shows nobody, whatever the path."""
+        """Return the first frame, which shows nobody, for any path."""
         return self.images[0].copy()
 
 

@@ -107,7 +107,7 @@ def several_views(case: Case) -> None:
 
 
 def same_again(case: Case) -> None:
-    """The same frame gives the same poses and weights, whatever came before."""
+    """The same frame gives the same poses and weights, after any other frames."""
     start = case.build()
     for observation in [images()[1][-1], *images()[1]]:
         guess = start.posterior(observation)

@@ -400,7 +400,7 @@ def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> A
 def few_joints(analysis: Analysis, motion: str) -> Array:
     """Return the share (views, seeds) of the three worst joints in high errors.
 
-    High errors are those of the worst tenth of a run's frames.
+    High errors are the errors of the worst tenth of a run's frames.
     """
     away = analysis.away(motion)
     # the root and 21 inner joints
