@@ -72,8 +72,8 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     turns = motion.skeleton.turns(motion.poses)
     moved = [(0, "translation", motion.translations)]
     moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]
-    samplers = []
-    channels = []
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
     for node, path, values in moved:
         target = {"node": node, "path": path}
         channels.append({"sampler": len(samplers), "target": target})
