@@ -160,8 +160,8 @@ def _centres_of(latents_bytes: bytes, m: int, clusters: int) -> Array:
 def principal(centred: Array, components: float) -> tuple[Array, Array]:
     """Return principal directions (m, 63), and the share of variance of each (m,).
 
-    They are those of centred joint angles (T, 63). Signs are chosen such that the
-    number of largest magnitude in each direction is positive.
+    The joint angles (T, 63) are centred. Signs are chosen such that the number of
+    largest magnitude in each direction is positive.
     """
     if components > centred.shape[1]:
         raise InputError(

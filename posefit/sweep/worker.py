@@ -50,9 +50,8 @@ class _Process(SpawnProcess):
     def _Popen(process: Any) -> Any:  # noqa: N802
         main = sys.modules["__main__"]
         with _starting, _interrupts_blocked():
-            before = {
-                name: getattr(main, name, None) for name in ("__file__", "__spec__")
-            }
+            names = ("__file__", "__spec__")
+            before = {name: getattr(main, name, None) for name in names}
             try:
                 vars(main).update(dict.fromkeys(before))
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
@@ -118,7 +117,7 @@ def _exists(process: int) -> bool:
 
 @contextmanager
 def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards what the body changes in this process.
+    """Undo afterwards the changes that the body makes in this process.
 
     These are the folder, the environment variables, `sys.path`, the signal handlers,
     the global random numbers and NumPy's handling of floating-point errors. A worker
@@ -162,7 +161,7 @@ class _State:
             for number, before, now in zip(
                 _SIGNALS, self._handlers, handlers, strict=True
             ):
-                # None stands for a handler that Python did not install
+                # None means a handler that Python did not install
                 if before is not None and now != before:
                     signal.signal(number, before)
         random.setstate(self._numbers)
@@ -182,9 +181,10 @@ def functions_kept() -> Iterator[None]:
         if name in _functions or not isinstance(module, ModuleType):
             continue
         members = vars(module)
-        functions = {
-            member: value for member, value in members.items() if callable(value)
-        }
+        functions = {}
+        for member, value in members.items():
+            if callable(value):
+                functions[member] = value
         _functions[name] = members, functions
     try:
         yield
