@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage.people import People, person_indices, planes_of
+from posefit.footage.people import People, _distance, person_indices, planes_of
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
@@ -228,6 +228,21 @@ def test_parts_that_take_turns_are_no_time_apart() -> None:
     for k in range(50):
         people.add([sides[int(k % 3 == 2 if k < 32 else k > 32)]])
     assert [len(person) for person in people.persons()] == [2]
+
+
+def test_a_gap_counts_by_its_seconds_and_not_by_its_frames() -> None:
+    before, after = np.zeros((2, *SIZE[::-1]), dtype=bool)
+    before[20:100, 20:50] = after[20:100, 115:145] = True
+    distances = list[float]()
+    for fps in (10, 20):
+        people = People(float(fps))
+        for second in range(5):
+            shown = {0: [before], 4: [after]}.get(second, [])
+            for _ in range(fps):
+                people.add(shown)
+        first, second_part = people.tracklets
+        distances.append(_distance(first, second_part, float(fps)))
+    assert distances[0] == pytest.approx(distances[1], rel=0.02)
 
 
 def test_memory_of_noise_is_given_back() -> None:
