@@ -24,7 +24,17 @@ from typing import Any, NamedTuple
 import click
 import numpy as np
 
-from clips import CHANGES, GROUPS, PAIRS, SIDES, Clip, Views, cell_fields, track_of
+from clips import (
+    CHANGES,
+    EVALUATIONS,
+    GROUPS,
+    PAIRS,
+    SIDES,
+    Clip,
+    Views,
+    cell_fields,
+    track_of,
+)
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.statistics.means import mean_interval
@@ -46,6 +56,7 @@ MODULES = (
     "smoothing",
     "tracker",
 )
+CELL = "cell"  # a change of `cell.FIELD` is one of the cell's fields
 AS_IT_IS = "as it is"
 OFF = 1e9  # of a spread or a cost: so large that what depends on it says nothing
 TINY = 1e-9  # of a share or a cost
@@ -86,6 +97,7 @@ MECHANISMS: Mapping[str, Change] = {
     },
     "half as many states": {"tracker.BEAM_STATES": 200},
     "only the nearest group is searched": {"exemplars.NEAR_GROUPS": 1},
+    "half of the evaluations": {f"{CELL}.evaluations": EVALUATIONS // 2},
 }
 
 
@@ -149,6 +161,8 @@ def changed(change: Change) -> Iterator[None]:
     try:
         for place, value in change.items():
             owner, _, name = place.partition(".")
+            if owner == CELL:
+                continue
             usual = getattr(importlib.import_module(f"{PACKAGE}.{owner}"), name)
             for module in modules:
                 if getattr(module, name, None) is usual:
@@ -175,6 +189,10 @@ def tracked(run: Run, change: Change) -> dict[str, Any]:
     fields = cell_fields(
         clip, situation.views, FRAMES, seed=run.number, **situation.fields
     )
+    for place, value in change.items():
+        owner, _, name = place.partition(".")
+        if owner == CELL:
+            fields[name] = value
     cell = cell_of(fields)
     scene = cell_scene(cell)
     with changed(change):
