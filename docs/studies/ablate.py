@@ -18,7 +18,7 @@ import importlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import click
@@ -33,6 +33,7 @@ from clips import (
     Clip,
     Views,
     cell_fields,
+    learn_library,
     track_of,
 )
 from posefit.arrays import Array
@@ -174,18 +175,12 @@ def changed(change: Change) -> Iterator[None]:
             setattr(module, name, usual)
 
 
-@lru_cache(maxsize=2)
-def _learned(clip: Clip, views: Views) -> None:
-    """Have the library learned, so that no track's CPU time contains it."""
-    cell = cell_of(cell_fields(clip, views, 2))
-    track_of(cell, cell_scene(cell))
-
-
 def tracked(run: Run, change: Change) -> dict[str, Any]:
     """Return the error of a run's track and its CPU time a frame."""
     situation = SITUATIONS[run.situation]
     clip = clip_of(run.number // situation.every)
-    _learned(clip, situation.views)
+    # no track's CPU time contains the learning of its library
+    learn_library(clip, situation.views)
     fields = cell_fields(
         clip, situation.views, FRAMES, seed=run.number, **situation.fields
     )

@@ -257,7 +257,7 @@ class ExemplarTracker:
             if before is None and parts:
                 elsewhere = replace(elsewhere, totals=elsewhere.totals + JUMP_COST)
             parts.insert(0, elsewhere)
-        joined = beams.merged(*parts)
+        joined = beams.joined(*parts)
         return self._placed(frame_costs, joined, before is not None), small_count
 
     def _elsewhere(
