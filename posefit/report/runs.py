@@ -168,8 +168,17 @@ def runs_of(
     data: dict[str, Any] = {}
     # without rows there are no columns
     for name, column in zip(kind.data, columns, strict=False):
-        data[name] = np.array(column) if isinstance(column[0], np.ndarray) else column
-    failures = zip(rows.quarantined, rows.failed_method, strict=True)
+        data[name] = column
+        if isinstance(column[0], np.ndarray):
+            data[name] = np.array(column)
+    warnings = {}
+    for place, k in enumerate(numbers):
+        if rows.warnings[k]:
+            warnings[place] = rows.warnings[k]
+    failures = []
+    for cell, m in zip(rows.quarantined, rows.failed_method, strict=True):
+        if m in chosen:
+            failures.append(_failure(cell, label_of[m]))
     return Runs(
         kind=kind,
         version=ledger.version,
@@ -184,14 +193,8 @@ def runs_of(
         keys=tuple(rows.keys[k] for k in numbers),
         figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
         data=data,
-        warnings={
-            place: rows.warnings[k]
-            for place, k in enumerate(numbers)
-            if rows.warnings[k]
-        },
-        failures=tuple(
-            _failure(cell, label_of[m]) for cell, m in failures if m in chosen
-        ),
+        warnings=warnings,
+        failures=tuple(failures),
     )
 
 
@@ -221,11 +224,10 @@ def _instance_names(kind: Kind, places: Sequence[dict[str, Any]]) -> tuple[str, 
     """Return the distinct names of instances."""
     details = []
     for place in places:
-        unnamed = {
-            name: _text(value).strip('"')
-            for name, value in place.items()
-            if name not in kind.named
-        }
+        unnamed = {}
+        for name, value in place.items():
+            if name not in kind.named:
+                unnamed[name] = _text(value).strip('"')
         details.append(unnamed)
     return distinct([kind.place_name(place) for place in places], details)
 
@@ -314,11 +316,11 @@ def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields that define an instance."""
-    return {
-        name: value
-        for name, value in spec.items()
-        if name not in (*_METHOD_FIELDS, "kind", "seed")
-    }
+    fields = {}
+    for name, value in spec.items():
+        if name not in (*_METHOD_FIELDS, "kind", "seed"):
+            fields[name] = value
+    return fields
 
 
 def distinct(
@@ -344,12 +346,15 @@ def distinct(
     differing = {name: _differing(several) for name, several in by_name.items()}
     longer: dict[str, None] = {}  # an ordered set
     for name, values in zip(names, details, strict=True):
-        words = [
-            f"{short} {values[field]}"
-            for field, short in differing[name].items()
-            if field in values
-        ]
-        plain = unique = printable(f"{name} ({', '.join(words)})" if words else name)
+        words = []
+        for field, short in differing[name].items():
+            if field in values:
+                words.append(f"{short} {values[field]}")
+        text = name
+        if words:
+            text = f"{name} ({', '.join(words)})"
+        plain = printable(text)
+        unique = plain
         number = 1
         while unique in longer:
             number += 1
@@ -369,10 +374,11 @@ def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
         if len({values.get(field) for values in several}) > 1:
             differing.append(field)
     short_names = [field.rpartition(".")[2] for field in differing]
-    return {
-        field: short if short_names.count(short) == 1 else field
-        for field, short in zip(differing, short_names, strict=True)
-    }
+    names = {}
+    for field, short in zip(differing, short_names, strict=True):
+        is_unique = short_names.count(short) == 1
+        names[field] = short if is_unique else field
+    return names
 
 
 def _text(value: Any) -> str:
