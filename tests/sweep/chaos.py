@@ -226,8 +226,12 @@ class Chaos:
         known = dict.fromkeys(process for _, process in starts(self._starts)[-8:])
         parents = {process: _ancestors(process) for process in known}
         if self.engine == "dask":
-            running = [process for process in known if parents[process]]
-            return [*running, *(parents[process][0] for process in running)]
+            running = []
+            for process in known:
+                # the parent of a process that has ended is 0 here, of an orphan 1
+                if parents[process] and parents[process][0] > 1:
+                    running += [process, parents[process][0]]
+            return running
         return [process for process in known if self._driver.pid in parents[process]]
 
 
