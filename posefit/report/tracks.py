@@ -21,6 +21,7 @@ from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
 from posefit.report.repeat import command_head
 from posefit.statistics.means import block_means
+from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
 
 LOSS = "error_with_losses_degrees"
@@ -380,17 +381,6 @@ def _skills(
         if error is not None and baseline is not None:
             skills[f"skill.{name}"] = skill(error, baseline)
     return skills
-
-
-def views(place: Place) -> list[str]:
-    """Return the directions of an instance's cameras in degrees."""
-    return [f"{view:g}" for view in place["view_degrees"]]
-
-
-def damage(place: Place) -> list[str]:
-    """Return the kinds of damage of an instance with their strengths."""
-    kinds = sorted(place["corruption"].items())
-    return [f"{kind} {strength:g}" for kind, strength in kinds]
 
 
 def _exact(number: int) -> int | str:

@@ -73,18 +73,15 @@ def write_report(
         if latex is not None and "leaderboard" not in data:
             raise InputError("--latex must be of runs with errors, got none")
         if out is not None:
-            with replaced_file(out, MARK.encode()) as building:
-                building.write_text(document(data), encoding="utf-8", newline="\n")
+            _write(out, MARK, document(data))
         if figures is not None:
             write_figures(runs, figures)
         if csv is not None:
             with replaced_file(csv, CSV_MARK.encode()) as building:
-                building.unlink()
                 write_csv(_csv_rows(ledger, runs.kind), building)
         if latex is not None:
-            with replaced_file(latex, LATEX_MARK.encode()) as building:
-                text = latex_table(runs.kind.score, data["leaderboard"])
-                building.write_text(text, encoding="utf-8", newline="\n")
+            text = latex_table(runs.kind.score, data["leaderboard"])
+            _write(latex, LATEX_MARK, text)
     return {
         "out": out,
         "kind": runs.kind.name,
@@ -114,6 +111,12 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     if report["out"] is not None:
         lines.append(f"written to {report['out']}: open it in any browser")
     return lines
+
+
+def _write(path: str, mark: str, text: str) -> None:
+    """Write a text as a new file, or in place of an earlier one with this mark."""
+    with replaced_file(path, mark.encode()) as building:
+        building.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
