@@ -23,7 +23,7 @@ def plugins(context: click.Context, as_json: bool) -> None:
 
     with results_alone():
         offers = registry().offers
-    descriptions = []
+    descriptions: list[dict[str, Any]] = []
     for kind in KINDS:
         descriptions += map(described, offers[kind].values())
     print_result(listing(registry()), descriptions, as_json)

@@ -73,7 +73,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
         raise InputError(
             f"train must not contain the motion itself, got {values['motion']}"
         )
-    files = {}
+    files: dict[str, str] = {}
     for motion in (values["motion"], *train):
         files.update(_files(motion))
     version = version_of(offer.origin for offer in offers)
