@@ -101,18 +101,13 @@ class Context(SpawnContext):
         A process that a cell started belongs to its worker's process group.
         """
         for process in self._started.copy():
-            if process.pid is not None and not _exists(process.pid):
-                self._started.remove(process)
-                with suppress(OSError, AttributeError):
-                    os.killpg(process.pid, signal.SIGKILL)
-
-
-def _exists(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
+            # a process that was not started has neither a number nor a status
+            if process.pid is None or process.exitcode is None:
+                continue
+            self._started.remove(process)
+            # Windows has no process groups
+            with suppress(OSError, AttributeError):
+                os.killpg(process.pid, signal.SIGKILL)
 
 
 @contextmanager
