@@ -94,7 +94,6 @@ MECHANISMS: Mapping[str, Change] = {
     },
     "a known root says nothing of clips": {"cost_model.KNOWN_ROOT_SPREAD": OFF},
     "no search everywhere after the first frame": {"path.SEARCHES_PER_SECOND": TINY},
-    "fast turns cost nothing": {"cost_model.FAST_TURN_COST": 0.0},
     "no jumps": {"cost_model.JUMP_COST": 1e4},
     "near hypotheses are not one": {"proposals.SAME_DISTANCE": 1e-4},
     "the beam has all evaluations but a fit": {"tracker.FIT_SHARE": 0.3},

@@ -190,39 +190,56 @@ class ClipSteps:
             for code, cost in speeds
         ]
         costs: Array = np.minimum.reduce(squares)  # TOYAMA2001 (dynamics)
-        yaw_differences = wrapped(after.yaws - self.yaws[:, None])  # (n, m)
-        costs = costs + 0.5 * (yaw_differences / step.turn) ** 2
+        # Most steps cost more than a jump by their poses alone, and need no more. Flat
+        # indices of the others take a tenth of the time of a mask.
+        near = np.flatnonzero(costs < JUMP_COST)
+        rows, columns = np.divmod(near, len(after))
+        turns = wrapped(after.yaws[columns] - self.yaws[rows])
+        cheap = costs.take(near) + 0.5 * (turns / step.turn) ** 2
         if self.root is None:
-            costs += root_deviation_costs(after.places, self.places[:, None], camera)
-        costs = np.minimum(costs, JUMP_COST)
+            missed = after.places.take(columns, 0) - self.places.take(rows, 0)
+            sights = lines_of_sight(after.places, camera)
+            if sights is not None:
+                sights = sights.take(columns, 0)
+            cheap += root_deviation_costs(missed, sights)
+        costs = np.full(costs.shape, JUMP_COST)
+        costs.ravel()[near] = np.minimum(cheap, JUMP_COST)
         if step.max_turn < np.pi:
-            turns = np.abs(wrapped(after.yaws - self.beam.yaws[:, None]))
-            costs += FAST_TURN_COST * np.maximum(turns - step.max_turn, 0.0)
+            turned = np.abs(wrapped(after.yaws - self.beam.yaws[:, None]))
+            costs += FAST_TURN_COST * np.maximum(turned - step.max_turn, 0.0)
         return costs
 
 
-def root_deviation_costs(places: Array, expected: Array, camera: Array | None) -> Array:
-    """Return the costs of aligned roots at `places` that were expected elsewhere.
+def lines_of_sight(places: Array, camera: Array | None) -> Array | None:
+    """Return the directions (n, 3) from the only camera to places (n, 3).
+
+    None without a `camera` (3,), if several show the person.
+    """
+    if camera is None:
+        return None
+    sights = places - camera
+    lengths = np.linalg.norm(sights, axis=1, keepdims=True)
+    return np.asarray(sights / np.maximum(lengths, np.finfo(np.float64).tiny))
+
+
+def root_deviation_costs(missed: Array, sights: Array | None) -> Array:
+    """Return the costs of aligned roots that were expected elsewhere.
 
     Args:
-        places: (n, 3) metres, the aligned roots.
-        expected: (..., n, 3) metres, where the roots were expected.
-        camera: (3,) metres, the position of the only camera, or None if there are
-            several. Differences along its line of sight cost less, because one
-            silhouette says little about how far away a body is.
+        missed: (..., n, 3) metres, from where the roots were expected to where they
+            are.
+        sights: (n, 3) the `lines_of_sight`. Differences along the line of sight of a
+            single camera cost less, because one silhouette says little about how far
+            away a body is.
 
     Returns:
         The costs (..., n).
 
     """
     # axis by axis, because NumPy's sums over an axis of length 3 take far longer
-    x, y, z = (places[..., axis] - expected[..., axis] for axis in range(3))
+    x, y, z = (missed[..., axis] for axis in range(3))
     along: Array | float = 0.0
-    if camera is not None:
-        sights = places - camera
-        sights /= np.maximum(
-            np.linalg.norm(sights, axis=1, keepdims=True), np.finfo(np.float64).tiny
-        )
+    if sights is not None:
         along = (x * sights[:, 0] + y * sights[:, 1] + z * sights[:, 2]) ** 2
     across = x**2 + y**2 + z**2 - along
     return np.asarray(
@@ -302,9 +319,8 @@ class HypothesisCosts:
         costs = part_step_costs(self._spread, max_part_cost(noise), before, after)
         if frame_costs.root is None:
             expected = before.places + before.shifts
-            costs += root_deviation_costs(
-                after.places, expected[:, None], frame_costs.camera_position
-            )
+            sights = lines_of_sight(after.places, frame_costs.camera_position)
+            costs += root_deviation_costs(after.places - expected[:, None], sights)
         return costs
 
 

@@ -23,6 +23,7 @@ from posefit_exemplars.cost_model import (
     RECORDED_SPEED,
     YAW_TOLERANCE,
     ClipSteps,
+    lines_of_sight,
     root_deviation_costs,
     squared_distances,
 )
@@ -160,9 +161,8 @@ class StateProposals:
         expected = beam.places
         beam = self._placed(frame_costs, beam)
         if self._task.translation != "known":
-            costs = root_deviation_costs(
-                beam.places, expected, frame_costs.camera_position
-            )
+            sights = lines_of_sight(beam.places, frame_costs.camera_position)
+            costs = root_deviation_costs(beam.places - expected, sights)
             beam = replace(beam, totals=beam.totals + costs)
         return beam, used
 

@@ -12,6 +12,7 @@ from posefit_exemplars.cost_model import (
     JUMP_COST,
     ClipSteps,
     Step,
+    lines_of_sight,
     root_deviation_costs,
     squared_distances,
 )
@@ -162,9 +163,10 @@ def test_a_root_strays_more_easily_along_the_line_of_sight() -> None:
     across = np.array([[0.01, 0.0, 5.0]])
     # a standard deviation either way costs log(1 + 1 / 2); without a line of sight the first is 3 of them
     expected = np.stack([along, across, place])
-    costs = root_deviation_costs(place, expected, camera)[:, 0]
+    sights = lines_of_sight(place, camera)
+    costs = root_deviation_costs(place - expected, sights)[:, 0]
     np.testing.assert_allclose(costs, [np.log(1.5), np.log(1.5), 0.0], rtol=1e-6)
-    assert root_deviation_costs(place, along, None)[0] == pytest.approx(
+    assert root_deviation_costs(place - along, None)[0] == pytest.approx(
         np.log(1.0 + 4.5)
     )
 
