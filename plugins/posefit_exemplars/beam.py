@@ -89,29 +89,26 @@ class Beam:
 def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, count: int) -> Rows:
     """Return the `count` states of least `totals` (n,), with few similar ones.
 
-    Only the best few of the states with similar poses and yaws are kept: the right
-    alternative often costs more for a while, until later silhouettes confirm it.
+    Of states with equal poses and yaw bins only the cheapest is kept. Of the states
+    with similar poses and yaws only the best few are kept: the right alternative often
+    costs more for a while, until later silhouettes confirm it.
     """
-    kinds = exemplars.coarse_groups[beam.states] * YAW_BINS + yaw_bins(beam.yaws)
-    order = np.lexsort((totals, kinds))
-    starts = np.flatnonzero(np.diff(kinds[order], prepend=-1))
-    sizes = np.diff(np.append(starts, len(order)))
-    # the rank of each state among the states of its kind
-    ranks = np.arange(len(order)) - np.repeat(starts, sizes)
-    retained = order[ranks < max(count // BEAM_SHARES, 1)]
-    return retained[np.argsort(totals[retained], kind="stable")[:count]]
+    bins = yaw_bins(beam.yaws)
+    order = np.argsort(totals, kind="stable")
+    keys = beam.states * YAW_BINS + bins
+    kinds = exemplars.coarse_groups[beam.states] * YAW_BINS + bins
+    share = max(count // BEAM_SHARES, 1)
+    rows: Rows = kernels.first_distinct(order, keys, kinds, share, count)
+    return rows
 
 
-def merged(*beams: Beam) -> Beam:
-    """Return the states of all beams, of equal poses and yaw bins only the cheapest."""
+def joined(*beams: Beam) -> Beam:
+    """Return the states of all beams."""
     arrays = zip(
         *((beam.states, beam.yaws, beam.totals, beam.places) for beam in beams),
         strict=True,
     )
-    joined = Beam(*map(np.concatenate, arrays))
-    keys = joined.states * YAW_BINS + yaw_bins(joined.yaws)
-    order = np.lexsort((joined.totals, keys))
-    return joined.rows(order[np.diff(keys[order], prepend=-1) != 0])
+    return Beam(*map(np.concatenate, arrays))
 
 
 def yaw_bins(yaws: Array) -> Rows:
@@ -180,40 +177,40 @@ def next_states(
     faster than all clips.
     """
     continued = Continuations.of(exemplars, beam, step, root)
-    groups = exemplars.near_groups(continued.codes[RECORDED_SPEED])
-    limit = beam.totals.min() + JUMP_COST + MAX_EXCESS_COST
-    scale = 1.0 / (2.0 * step.pose**2)
-    costs = continued.displacement_costs
-    bins = yaw_bins(continued.yaws)
+    sources = kernels.Sources(
+        beam.totals,
+        continued.codes,
+        continued.displacement_costs,
+        exemplars.near_groups(continued.codes[RECORDED_SPEED]),
+    )
+    least = beam.totals.min()
+    share = max(count // YAW_SHARES, 1)
+    bounds = kernels.Bounds(
+        1.0 / (2.0 * step.pose**2), least, least + JUMP_COST + MAX_EXCESS_COST, share
+    )
     places = len(exemplars.tiles.states)
-    room = np.full(places, np.inf), np.empty(places, int), np.empty(places, int)
+    room = kernels.Room(
+        np.full(places, np.inf),
+        np.empty(places, np.int64),
+        np.empty(places, np.int64),
+    )
+    bins = yaw_bins(continued.yaws)
+    cheapest_first = np.argsort(beam.totals, kind="stable")
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
-        rows = np.flatnonzero(bins == number)
+        rows = cheapest_first[bins[cheapest_first] == number]
         states, parents, totals = kernels.cheapest_steps(
-            continued.codes,
-            costs,
-            beam.totals,
-            rows,
-            groups,
-            exemplars.tiles,
-            room,
-            scale,
-            limit,
+            sources, rows, exemplars.tiles, room, bounds
         )
-        if len(states) > count // YAW_SHARES:
-            best = np.argpartition(totals, count // YAW_SHARES)[: count // YAW_SHARES]
-            states = states[best]
-            parents = parents[best]
-            totals = totals[best]
-        by_bin.append((states, parents, totals))
+        best = np.argsort(totals, kind="stable")[:share]
+        by_bin.append((states[best], parents[best], totals[best]))
     states, parents, totals = (
         np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True)
     )
     turns = np.repeat([0.0, -CANDIDATE_TURN, CANDIDATE_TURN], len(states) // 3)
     totals = totals + 0.5 * (turns / step.turn) ** 2
-    candidates = merged(
-        Beam(states, continued.yaws[parents] + turns, totals, continued.places[parents])
+    candidates = Beam(
+        states, continued.yaws[parents] + turns, totals, continued.places[parents]
     )
     return candidates.rows(
         diverse_best(exemplars, candidates, candidates.totals, count)

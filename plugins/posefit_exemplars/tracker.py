@@ -257,7 +257,7 @@ class ExemplarTracker:
             if before is None and parts:
                 elsewhere = replace(elsewhere, totals=elsewhere.totals + JUMP_COST)
             parts.insert(0, elsewhere)
-        joined = beams.merged(*parts)
+        joined = beams.joined(*parts)
         return self._placed(frame_costs, joined, before is not None), small_count
 
     def _elsewhere(
@@ -293,19 +293,24 @@ class ExemplarTracker:
             yaws = middle + rng.uniform(-reach, reach, tried)
         beam = self._placed(frame_costs, self._started(states, yaws, before), False)
         costs = frame_costs.small(self._poses(beam), beam.places)
-        # more groups than there is room for, because some have few poses
-        best = np.argsort(costs, kind="stable")[: 4 * group_count]
+        room = count - tried
         members = self.exemplars.members
         starts = self.exemplars.starts
+        best = list[int]()
         poses = list[Rows]()
-        for group in self.exemplars.groups[states[best]]:
+        found = 0
+        for row in np.argsort(costs, kind="stable"):
+            group = self.exemplars.groups[states[row]]
             rows = members[starts[group] : starts[group + 1]]
             if len(rows) > GROUP_POSES:
                 rows = rng.choice(rows, GROUP_POSES, replace=False)
-            poses.append(rows)
+            poses.append(rows[: room - found])
+            found += len(poses[-1])
+            best.append(row)
+            if found == room:
+                break
         yaws = np.repeat(yaws[best], [len(rows) for rows in poses])
-        room = slice(count - tried)
-        return self._started(np.concatenate(poses)[room], yaws[room], before), len(beam)
+        return self._started(np.concatenate(poses), yaws, before), len(beam)
 
     def _first_states(self, angles: Array, count: int) -> Beam:
         """Return at most `count` states nearest to a first pose with angles (63,)."""

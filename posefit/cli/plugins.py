@@ -23,11 +23,10 @@ def plugins(context: click.Context, as_json: bool) -> None:
 
     with results_alone():
         offers = registry().offers
-    print_result(
-        listing(registry()),
-        [described(offer) for kind in KINDS for offer in offers[kind].values()],
-        as_json,
-    )
+    descriptions = []
+    for kind in KINDS:
+        descriptions += map(described, offers[kind].values())
+    print_result(listing(registry()), descriptions, as_json)
 
 
 @plugins.command()
@@ -127,15 +126,15 @@ def check(
         from posefit.testing.process import check_in_process
 
         report = check_in_process(kind, name, settings, only)
-    results = [
-        {
+    results = []
+    for result in report.results:
+        row = {
             "check": result.name,
             "outcome": result.outcome,
             "detail": result.detail,
             "traceback": result.traceback,
         }
-        for result in report.results
-    ]
+        results.append(row)
     value = {"plugin": report.plugin, "summary": report.summary, "results": results}
     print_result(str(report).split("\n"), value, as_json)
     context.exit(0 if report else 1)

@@ -131,8 +131,12 @@ def _names(texts: tuple[str, ...]) -> list[str]:
 
     Commas separate them, except in brackets.
     """
-    parts = [part for text in texts for part in re.split(r",(?![^(]*\))", text)]
-    return [part.strip() for part in parts if part.strip()]
+    names = []
+    for text in texts:
+        for part in re.split(r",(?![^(]*\))", text):
+            if part.strip():
+                names.append(part.strip())
+    return names
 
 
 @click.command()

@@ -91,14 +91,13 @@ def write_plugin(
 
 def _taken(kind: Registrable, commands: Sequence[str]) -> dict[str, str]:
     """Return the names that are taken, each with its distribution."""
+    taken: dict[str, str] = {}
     if kind != COMMAND:
-        return {
-            offer.name: offer.distribution for offer in registry().offers[kind].values()
-        }
-    plugins = plugins_of((COMMAND,), tuple(commands))
-    others = {
-        str(command.name): plugin.distribution
-        for plugin in plugins
-        for command in plugin.commands
-    }
-    return dict.fromkeys(commands, PROJECT) | others
+        for offer in registry().offers[kind].values():
+            taken[offer.name] = offer.distribution
+        return taken
+    taken = dict.fromkeys(commands, PROJECT)
+    for plugin in plugins_of((COMMAND,), tuple(commands)):
+        for command in plugin.commands:
+            taken[str(command.name)] = plugin.distribution
+    return taken

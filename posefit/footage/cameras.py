@@ -395,8 +395,8 @@ def world_of(
         if calibration.scale == "metres":
             if unit not in (None, "m"):
                 raise InputError(
-                    f"unit must be left out for {quoted(calibration.name)}, whose file "
-                    f"states it, got {quoted(unit)}"
+                    f"unit must be left out for {quoted(calibration.name)}, whose unit "
+                    f"is known, got {quoted(unit)}"
                 )
         elif calibration.translation is not None:
             distances.append(float(np.linalg.norm(calibration.translation)))

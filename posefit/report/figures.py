@@ -191,15 +191,16 @@ def write_figures(runs: Runs, path: str | Path) -> None:
         raise InputError("figures must be of runs with errors, got none")
     board = leaderboard(contest)
     names = [runs.methods[m] for m in contest.methods]
-    order = [
-        contest.methods.index(row["method"]) for row in board if row["taking_part"]
-    ]
+    order = []
+    for row in board:
+        if row["taking_part"]:
+            order.append(contest.methods.index(row["method"]))
     score = runs.kind.score
-    baselines = [
-        (runs.kind.baselines[row["baseline"]], row[score.name])
-        for row in runs.kind.baseline_rows(contest)
-        if row[score.name] is not None
-    ]
+    baselines = []
+    for row in runs.kind.baseline_rows(contest):
+        if row[score.name] is not None:
+            title = runs.kind.baselines[row["baseline"]]
+            baselines.append((title, row[score.name]))
     figures = {"leaderboard": board_figure(score, board, baselines)}
     for chart in track_charts(contest):
         figures[chart.name] = chart_figure(names, chart, contest.methods, order)

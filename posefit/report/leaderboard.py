@@ -35,7 +35,7 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     1. Methods that are not shown to be worse than the method of the best score, with p
        of the paired test not below 0.05. They are sorted by the number of lost tracks,
        because no difference of their errors is shown. So no method that loses tracks is
-       ahead of one that is as good and loses none.
+       ahead of an equally good method that loses none.
     2. The other methods that take part, by their score.
     3. Methods that do not take part, with the averages of all their own runs.
 
@@ -100,9 +100,9 @@ def _effects(contest: Contest, first: int) -> dict[int, dict[str, float | None]]
     They are None for a method without a test.
     """
     place = contest.methods.index(first)
-    effects: dict[int, dict[str, float | None]] = {
-        m: dict.fromkeys(EFFECT) for m in range(len(contest.runs.methods))
-    }
+    effects: dict[int, dict[str, float | None]] = {}
+    for m in range(len(contest.runs.methods)):
+        effects[m] = dict.fromkeys(EFFECT)
     for pair in contest.comparisons:
         if place not in (pair.first, pair.second):
             continue

@@ -109,9 +109,9 @@ class _Rows:
         spec = row["spec"]
         place = self.places.number(_place(spec))
         method = self.methods.number(_variant(spec))
-        first_fields = {
-            name: value for name, value in spec.items() if name not in LAST_FIELDS
-        }
+        first_fields = dict(spec)
+        for name in LAST_FIELDS:
+            first_fields.pop(name, None)
         head = self.heads.number(first_fields)
         self.numbers.append((place, method, head))
         self.seeds.append(int(spec["seed"]))
@@ -147,9 +147,9 @@ def runs_of(
     kind = rows.kind
     # methods that only failed have the numbers from here on
     count = len(rows.methods.values)
-    failed_method = [
-        rows.methods.number(_variant(cell["spec"])) for cell in quarantined
-    ]
+    failed_method = []
+    for cell in quarantined:
+        failed_method.append(rows.methods.number(_variant(cell["spec"])))
     variants = rows.methods.values
     numbers = np.array(rows.numbers, dtype=int).reshape(-1, 3)
     figures = np.array([values for values, _ in rows.measured], dtype=float)
@@ -174,12 +174,14 @@ def runs_of(
     place_of_method = {m: k for k, m in enumerate(finished)}
 
     # the rows and the quarantined cells of these methods
-    retained = [k for k, row in enumerate(rows.numbers) if row[1] in place_of_method]
-    cells = [
-        (cell, label_of[m])
-        for cell, m in zip(quarantined, failed_method, strict=True)
-        if m in best_first
-    ]
+    retained = []
+    for k, (_, method, _) in enumerate(rows.numbers):
+        if method in place_of_method:
+            retained.append(k)
+    cells = []
+    for cell, m in zip(quarantined, failed_method, strict=True):
+        if m in best_first:
+            cells.append((cell, label_of[m]))
     failed = Counter(name for _, name in cells)
 
     # their instances, in order, with the details that may distinguish equal names
@@ -191,17 +193,18 @@ def runs_of(
     places = [values[i] for i in place_order]
     details = []
     for place in places:
-        unnamed = {
-            name: _text(value).strip('"')
-            for name, value in place.items()
-            if name not in kind.named
-        }
+        unnamed = {}
+        for name, value in place.items():
+            if name not in kind.named:
+                unnamed[name] = _text(value).strip('"')
         details.append(unnamed)
 
-    commands = {
-        head: command_head(rows.heads.values[head])
-        for head in {rows.numbers[k][2] for k in retained}
-    }
+    # rows that differ only in instance and seed share the beginning of their command
+    commands: dict[int, str] = {}
+    for k in retained:
+        head = rows.numbers[k][2]
+        if head not in commands:
+            commands[head] = command_head(rows.heads.values[head])
     heads = sorted(set(commands.values()))
     place_of_command = {command: k for k, command in enumerate(heads)}
     place_of_instance = {i: k for k, i in enumerate(place_order)}
@@ -229,7 +232,14 @@ def runs_of(
     data: dict[str, Any] = {}
     # without rows there are no columns
     for name, column in zip(kind.data, columns, strict=False):
-        data[name] = np.array(column) if isinstance(column[0], np.ndarray) else column
+        if isinstance(column[0], np.ndarray):
+            data[name] = np.array(column)
+        else:
+            data[name] = column
+    warnings = {}
+    for k, row in enumerate(order):
+        if rows.warnings[row]:
+            warnings[k] = tuple(map(printable, rows.warnings[row]))
     return Runs(
         kind=kind,
         version=ledger.version,
@@ -245,11 +255,7 @@ def runs_of(
         keys=tuple(rows.keys[k] for k in order),
         figures=dict(zip(kind.columns, figures[order].T, strict=True)),
         data=data,
-        warnings={
-            k: tuple(map(printable, rows.warnings[row]))
-            for k, row in enumerate(order)
-            if rows.warnings[row]
-        },
+        warnings=warnings,
         failures=tuple(_failure(cell, name) for cell, name in cells),
         failed=tuple(failed[label_of[m]] for m in finished),
         unfinished=tuple(label_of[m] for m in best_first if m >= count),
@@ -282,9 +288,10 @@ def _named(
 
     Raises InputError if no method has one of the names.
     """
-    names_of = {
-        m: {label_of[m], variants[m]["name"] or variants[m]["method"]} for m in numbers
-    }
+    names_of = {}
+    for m in numbers:
+        name = variants[m]["name"] or variants[m]["method"]
+        names_of[m] = {label_of[m], name}
     known = set().union(*names_of.values())
     for name in names:
         if name not in known:
@@ -335,11 +342,11 @@ def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields that define an instance."""
-    return {
-        name: value
-        for name, value in spec.items()
-        if name not in (*_METHOD_FIELDS, "kind", "seed")
-    }
+    fields = {}
+    for name, value in spec.items():
+        if name not in (*_METHOD_FIELDS, "kind", "seed"):
+            fields[name] = value
+    return fields
 
 
 def distinct(
@@ -365,12 +372,15 @@ def distinct(
     differing = {name: _differing(several) for name, several in by_name.items()}
     longer: dict[str, None] = {}  # an ordered set
     for name, values in zip(names, details, strict=True):
-        words = [
-            f"{short} {values[field]}"
-            for field, short in differing[name].items()
-            if field in values
-        ]
-        plain = unique = printable(f"{name} ({', '.join(words)})" if words else name)
+        words = []
+        for field, short in differing[name].items():
+            if field in values:
+                words.append(f"{short} {values[field]}")
+        text = name
+        if words:
+            text = f"{name} ({', '.join(words)})"
+        plain = printable(text)
+        unique = plain
         number = 1
         while unique in longer:
             number += 1
@@ -390,10 +400,11 @@ def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
         if len({values.get(field) for values in several}) > 1:
             differing.append(field)
     short_names = [field.rpartition(".")[2] for field in differing]
-    return {
-        field: short if short_names.count(short) == 1 else field
-        for field, short in zip(differing, short_names, strict=True)
-    }
+    names = {}
+    for field, short in zip(differing, short_names, strict=True):
+        is_unique = short_names.count(short) == 1
+        names[field] = short if is_unique else field
+    return names
 
 
 def _text(value: Any) -> str:

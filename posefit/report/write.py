@@ -104,7 +104,9 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     Returns:
         The lines.
     """
-    lines = [*report["answer"]] if "leaderboard" in report else []
+    lines = []
+    if "leaderboard" in report:
+        lines += report["answer"]
     for text, details in report["header"]["problems"]:
         lines += [text, *(f"  {detail}" for detail in details)]
     if "leaderboard" in report:

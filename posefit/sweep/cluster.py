@@ -87,7 +87,9 @@ class Cluster:
         wanted = posefit_build()
         for worker, found in self._client.run(eval, _BUILD, on_error="return").items():
             if found != wanted:
-                came = found if isinstance(found, str) else f"none ({text_of(found)})"
+                came = found
+                if not isinstance(found, str):
+                    came = f"none ({text_of(found)})"
                 raise InputError(f"the worker {worker} must have {wanted}, got {came}")
         try:
             self._client.run_on_scheduler(eval, _BUILD)
@@ -130,9 +132,12 @@ class Cluster:
                 futures = tuple(self._running)
                 wait: Any = self._distributed.wait
                 wait(futures, seconds, "FIRST_COMPLETED")
-        return [
-            self._outcome(future) for future in tuple(self._running) if future.done()
-        ]
+        outcomes = []
+        # a copy, because `_outcome` removes the job from `_running`
+        for future in tuple(self._running):
+            if future.done():
+                outcomes.append(self._outcome(future))
+        return outcomes
 
     def close(self) -> None:
         """Leave the scheduler."""

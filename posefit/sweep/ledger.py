@@ -122,9 +122,11 @@ class Ledger:
 
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
-        self.files = list(
-            dict.fromkeys(file for path in paths for file in _files(Path(path)))
-        )
+        # each file once, even if it is named twice
+        files: dict[Path, None] = {}
+        for path in paths:
+            files.update(dict.fromkeys(_files(Path(path))))
+        self.files = list(files)
         self._open: list[tuple[Path, sqlite3.Connection]] = []
         # by key of each done or quarantined cell: its file, and whether it is done
         self._places: dict[str, tuple[int, bool]] = {}

@@ -86,14 +86,16 @@ class Pool:
         """Return the outcomes of the jobs that ended."""
         done = wait(self._running, seconds, FIRST_COMPLETED).done
         self._context.end_orphans()
-        outcomes = [
-            self._outcome(future) for future in tuple(self._running) if future in done
-        ]
+        outcomes = []
+        # a copy, because `_outcome` removes the job from `_running`
+        for future in tuple(self._running):
+            if future in done:
+                outcomes.append(self._outcome(future))
         latest_start = time.monotonic() - self._start_seconds
-        stuck = any(
-            start < latest_start and not future.running()
-            for future, (_, start) in self._running.items()
-        )
+        stuck = False
+        for future, (_, start) in self._running.items():
+            if start < latest_start and not future.running():
+                stuck = True
         # A worker that dies while it takes a job from the common queue blocks the
         # others. Only a new pool helps.
         if stuck or not self._pool.active:

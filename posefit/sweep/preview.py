@@ -107,10 +107,9 @@ def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
         is_varied = len(values) > 1 and name not in ("version", "files")
         if name not in ("method", "motion") and not is_varied:
             continue
-        shown = [
-            f"{count:,} x {cut(value)}"
-            for value, count in islice(values.items(), VALUES)
-        ]
+        shown = []
+        for value, count in islice(values.items(), VALUES):
+            shown.append(f"{count:,} x {cut(value)}")
         if len(values) > VALUES:
             shown.append(f"and {len(values) - VALUES:,} other values")
         lines.append(f"{name:16}  {', '.join(shown)}")

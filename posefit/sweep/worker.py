@@ -50,9 +50,8 @@ class _Process(SpawnProcess):
     def _Popen(process: Any) -> Any:  # noqa: N802
         main = sys.modules["__main__"]
         with _starting, _interrupts_blocked():
-            before = {
-                name: getattr(main, name, None) for name in ("__file__", "__spec__")
-            }
+            names = ("__file__", "__spec__")
+            before = {name: getattr(main, name, None) for name in names}
             try:
                 vars(main).update(dict.fromkeys(before))
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
@@ -102,23 +101,18 @@ class Context(SpawnContext):
         A process that a cell started belongs to its worker's process group.
         """
         for process in self._started.copy():
-            if process.pid is not None and not _exists(process.pid):
-                self._started.remove(process)
-                with suppress(OSError, AttributeError):
-                    os.killpg(process.pid, signal.SIGKILL)
-
-
-def _exists(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
+            # a process that was not started has neither a number nor a status
+            if process.pid is None or process.exitcode is None:
+                continue
+            self._started.remove(process)
+            # Windows has no process groups
+            with suppress(OSError, AttributeError):
+                os.killpg(process.pid, signal.SIGKILL)
 
 
 @contextmanager
 def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards what the body changes in this process.
+    """Undo afterwards the changes that the body makes in this process.
 
     These are the folder, the environment variables, `sys.path`, the signal handlers,
     the global random numbers and NumPy's handling of floating-point errors. A worker
@@ -162,7 +156,7 @@ class _State:
             for number, before, now in zip(
                 _SIGNALS, self._handlers, handlers, strict=True
             ):
-                # None stands for a handler that Python did not install
+                # None means a handler that Python did not install
                 if before is not None and now != before:
                     signal.signal(number, before)
         random.setstate(self._numbers)
@@ -182,9 +176,10 @@ def functions_kept() -> Iterator[None]:
         if name in _functions or not isinstance(module, ModuleType):
             continue
         members = vars(module)
-        functions = {
-            member: value for member, value in members.items() if callable(value)
-        }
+        functions = {}
+        for member, value in members.items():
+            if callable(value):
+                functions[member] = value
         _functions[name] = members, functions
     try:
         yield

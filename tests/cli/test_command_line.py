@@ -183,11 +183,9 @@ def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(
     assert run("track", path, "--out", out, *words).exit_code == 0
     summary = json.loads((out / "summary.json").read_text())
     unit, axis = summary["warnings"]
-    assert unit.startswith(f"{path}: lengths are taken for centimetres")
-    assert (
-        axis
-        == f"{path}: z is taken to be up, as the person stands along it; --up sets it"
-    )
+    assert unit.startswith(f"{path}: lengths are taken as centimetres")
+    reason = "because the person stands along it"
+    assert axis == f"{path}: z is taken to be up, {reason}; --up sets it"
     for name in ("frames.csv", "angles.csv"):
         rows = csv_rows(out / name)
         assert [int(float(row["frame"])) for row in rows] == [5, 6, 7]
@@ -214,7 +212,7 @@ def test_an_amc_is_tracked_with_the_asf_beside_it_at_cmus_rate_or_one_that_is_gi
     assert "120 frames a second are assumed" in assumed["warnings"][0]
     assert given["warnings"] == []
     clip[0].unlink()
-    assert "expected --asf or exactly one .asf file beside it, got 0" in error_of(
+    assert "expected --asf or exactly one .asf file in its folder, got 0" in error_of(
         "track", clip[1]
     )
 
@@ -459,6 +457,8 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
             == f"posefit: No such command {name!r}; did you mean {path!r}?"
         )
     assert error_of("zebra") == "posefit: No such command 'zebra'"
+    # near the name of a command of another group, which does something else
+    assert error_of("suite", "extrat") == "posefit: No such command 'extrat'"
 
 
 def test_check_reports_every_rule_and_how_many_ran() -> None:

@@ -7,7 +7,7 @@ const logSteps = (low, high) =>
     .map((k) => [1, 2, 5][k % 3] * 10 ** (Math.floor(k / 3) - 4))
     .filter((value) => value >= low && value <= high);
 
-// Those of rising values that lie at least a gap apart, from the first place on.
+// The rising values that lie at least a gap apart, from the first on.
 function spaced(values, of, gap, first = -Infinity) {
   let free = first;
   return values.filter((value) => {
@@ -118,7 +118,7 @@ function drawnLine({ at, up }, { m, x, y, low, high }, order, last) {
   );
 }
 
-// A horizontal interval; an arrow says that it goes on beyond an end of the axis.
+// A horizontal interval; an arrow means that it continues beyond an end of the axis.
 function interval({ at, left, right }, y, low, high, about) {
   const [from, to] = [at(low), at(high)];
   const ends = [between(left, right, from), between(left, right, to)];

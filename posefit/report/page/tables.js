@@ -115,7 +115,7 @@ function leaderboard() {
   table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
 }
 
-// The command that runs a row again, and a button for one that needs no ledger.
+// The command that runs a row again, and a button for a command that needs no ledger.
 const rerun = (key) => make("code", {}, `posefit rerun ${D.ledger} ${key}`);
 function repeatButton(k) {
   const R = D.rows;
