@@ -61,9 +61,7 @@ def opencv_name(path: str | Path) -> str:
     try:
         name.encode()
     except UnicodeEncodeError:
-        raise InputError(
-            f"{path}: expected a name in UTF-8, got one that is not"
-        ) from None
+        raise InputError(f"{path}: expected a name in UTF-8, got other bytes") from None
     return name
 
 

@@ -75,7 +75,7 @@ def main(debug: bool) -> None:
 
     \b
     posefit track walk --out walk           a first track: open walk/track.html
-    posefit track video.mp4 --out walker    a person before a still background
+    posefit track video.mp4 --out walker    a person against a still background
     posefit sweep default --out results     compare eight methods
     """  # noqa: D301
 

@@ -60,6 +60,7 @@ def sources_from(
     for name in built_in.names():
         if name.startswith(begun):
             names.append(CompletionItem(name))
+    return [*names, CompletionItem(begun, type="file")]
 
 
 # options whose values a shell completes

@@ -15,7 +15,7 @@ from posefit.cli.output import print_result, results_alone, say
 @click.option(
     "--out",
     metavar="DIR",
-    help="The ledger's folder: a new one, or that of a sweep to continue.",
+    help="Folder of the ledger: new, or of a sweep to continue.",
 )
 @click.option(
     "--shard",
@@ -102,7 +102,7 @@ def sweep(
 @click.option(
     "--latest",
     is_flag=True,
-    help="Of methods that differ only in version, compare only the latest.",
+    help="If methods differ only in version, compare only the latest.",
 )
 @JSON
 def report(
@@ -146,7 +146,7 @@ def _names(texts: tuple[str, ...]) -> list[str]:
 @click.option("--out", metavar="DIR", help="A folder for the ledger of the new row.")
 @JSON
 def rerun(ledger: str, key: str, out: str | None, as_json: bool) -> None:
-    """Run one row of the results in DIR again, and print which figures differ.
+    """Run one row of the results in DIR again, and print the figures that differ.
 
     KEY is the row's key in the report, or enough of its first digits.
     The exit status is 1 if a figure other than a time differs.

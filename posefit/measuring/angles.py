@@ -53,7 +53,6 @@ BETWEEN = {
 }
 
 
-# columns of angles.csv, in order
 def _columns() -> Iterator[str]:
     for joint, angles in MEANINGS.items():
         for side in SIDES:
@@ -61,6 +60,7 @@ def _columns() -> Iterator[str]:
                 yield f"{side}_{joint}_{angle}"
 
 
+# columns of angles.csv, in order
 COLUMNS = tuple(_columns())
 # mirrors left and right, in segments' axes
 _ACROSS = np.diag([1.0, 1.0, -1.0])

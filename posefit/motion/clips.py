@@ -221,7 +221,7 @@ def _clips(
         clips = [clip for clip in recorded.named(source) if clip.name != stem]
         if not clips:
             raise InputError(
-                "train must hold another clip than the source, "
+                "train must hold a clip other than the source, "
                 f"got {source} for {followed}"
             )
         yield from (recorded_clip(clip) for clip in clips)
@@ -238,8 +238,8 @@ def _clips(
         others = [path for path in paths if not _same(path, followed)]
         if not others:
             raise InputError(
-                f"{source}: expected a folder with another clip than the source, "
-                "got that one alone"
+                f"{source}: expected a folder with a clip other than the source, "
+                "got only that clip"
             )
         yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):

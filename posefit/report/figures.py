@@ -188,7 +188,7 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     """
     contest = contest_of(runs)
     if contest is None:
-        raise InputError("figures must be of runs with errors, got none")
+        raise InputError("figures need runs with errors, got none")
     board = leaderboard(contest)
     names = [runs.methods[m] for m in contest.methods]
     order = []

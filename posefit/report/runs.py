@@ -75,8 +75,8 @@ class _Rows:
             kinds.add(row["spec"]["kind"])
             if len(kinds) > 1:
                 raise InputError(
-                    f"{ledger.path}: expected a ledger of tracks or one of single "
-                    "searches, got both in one"
+                    f"{ledger.path}: expected a ledger of either tracks or single "
+                    "searches, got both"
                 )
             if row["status"] == "done":
                 try:
@@ -86,8 +86,7 @@ class _Rows:
                     raise ledger.damaged_row(row["key"], error) from None
         if not kinds:
             raise InputError(
-                f"{ledger.path}: expected a ledger with finished rows, "
-                "got one with none"
+                f"{ledger.path}: expected a ledger with finished rows, got none"
             )
         self.kind = KINDS[kinds.pop()]
         # methods that only failed have the numbers from here on

@@ -272,7 +272,7 @@ class Suite:
         if isinstance(index, slice):
             raise InputError(
                 f"index must be the number of one problem, got {quoted(index)}: "
-                "itertools.islice makes several, one after the other"
+                "itertools.islice gives several"
             )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)

@@ -73,8 +73,7 @@ class Cluster:
             self.close()
             cause = " ".join(str(error).split())
             raise InputError(
-                "scheduler must be one with workers that answers, "
-                f"got {scheduler}: {cause}"
+                f"scheduler must answer and have workers, got {scheduler}: {cause}"
             ) from None
 
     def _check_versions(self) -> None:

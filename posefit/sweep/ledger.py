@@ -519,7 +519,7 @@ def _check_place(path: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")
     if path.is_symlink() and not path.exists():
-        raise InputError(f"{path}: expected a ledger, got a link that leads nowhere")
+        raise InputError(f"{path}: expected a ledger, got a broken link")
     if not folder.is_dir():
         return
     names = [name for name in sorted(os.listdir(folder)) if not name.startswith(".")]

@@ -300,7 +300,7 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
         (["wlak"], "did you mean 'walk'?"),
         (
             ["16_999"],
-            "motion must be a file, a folder, a recorded one that posefit motions lists, or one of walk, ",
+            "motion must be a file, a folder, a recorded motion that posefit motions lists, or one of walk, ",
         ),
         (["library"], "a recorded one that posefit motions lists, or one of walk, "),
         (["lost/"], "lost: expected a file or a folder, got nothing of that name"),
@@ -561,19 +561,19 @@ def test_a_new_command_installs_offline_and_passes_its_own_test(tmp_path: Path) 
 
 def test_a_new_plugin_has_names_of_its_own_and_replaces_nothing(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
-    hidden = "name must make a new module, got '{0}': its module posefit_{0} would hide the one"
+    hidden = "name must give a new module, got '{0}': its module posefit_{0} would hide the module"
     for words, message in [
         (
             ["track", "--kind", "command"],
-            "name must be a new one, got 'track', which posefit registers already",
+            "name must be new, got 'track', which posefit registers already",
         ),
         (
             ["bench", "--kind", "command"],
-            "name must be a new one, got 'bench', which posefit registers already",
+            "name must be new, got 'bench', which posefit registers already",
         ),
         (
             ["sapso"],
-            "name must be a new one, got 'sapso', which posefit registers already",
+            "name must be new, got 'sapso', which posefit registers already",
         ),
         *(([name], hidden.format(name)) for name in ("swarm", "reproduce", "envs")),
         (["9 lives"], "name must be small letters"),

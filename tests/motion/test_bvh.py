@@ -89,7 +89,7 @@ def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None
         (
             "JOINT LeftLeg",
             "JOINT Knot",
-            r"expected a BVH file with a person's joints, got one without left shin",
+            r"expected a BVH file with a person's joints, got a person without left shin",
         ),
         ("JOINT RightHand\n", "JOINT A\n", "got one without right hand"),
         ("Frames: 6", "Frames: 7", "bvh:[0-9]+: expected 7 frames, got 6"),

@@ -341,7 +341,7 @@ def test_a_scheduler_that_is_not_there_is_named() -> None:
     address = f"tcp://127.0.0.1:{port()}"
     with pytest.raises(
         InputError,
-        match=f"scheduler must be one with workers that answers, got {address}",
+        match=f"scheduler must answer and have workers, got {address}",
     ):
         cluster(address, LIMITS, patience=1.0)
 
