@@ -16,6 +16,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from math import inf
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
@@ -161,9 +162,7 @@ class Worker:
         with suppress(OSError, AttributeError):
             os.killpg(pid, signal.SIGKILL)
         # unless it has left the group
-        for process in _marked(self._process.mark):
-            with suppress(OSError):
-                os.kill(process, signal.SIGKILL)
+        _end_marked(self._process.mark)
         self._process.kill()
         self._process.join()
         self.connection.close()
@@ -196,19 +195,18 @@ class _Process(SpawnProcess):
                 os.environ[MARK] = process.mark
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
             finally:
-                del os.environ[MARK]
+                os.environ.pop(MARK, None)
                 vars(main).update(before)
 
 
-def _marked(mark: str) -> list[int]:
-    """Return the processes whose environment has a mark, where /proc lists them."""
-    found = []
+def _end_marked(mark: str) -> None:
+    """End all other processes whose environment has a mark, where /proc lists them."""
     for path in Path("/proc").glob("[0-9]*/environ"):
+        process = int(path.parent.name)
         # a process may end meanwhile, and others do not let us read theirs
         with suppress(OSError):
-            if mark.encode() in path.read_bytes():
-                found.append(int(path.parent.name))
-    return found
+            if process != os.getpid() and mark.encode() in path.read_bytes():
+                os.kill(process, signal.SIGKILL)
 
 
 @contextmanager
@@ -295,7 +293,7 @@ def become_worker(parent: int, path: list[str]) -> None:
     # the driver has already issued these warnings
     warnings.simplefilter("ignore", PluginWarning)
     single_thread()
-    end_with_parent(parent)
+    end_with_parent(parent, partial(_end_marked, os.environ[MARK]))
 
 
 def _serve(
@@ -310,8 +308,9 @@ def _serve(
     while True:
         try:
             job = connection.recv_bytes()
-        except EOFError:
-            return
+        except (EOFError, OSError):
+            # the driver has ended: `end_with_parent` ends this process and all others
+            threading.Event().wait()
         connection.send_bytes(BEGUN)
         try:
             if run is None:

@@ -36,6 +36,7 @@ from tests.sweep.fake import quarantined_in, rows_in, scheduler, swept
 
 LEFT = "POSEFIT_LEFT"  # the file that lists the processes that are left
 SLEEP = [sys.executable, "-c", "import time; time.sleep(900)"]
+END_SECONDS = 20.0  # a worker of Dask takes a while to notice that its parent ended
 LIMITS = Limits(seconds=20.0, gigabytes=1.0)
 # the figures that two runs of a cell differ by
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
@@ -289,9 +290,14 @@ def engine_of(name: str, workers: int) -> Iterator[Engine]:
 
 
 def left(noted: Path) -> list[int]:
-    """Return the processes that were noted and have not ended."""
+    """Return the processes that were noted and have not ended within some seconds."""
     numbers = noted.read_text().split() if noted.exists() else []
-    return [int(number) for number in numbers if _runs(int(number))]
+    processes = [int(number) for number in numbers]
+    until = time.monotonic() + END_SECONDS
+    while processes and time.monotonic() < until:
+        time.sleep(0.1)
+        processes = [process for process in processes if _runs(process)]
+    return processes
 
 
 def _runs(process: int) -> bool:
