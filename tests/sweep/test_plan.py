@@ -390,7 +390,7 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(
         ),
         ("fps = 1e-320", "fps must lie in 0.001 to 1e[+]06, got 1e-320"),
         (f'"{"n" * 300}" = 1', "got 'n{76}[.]{3}$"),
-        ("train = " + "[" * 9000, "not nested so deeply"),
+        ("train = " + "[" * 9000, "less deeply nested"),
     ):
         path.write_text(PLAIN + line)
         with pytest.raises(ValueError, match=message):
