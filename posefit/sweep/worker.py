@@ -304,6 +304,7 @@ def _serve(
     An answer is a pair: the job's result, and the reason if it failed.
     """
     become_worker(parent, path)
+    process = os.getpid()
     run: Run | None = None
     while True:
         try:
@@ -324,6 +325,9 @@ def _serve(
         # also SystemExit: a cell that exits must not end its worker
         except BaseException as error:
             answer = pickle.dumps((None, text_of(error)))
+        # a job may have forked the process, but there is one answer
+        if os.getpid() != process:
+            os._exit(0)
         connection.send_bytes(answer)
 
 

@@ -64,6 +64,13 @@ def leaves_a_fork() -> None:
     _note(process)
 
 
+def forks_and_goes_on() -> None:
+    # once: each process that goes on would fork again
+    if "FORKED" not in os.environ:
+        os.environ["FORKED"] = "yes"
+        os.fork()
+
+
 def leaves_a_session() -> None:
     _note(subprocess.Popen(SLEEP, start_new_session=True).pid)
 
@@ -203,7 +210,7 @@ def traces() -> None:
 
 
 MISCHIEF: tuple[Callable[[], None], ...] = (
-    changes_the_folder, leaves_a_process, leaves_a_fork, leaves_a_session, leaves_a_thread,
+    changes_the_folder, leaves_a_process, leaves_a_fork, forks_and_goes_on, leaves_a_session, leaves_a_thread,
     replaces_a_function, replaces_a_builtin, replaces_a_method, replaces_the_clock, writes_into_arrays,
     forgets_modules, handles_signals, sets_an_alarm, seeds_random_numbers, clears_the_environment,
     closes_descriptors, closes_output, prints_much, raises, exits, ends_its_process, kills_itself, stops_itself,
