@@ -43,6 +43,8 @@ from composites_scene import (
     on_ground,
     walked_on,
 )
+from flesh import LENGTHS as PUBLISHED
+from flesh import Legs, legs_of, painted
 from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.fitting import metrics
@@ -104,6 +106,7 @@ RIM = 0.5
 ROUGH = 0.7
 DAMAGE = {"holes": 0.1, "blobs": 0.1}
 SHADOW = 0.15
+SMALL = (480, 270)  # pixels of films whose people have published legs
 LANDMARK_OFF = 0.02  # metres, constant in a film, and again in each frame
 # shares of the frames in which a film's landmarks exchange legs, or arms
 EXCHANGED = (0.03, 0.15, 0.4)
@@ -177,6 +180,28 @@ ACTS: Mapping[str, Sequence[Act]] = {
         Act("17_03", 80.0),
     ],
 }
+# people who stand upright, all library clips with nearly straight knees for 40 frames
+UPRIGHT = [
+    Act("02_05", 0.0, start=424),
+    Act("02_10", 10.0, start=380),
+    Act("29_04", -10.0, start=437),
+    Act("29_08", 0.0, start=498),
+    Act("29_24", 15.0, start=548),
+    Act("49_09", 0.0, start=100),
+    Act("49_12", -15.0),
+    Act("49_17", 10.0),
+]
+# films of people with legs of published shapes: body 0 has the first, and so on
+WITH_LEGS = (
+    ("through", 0),
+    ("through", 3),
+    ("aslant", 0),
+    ("through", 1),
+    ("squats", 0),
+    ("through", 6),
+    ("towards", 0),
+    ("aslant", 2),
+)
 LIMPS = [
     Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "16_22", "49_01")
 ]
@@ -191,13 +216,32 @@ class Shot(NamedTuple):
     body: int
     landmarks: bool = False
     seed: int = 0  # of the track
+    legs: bool = False  # whether the legs have published shapes
 
     @property
     def name(self) -> str:
         """The name of its row and its file."""
         marks = "-landmarks" if self.landmarks else ""
+        marks += "-legs" if self.legs else ""
         again = f"-seed-{self.seed}" if self.seed else ""
         return f"{self.situation}-{self.number}-{self.views}-{self.body}{marks}{again}"
+
+
+def shots_with_legs() -> list[Shot]:
+    """Return the films of people with legs of published shapes.
+
+    Those who stand upright are filmed by one camera, the others by one, two and four.
+    """
+    several = [
+        Shot(situation, number, views, body, legs=True)
+        for views in PLACES
+        for body, (situation, number) in enumerate(WITH_LEGS)
+    ]
+    upright = [
+        Shot("upright", body % len(UPRIGHT), 1, body, legs=True)
+        for body in range(len(UPRIGHT))
+    ]
+    return [*several, *upright]
 
 
 def shots() -> list[Shot]:
@@ -240,6 +284,7 @@ class Person:
     body: Body
     flesh: Body = field(repr=False)
     root_off: Array  # (3,) of the flesh's root, in the pelvis's frame
+    legs: Legs | None = None  # of published shapes, or None for the flesh's cones
 
     @property
     def flesh_joints(self) -> Array:
@@ -253,17 +298,26 @@ class Person:
             self.motion.translations[k]
             + rotation_from_root_angles(pose[:3]) @ self.root_off
         )
+        if self.legs is not None:
+            return painted(self.flesh, self.legs, camera, pose, place)
         return project(self.flesh, camera, pose, place)
 
 
-def body_of(number: int) -> tuple[Body, Body, Array]:
-    """Return a body, its flesh as a separate body, and the flesh's root offset (3,)."""
+def body_of(number: int, legs: bool = False) -> tuple[Body, Body, Array]:
+    """Return a body, its flesh as a separate body, and the flesh's root offset (3,).
+
+    With `legs`, thighs and shanks vary about the published lengths, not the tracker's.
+    """
     rng = np.random.default_rng([62, number])
     average = Body.of(built_in.average_skeleton())
     logs = np.zeros(len(NAMES))
+    if legs:
+        for part, bone in (("thighs", "femur"), ("shanks", "tibia")):
+            share = average.skeleton.lengths[BONES.index(f"l{bone}")] / average.stature
+            logs[NAMES.index(f"{part} length")] = np.log(PUBLISHED[bone] / share)
     lengths = slice(1, 1 + len(LENGTHS))
     logs[0] = STATURE * rng.standard_normal()
-    logs[lengths] = rng.multivariate_normal(
+    logs[lengths] += rng.multivariate_normal(
         np.zeros(len(LENGTHS)), COVARIANCE[lengths, lengths]
     )
     girths = 1.0 + rng.uniform(-GIRTH, GIRTH, len(BONES))
@@ -298,8 +352,9 @@ def body_of(number: int) -> tuple[Body, Body, Array]:
 
 def person(shot: Shot) -> Person:
     """Return the filmed person."""
-    act = (LIMPS if shot.situation == "limp" else ACTS[shot.situation])[shot.number]
-    body, flesh, root_off = body_of(shot.body)
+    situations = {**ACTS, "limp": LIMPS, "upright": UPRIGHT}
+    act = situations[shot.situation][shot.number]
+    body, flesh, root_off = body_of(shot.body, shot.legs)
     motion = frames_of(act.clip, act.start, None if act.walks else act.start + LONGEST)
     if act.walks:
         motion = walked_on(motion, WALK_METRES + 2.2 * (shot.situation == "limp"))
@@ -315,7 +370,8 @@ def person(shot: Shot) -> Person:
     motion = on_ground(
         facing_elsewhere(motion.frames(0, min(len(motion), 3 * LONGEST)), turn), body
     )
-    return Person(moved(motion, -middle_of(motion)), body, flesh, root_off)
+    legs = legs_of(shot.body, body.stature) if shot.legs else None
+    return Person(moved(motion, -middle_of(motion)), body, flesh, root_off, legs)
 
 
 def limping(motion: Motion, number: int) -> Motion:
@@ -354,9 +410,10 @@ def cameras_of(
 ) -> tuple[list[Camera], list[Camera]]:
     """Return the cameras, and their calibrations."""
     target = np.array([0.0, HEIGHT, 0.0])
+    size = SMALL if shot.legs else SIZE
     turned = rng.uniform(-15.0, 15.0)
     true = [
-        Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS)
+        Camera.around(target, np.radians(degrees + turned), DISTANCE, size, ACROSS)
         for degrees in PLACES[shot.views]
     ]
     rotation_off, place_off, focal_off = CALIBRATION_OFF
@@ -487,6 +544,7 @@ def figures(result: Track, who: Person) -> dict[str, Any]:
         },
         "build": result.log.build,
         "degrees": angle_errors(who.motion, angles, np.ones(len(true), dtype=bool)),
+        "bent": bent_beyond(who.motion, angles),
         "trust": {
             name: value
             for name, value in vars(result.trust).items()
@@ -494,6 +552,17 @@ def figures(result: Track, who: Person) -> dict[str, Any]:
         },
         "gait": [steps_of(gait_of(who.motion)), steps_of(result.gait)],
     }
+
+
+def bent_beyond(true: Motion, angles: Mapping[str, Array]) -> list[float]:
+    """Return median and 90th percentile, in degrees, of knee flexion beyond the truth.
+
+    Of each frame, the mean of both knees counts.
+    """
+    known = clinical_angles(true.skeleton, true.poses)
+    knees = [f"{side}_knee_flexion" for side in SIDES]
+    beyond = np.mean([angles[knee] - known[knee] for knee in knees], axis=0)
+    return np.quantile(beyond, (0.5, 0.9)).tolist()
 
 
 def legs_exchanged(true: Array, joints: Array) -> Array:
