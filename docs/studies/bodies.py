@@ -146,6 +146,9 @@ WRONG_MM = 75.0
 # turn of one thigh; share by which a cycle runs faster and slower
 LIMP_DEGREES = 7.0
 LIMP_WARP = 0.15
+# Of people who stand upright, at most. The library's, whose joints are those of a
+# skeleton fitted to markers, stand with knees bent by 8 degrees or more.
+STRAIGHT_DEGREES = 5.0
 
 
 class Act(NamedTuple):
@@ -360,6 +363,8 @@ def person(shot: Shot) -> Person:
         motion = walked_on(motion, WALK_METRES + 2.2 * (shot.situation == "limp"))
     if shot.situation == "limp":
         motion = limping(motion, shot.body)
+    if shot.situation == "upright":
+        motion = straightened(motion)
     leg = [BONES.index(name) for name in ("lfemur", "ltibia")]
     scale = body.skeleton.lengths[leg].sum() / motion.skeleton.lengths[leg].sum()
     motion = replace(motion.about_axes_of(body.skeleton), skeleton=body.skeleton)
@@ -385,13 +390,7 @@ def limping(motion: Motion, number: int) -> Motion:
         for step in gait_of(motion).steps
         if step.foot == short
     ]
-    joint = JOINTS.index(f"{short[0]}femur")
-    poses = motion.poses.copy()
-    axes = motion.skeleton.axes[joint - 1]
-    start = angle_index(joint)
-    back = cv2.Rodrigues(np.radians([LIMP_DEGREES, 0.0, 0.0]))[0]
-    turned = axes.T @ back @ motion.skeleton.turns(poses)[joint] @ axes
-    poses[:, start : start + 3] = joint_angles_from_rotation(turned)
+    poses = turned_back(motion, f"{short[0]}femur", np.full(len(motion), LIMP_DEGREES))
     turns = 2.0 * np.pi / float(np.diff(strikes).mean())
     times = np.arange(len(motion))
     uneven = np.clip(
@@ -403,6 +402,34 @@ def limping(motion: Motion, number: int) -> Motion:
     return replace(
         motion, poses=at_frames(np.unwrap(poses, axis=0), uneven), translations=places
     )
+
+
+def turned_back(motion: Motion, bone: str, degrees: Array) -> Array:
+    """Return the poses (T, 66) of a motion with a bone turned back by angles (T,)."""
+    joint = JOINTS.index(bone)
+    poses = motion.poses.copy()
+    axes = motion.skeleton.axes[joint - 1]
+    start = angle_index(joint)
+    back = np.array(
+        [cv2.Rodrigues(np.array([x, 0.0, 0.0]))[0] for x in np.radians(degrees)]
+    )
+    turned = axes.T @ back @ motion.skeleton.turns(poses)[joint] @ axes
+    poses[:, start : start + 3] = joint_angles_from_rotation(turned)
+    return poses
+
+
+def straightened(motion: Motion) -> Motion:
+    """Return a motion whose knees are never bent by more than `STRAIGHT_DEGREES`.
+
+    Hips and ankles turn by half, so that the feet stay under the hips, and flat.
+    """
+    angles = clinical_angles(motion.skeleton, motion.poses)
+    for side in SIDES:
+        less = np.minimum(STRAIGHT_DEGREES - angles[f"{side}_knee_flexion"], 0.0)
+        for bone, share in (("femur", -0.5), ("tibia", 1.0), ("foot", -0.5)):
+            poses = turned_back(motion, f"{side[0]}{bone}", share * less)
+            motion = replace(motion, poses=poses)
+    return motion
 
 
 def cameras_of(
