@@ -17,10 +17,12 @@ def printable(text: str) -> str:
     text = _LONG.sub(lambda word: f"{word[0][:38]}...{word[0][-39:]}", text)
     if text.isprintable():
         return text
-    return "".join(
-        sign if sign.isprintable() else sign.encode("unicode_escape").decode()
-        for sign in text
-    )
+    signs = []
+    for sign in text:
+        if not sign.isprintable():
+            sign = sign.encode("unicode_escape").decode()
+        signs.append(sign)
+    return "".join(signs)
 
 
 class InputError(ValueError):

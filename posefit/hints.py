@@ -180,10 +180,11 @@ def _fitted_members(
             raise UnfitError
     else:
         members = members * len(values)
-    kind = list if (get_origin(hint) or hint) is list else tuple
-    return kind(
-        fit(member, value) for member, value in zip(members, values, strict=True)
-    )
+    fitted = []
+    for member, value in zip(members, values, strict=True):
+        fitted.append(fit(member, value))
+    is_list = (get_origin(hint) or hint) is list
+    return fitted if is_list else tuple(fitted)
 
 
 def _members(hint: Any) -> tuple[Any, ...]:
@@ -247,8 +248,8 @@ def shown(hint: Any, default: Any = None) -> str:
     if hint in (None, type(None)):
         return "none"
     if origin in _SEQUENCES:
-        inside = [
-            "..." if member is Ellipsis else shown(member) for member in get_args(hint)
-        ]
+        inside = []
+        for member in get_args(hint):
+            inside.append("..." if member is Ellipsis else shown(member))
         return f"{origin.__name__}[{', '.join(inside)}]"
     return hint.__name__ if isinstance(hint, type) else str(hint)

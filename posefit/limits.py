@@ -167,11 +167,10 @@ def allowed_bytes() -> int:
     with suppress(ImportError):
         import resource
 
-        soft = (
-            resource.getrlimit(kind)[0]
-            for kind in (resource.RLIMIT_DATA, resource.RLIMIT_AS)
-        )
-        limits = [limit for limit in soft if limit != resource.RLIM_INFINITY]
+        for kind in (resource.RLIMIT_DATA, resource.RLIMIT_AS):
+            soft = resource.getrlimit(kind)[0]
+            if soft != resource.RLIM_INFINITY:
+                limits.append(soft)
     return min([_machine_bytes(), *limits])
 
 

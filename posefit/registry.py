@@ -37,7 +37,7 @@ BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
 Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter", "device"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-# those that `posefit check` has rules for, and `posefit plugins new` a template
+# `posefit check` has rules for these kinds, `posefit plugins new` a template
 CHECKED_KINDS = tuple(kind for kind in KINDS if kind != "device")
 # distribution of an optimiser that no plugin but the program itself has registered
 OWN = "this process"
@@ -161,11 +161,11 @@ class Registry:
     @cached_property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
         """The offers of all loaded plugins."""
-        offers = [offer for plugin in self.plugins for offer in plugin.offers]
-        return {
-            kind: {offer.name: offer for offer in offers if offer.kind == kind}
-            for kind in KINDS
-        }
+        offers: dict[Kind, dict[str, Offer]] = {kind: {} for kind in KINDS}
+        for plugin in self.plugins:
+            for offer in plugin.offers:
+                offers[offer.kind][offer.name] = offer
+        return offers
 
     def optimiser(self, name: str) -> "OptimiserFactory":
         """Return the optimiser factory with a name.
@@ -371,7 +371,7 @@ def load(
                     offers=tuple(methods),
                     commands=tuple(commands),
                 )
-            # whatever a plugin does, the others must work
+            # the others must work, no matter what a plugin does
             except (Exception, SystemExit) as error:
                 trace = "".join(traceback.format_exception(error))
                 plugin = plugin._replace(
@@ -411,12 +411,13 @@ def _offers(
         manager.check_pending()
     except pluggy.PluginValidationError as error:
         known = [name for name in vars(hooks) if name.startswith("posefit_register_")]
-        unknown = [
-            name
-            for name in vars(module)
-            if name.startswith("posefit_") and name not in known
-        ]
-        near = suggestion(unknown[0], known) if unknown else ""
+        unknown = []
+        for name in vars(module):
+            if name.startswith("posefit_") and name not in known:
+                unknown.append(name)
+        near = ""
+        if unknown:
+            near = suggestion(unknown[0], known)
         raise InputError(f"{error}{near}") from None
     offers: dict[str, Offer | click.Command] = {}
 

@@ -56,9 +56,10 @@ def sources_from(
     """Return the motions with a given beginning, and have the shell add files."""
     from posefit.motion import built_in
 
-    names = [
-        CompletionItem(name) for name in built_in.names() if name.startswith(begun)
-    ]
+    names = []
+    for name in built_in.names():
+        if name.startswith(begun):
+            names.append(CompletionItem(name))
     return [*names, CompletionItem(begun, type="file")]
 
 

@@ -24,7 +24,7 @@ def open_streams() -> None:
 
 
 def drop(stream: int) -> None:
-    """Discard what a standard stream holds and still gets, because its disk is full."""
+    """Discard a standard stream's output, because its disk is full."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
 

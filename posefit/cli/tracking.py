@@ -70,9 +70,19 @@ def track(
 
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
-    phases = [f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()]
-    shown.log(f"took {', '.join(phases)}")
+    shown.log(f"took {_times(shown)}")
     _print(result.content, as_json, {}, options, verbose, HINTS)
+
+
+def _times(shown: Progress) -> str:
+    """Return how long each phase took, and how much of that was compiling."""
+    from posefit.arrays.compiling import compiling_seconds
+
+    phases = [f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()]
+    compiling = compiling_seconds()
+    if compiling:
+        phases.append(f"of which compiling, once on this machine, {compiling:.1f} s")
+    return ", ".join(phases)
 
 
 @click.command(cls=TrackCommand)
@@ -200,7 +210,7 @@ def extract(
     at the same time.
     """
     from posefit.footage.extract import extract as run
-    from posefit.footage.segmentation import Extraction
+    from posefit.footage.extraction import Extraction
     from posefit.footage.source import resolve
 
     resolved = resolve(source)
@@ -273,7 +283,7 @@ def extraction_of(
         InputError: The options are given for a source that is not segmented.
 
     """
-    from posefit.footage.segmentation import Extraction, segmenter_name
+    from posefit.footage.extraction import Extraction, segmenter_name
     from posefit.footage.source import useless_for
     from posefit.registry import registry
     from posefit.settings import parse_texts
@@ -291,9 +301,15 @@ def extraction_of(
         values["method"] = values.pop("extraction")
     name = segmenter_name(values.get("method"), values.get("background"))
     if settings is None and "settings" in options:
-        texts = options["settings"]
-        settings = [text for text in texts if text.partition(".")[0] == name]
-        options["settings"] = tuple(text for text in texts if text not in settings)
+        own = []
+        others = []
+        for text in options["settings"]:
+            if text.partition(".")[0] == name:
+                own.append(text)
+            else:
+                others.append(text)
+        settings = own
+        options["settings"] = tuple(others)
     if settings:
         factory = registry().offer("segmenter", name).factory
         values["settings"] = parse_texts(name, factory, settings)

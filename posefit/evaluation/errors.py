@@ -35,72 +35,68 @@ MAX_SMALL_FACTOR = 4
 LOST = 0.5  # frames with at least this probability are called lost
 MAX_TRACE_POINTS = 64
 
-FRAME = {
-    measure.name: measure
-    for measure in (
-        Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
-        Measure(
-            "seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"
-        ),
-        MEASURES["cost"],
-        MEASURES["iou"],
-        Measure(
-            "usable",
-            "usable",
-            "",
-            0,
-            "1 where the frame was searched, 0 where the pose was held",
-        ),
-        MEASURES["error_degrees"],
-        MEASURES["geodesic_degrees"],
-        MEASURES["mpjpe_mm"],
-        MEASURES["pa_mpjpe_mm"],
-        Measure(
-            "swapped",
-            "swapped",
-            "",
-            0,
-            "1 where the frame is nearer to the truth when mirrored",
-        ),
-        Measure(
-            "unknown_sides",
-            "sides unknown",
-            "",
-            0,
-            "1 where left and right are unknown; blank where not estimated",
-        ),
-        Measure(
-            "lost",
-            "lost",
-            "",
-            2,
-            "probability that the frame is lost; blank where not estimated",
-        ),
-        Measure(
-            "interval_mm",
-            "80 % interval",
-            "mm",
-            0,
-            "its radius, the mean over joints; blank where not estimated",
-        ),
-        MEASURES["evaluations"],
-        Measure(
-            "wall_seconds",
-            "time",
-            "ms",
-            1,
-            "wall time of the estimate, from the end of the previous frame's",
-            1e3,
-        ),
-        Measure(
-            "activity",
-            "activity",
-            "",
-            0,
-            "the person's activity in a word; blank where not estimated",
-        ),
-    )
-}
+_FRAME_MEASURES = (
+    Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
+    Measure("seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"),
+    MEASURES["cost"],
+    MEASURES["iou"],
+    Measure(
+        "usable",
+        "usable",
+        "",
+        0,
+        "1 where the frame was searched, 0 where the pose was held",
+    ),
+    MEASURES["error_degrees"],
+    MEASURES["geodesic_degrees"],
+    MEASURES["mpjpe_mm"],
+    MEASURES["pa_mpjpe_mm"],
+    Measure(
+        "swapped",
+        "swapped",
+        "",
+        0,
+        "1 where the frame is nearer to the truth when mirrored",
+    ),
+    Measure(
+        "unknown_sides",
+        "sides unknown",
+        "",
+        0,
+        "1 where left and right are unknown; blank where not estimated",
+    ),
+    Measure(
+        "lost",
+        "lost",
+        "",
+        2,
+        "probability that the frame is lost; blank where not estimated",
+    ),
+    Measure(
+        "interval_mm",
+        "80 % interval",
+        "mm",
+        0,
+        "its radius, the mean over joints; blank where not estimated",
+    ),
+    MEASURES["evaluations"],
+    Measure(
+        "wall_seconds",
+        "time",
+        "ms",
+        1,
+        "wall time of the estimate, from the end of the previous frame's",
+        1e3,
+    ),
+    Measure(
+        "activity",
+        "activity",
+        "",
+        0,
+        "the person's activity in a word; blank where not estimated",
+    ),
+)
+FRAME = {measure.name: measure for measure in _FRAME_MEASURES}
 # columns (T,) by the names of `FRAME`, NaN where a value is unknown
 Table = dict[str, Array]
 
@@ -259,10 +255,9 @@ def _errors(
     def error_of(poses: Array) -> float:
         return float(metrics.pose_error_degrees(truth, poses).mean())
 
-    nearest_poses = [
-        nearest(scene, training, k, observation, beta)
-        for k, observation in enumerate(scene.observations)
-    ]
+    nearest_poses = []
+    for k, observation in enumerate(scene.observations):
+        nearest_poses.append(nearest(scene, training, k, observation, beta))
     trivial = {
         "mean_pose": with_root(training.mean(axis=0)),
         "persistence": np.tile(truth[0], (len(truth), 1)),
@@ -423,9 +418,7 @@ def _costs(
     silhouettes = observation.silhouettes
     if factor > 1:
         cameras = [coarser_camera(camera, factor) for camera in cameras]
-        silhouettes = [
-            coarser_silhouette(silhouette, factor) for silhouette in silhouettes
-        ]
+        silhouettes = [coarser_silhouette(each, factor) for each in silhouettes]
     return pose_costs(scene.body, cameras, silhouettes, poses, translations, beta)[0]
 
 
@@ -477,16 +470,13 @@ def mode_reliability(
         For each bin of the likeliest mode's probability: the number of frames, the mean
         probability, and the share of frames whose mode is right.
     """
-    weighed = [
-        (frame.modes, joints)
-        for frame, joints in zip(frames, truth, strict=True)
-        if frame.modes
-    ]
-    right = np.array(
-        [likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed]
-    )
-    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
-    return [
-        [count, round(mean, 6), round(share, 6)]
-        for count, mean, share in reliability(likely, right)
-    ]
+    probabilities = []
+    right = []
+    for frame, joints in zip(frames, truth, strict=True):
+        if frame.modes:
+            probabilities.append(max(mode.weight for mode in frame.modes))
+            right.append(likeliest_is_right(skeleton, frame.modes, joints))
+    rows = []
+    for count, mean, share in reliability(np.array(probabilities), np.array(right)):
+        rows.append([count, round(mean, 6), round(share, 6)])
+    return rows

@@ -135,7 +135,7 @@ def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
 def _frames(skeleton: Skeleton) -> list[tuple[int, Array | None]]:
     """Return each inner joint with the map from its counterpart's frame to its own.
 
-    The map includes the reflection. None stands for the reflection alone, so that
+    The map includes the reflection. None means the reflection alone, so that
     angles of more than half a turn can be kept.
     """
     frames: list[tuple[int, Array | None]] = []

@@ -7,7 +7,7 @@ frame of it is known. If a person walks and stays in one place, as on a treadmil
 before a camera that turns with them, only times count.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 
@@ -31,7 +31,7 @@ MIN_STEPS_SHARE = 1.0 / 3.0  # least share of the known time that the steps last
 # is wider
 MAX_STEP_WIDTH = 0.35
 RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
-# share of a stride; judged by the rearmost toes, a runner's foot stands shorter
+# share of a stride; judged by the rearmost toes, a runner's stance is shorter
 MIN_STANCE_SHARE = 0.57
 # ours: standard deviation over mean of strides in one place; a dance's differ more
 MAX_UNEVEN = 0.1
@@ -52,7 +52,7 @@ WARNING_SHARE = 0.05  # ours: share of frames from which a warning is given
 class Step:
     """A strike of a foot, with the step that it ends and the stride that it begins.
 
-    What is unknown is None. Seconds count from the first frame, lengths are metres.
+    Unknown values are None. Seconds count from the first frame, lengths are metres.
 
     Attributes:
         foot: "left" or "right".
@@ -63,7 +63,7 @@ class Step:
         step_width: between both ankles at the strike, across the way.
         stride_seconds: duration of the stride.
         stride_length: from this strike to the foot's next one.
-        stance_share: share of the stride in which the foot stands.
+        stance_share: share of the stride in which the foot is on the ground.
     """
 
     foot: str
@@ -153,21 +153,15 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     known = (len(motion) - len(unknown)) / motion.fps
     if why := _why_not(motion, events, steps, speed, known):
         return Gait(steps=steps, why=why)
-    left, right = (
-        _of_foot([step for step in steps if step.foot == side]) for side in SIDES
-    )
+    left = _of_foot([step for step in steps if step.foot == "left"])
+    right = _of_foot([step for step in steps if step.foot == "right"])
 
     def mean(name: str) -> float | None:
         """Return the mean of the feet's means.
 
         One foot may have more steps, and the feet of a limp differ.
         """
-        values = [
-            value
-            for foot in (left, right)
-            if (value := getattr(foot, name)) is not None
-        ]
-        return float(np.mean(values)) if values else None
+        return _mean([left, right], name)
 
     seconds = mean("step_seconds")
     length = mean("step_length")
@@ -204,19 +198,23 @@ def _steps(
     With `in_place` they have no lengths.
     """
     least = -np.inf if in_place else MIN_SPEED
-    strikes = sorted(
-        (time, side) for side in SIDES for time in _known(events.strikes[side], unknown)
-    )
+    strikes = []
+    for side in SIDES:
+        strikes += [(time, side) for time in _known(events.strikes[side], unknown)]
+    strikes.sort()
     for k, (time, foot) in enumerate(strikes):
         other = "right" if foot == "left" else "left"
         measures: dict[str, float | None] = {}
-        again = next(
-            (later for later, side in strikes[k + 1 :] if side == foot), np.inf
-        )
-        off = next(
-            (off for off in _known(events.offs[foot], unknown) if time < off < again),
-            None,
-        )
+        again = np.inf  # this foot's next strike
+        for later, side in strikes[k + 1 :]:
+            if side == foot:
+                again = later
+                break
+        off = None  # this foot's first lift-off in between
+        for lift in _known(events.offs[foot], unknown):
+            if time < lift < again:
+                off = lift
+                break
         if off is not None:
             measures["toe_off_seconds"] = (first + off) / fps
         before, foot_before = strikes[k - 1] if k else (time, foot)
@@ -275,9 +273,11 @@ def _stride(
 
 def _known(times: Array, unknown: set[int]) -> list[float]:
     """Return the times that do not lie next to an unknown frame."""
-    return [
-        float(time) for time in times if not {int(time), int(np.ceil(time))} & unknown
-    ]
+    known = []
+    for time in times:
+        if not {int(time), int(np.ceil(time))} & unknown:
+            known.append(float(time))
+    return known
 
 
 def _walked(
@@ -346,16 +346,24 @@ def _why_not(
 
 
 def _leg(motion: Motion) -> float:
-    bones = [BONES.index(bone) for kind in ("femur", "tibia") for bone in both(kind)]
+    bones = [BONES.index(bone) for bone in (*both("femur"), *both("tibia"))]
     return float(motion.skeleton.lengths[bones].sum()) / 2.0
 
 
-def _values(steps: list[Step], name: str) -> list[float]:
-    return [value for step in steps if (value := getattr(step, name)) is not None]
+def _values(measured: Sequence[Step | FootGait], name: str) -> list[float]:
+    values = []
+    for each in measured:
+        value = getattr(each, name)
+        if value is not None:
+            values.append(value)
+    return values
 
 
-def _mean(steps: list[Step], name: str) -> float | None:
-    return float(np.mean(values)) if (values := _values(steps, name)) else None
+def _mean(measured: Sequence[Step | FootGait], name: str) -> float | None:
+    values = _values(measured, name)
+    if not values:
+        return None
+    return float(np.mean(values))
 
 
 def stride_curves(motion: Motion, gait: Gait, angle: str) -> dict[str, Array]:

@@ -170,9 +170,9 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
             row[start:stop] = line.numbers(stop - start)
         elif number is not None or not line.words:  # the frame is over
             if len(bones_read) < len(spans):
-                missing = quoted(next(bone for bone in spans if bone not in bones_read))
+                missing = [bone for bone in spans if bone not in bones_read]
                 raise line.mistake(
-                    f"bone {missing} in frame {frame}",
+                    f"bone {quoted(missing[0])} in frame {frame}",
                     None if number is None else f"frame {number}",
                 )
             data.extend(row)

@@ -66,9 +66,9 @@ def _json(value: Any) -> str:
     Python objects take much memory.
     """
     if isinstance(value, dict):
-        items = [
-            f"{json.dumps(str(name))}:{_json(inner)}" for name, inner in value.items()
-        ]
+        items = []
+        for name, inner in value.items():
+            items.append(f"{json.dumps(str(name))}:{_json(inner)}")
         return f"{{{','.join(items)}}}"
     return json.dumps(plain(value), allow_nan=False, separators=(",", ":"))
 
@@ -96,11 +96,13 @@ def plain(value: Any) -> Any:
     return value
 
 
+def _variables(colours: dict[str, str]) -> str:
+    return "".join(f" --{name}: {colour};" for name, colour in colours.items())
+
+
 def colour_style(light: dict[str, str], dark: dict[str, str]) -> str:
     """Return named colours as variables of a page's style, for light and dark."""
-    bright, dim = (
-        "".join(f" --{name}: {colour};" for name, colour in scheme.items())
-        for scheme in (light, dark)
-    )
+    bright = _variables(light)
+    dim = _variables(dark)
     in_the_dark = "@media (prefers-color-scheme: dark)"
     return f":root {{{bright} }}\n{in_the_dark} {{ :root {{{dim} }} }}\n"

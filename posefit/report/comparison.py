@@ -137,7 +137,9 @@ def compare(
     for name in ("views", "corruptions", "instances"):
         if name in lists:
             crossed[name] = lists.pop(name)
-    grid = {"grid": lists.pop("grid")} if "grid" in lists else {}
+    grid = {}
+    if "grid" in lists:
+        grid["grid"] = lists.pop("grid")
     plan = Plan.of({"product": crossed, "defaults": lists, **grid})
     folder = _temporary_folder() if out is None else Path(out)
     say = interactive().log

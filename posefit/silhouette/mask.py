@@ -59,7 +59,7 @@ def touches_border(mask: Mask) -> bool:
 def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
     """Return the rows and columns of a mask's box with a margin in pixels.
 
-    For an empty mask they are those of the first pixel.
+    For an empty mask it is the first pixel's box.
     """
     left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))
     if not wide:
@@ -198,8 +198,8 @@ class Device(Protocol):
             translations: (n, 3) metres; the caller has checked the shape.
 
         Returns:
-            R, B, Y (n, 3) in pixels, equal to those of `posefit.silhouette.cost.areas`
-            on a CPU.
+            R, B, Y (n, 3) in pixels, equal to the result of
+            `posefit.silhouette.cost.areas` on a CPU.
 
         """
 

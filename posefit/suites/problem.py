@@ -3,7 +3,7 @@
 Each is a `posefit.Problem` with a `SuiteCost` as its cost function. Its attributes have
 the same names as in COCO, so loops written for COCO run on it unchanged.
 
-A suite may get more problems, but nothing else about it ever changes.
+A suite may get more problems. Everything else about it stays the same for ever.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -241,18 +241,18 @@ class Suite:
         instances = _numbers("instances", instances)
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
-        self.passed_over = tuple(
-            function
-            for function in chosen
-            if not set(dimensions) & set(function.dimensions)
-        )
+        passed_over = []
+        for function in chosen:
+            if not set(dimensions) & set(function.dimensions):
+                passed_over.append(function)
+        self.passed_over = tuple(passed_over)
         self.name = name
         self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget}
-        self._addresses = [
-            checked_address(name, function.number, instance, dimension)
-            for dimension, function, instance in product(dimensions, chosen, instances)
-            if dimension in function.dimensions
-        ]
+        self._addresses = []
+        for dimension, function, instance in product(dimensions, chosen, instances):
+            if dimension in function.dimensions:
+                address = checked_address(name, function.number, instance, dimension)
+                self._addresses.append(address)
         if not self._addresses:
             raise InputError(
                 "a suite must hold at least one problem, "
@@ -272,7 +272,7 @@ class Suite:
         if isinstance(index, slice):
             raise InputError(
                 f"index must be the number of one problem, got {quoted(index)}: "
-                "itertools.islice makes several, one after the other"
+                "itertools.islice gives several"
             )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)

@@ -147,7 +147,7 @@ def run_of(
         budget = problem.budget
     if budget is None:
         raise InputError(
-            f"{problem.id}: budget must be known, here or of the problem, got none"
+            f"{problem.id}: budget must be given, here or in the problem, got none"
         )
     if problem.evaluations > budget:
         raise InputError(

@@ -89,15 +89,13 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         "status": row["status"],
         "reason": "; ".join(row.get("reasons", [])),
     }
-    columns |= {
-        name: value for name, value in spec.items() if name not in ("files", "version")
-    }
+    for name, value in spec.items():
+        if name not in ("files", "version"):
+            columns[name] = value
     columns["settings"] = ", ".join(settings_text(spec["settings"]))
     if spec["kind"] == "track":
-        corruptions = [
-            f"{kind} {strength:g}"
-            for kind, strength in sorted(spec["corruption"].items())
-        ]
+        kinds = sorted(spec["corruption"].items())
+        corruptions = [f"{kind} {strength:g}" for kind, strength in kinds]
         columns["corruption"] = ", ".join(corruptions)
         columns["train"] = ", ".join(spec["train"])
         views = [f"{view:g}" for view in spec["view_degrees"]]
@@ -107,14 +105,15 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability"):
             continue
         if name == "joint_errors_mm":
-            columns |= {
-                f"{name}.{joint}": error
-                for joint, error in zip(JOINTS, value, strict=True)
-            }
+            for joint, error in zip(JOINTS, value, strict=True):
+                columns[f"{name}.{joint}"] = error
         elif isinstance(value, Mapping):
-            columns |= {f"{name}.{part}": figure for part, figure in value.items()}
+            for part, figure in value.items():
+                columns[f"{name}.{part}"] = figure
+        elif isinstance(value, list):
+            columns[name] = "; ".join(value)
         else:
-            columns[name] = "; ".join(value) if isinstance(value, list) else value
+            columns[name] = value
     return columns
 
 
@@ -135,7 +134,9 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
     table = list(rows)
     if not table:
         raise InputError("rows must be at least one, got none")
-    columns = list(dict.fromkeys(name for row in table for name in row))
+    columns: dict[str, None] = {}  # an ordered set
+    for row in table:
+        columns.update(dict.fromkeys(row))
     with (
         new_file(path) as building,
         building.open("w", newline="", encoding="utf-8") as file,
@@ -158,11 +159,9 @@ def search_run(row: Mapping[str, Any]) -> SuiteRun:
     """Return the suite run that a ledger's row of a single search describes."""
     spec = row["spec"]
     trace = row["trace"]
-    problem = {
-        name: value
-        for name, value in spec.items()
-        if name not in ("kind", "name", "evaluations", "version")
-    }
+    problem = dict(spec)
+    for name in ("kind", "name", "evaluations", "version"):
+        problem.pop(name, None)
     return SuiteRun(
         **problem,
         budget=spec["evaluations"],

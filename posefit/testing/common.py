@@ -1,4 +1,4 @@
-"""Rules that several kinds of plugins share, and what the other rules are made of."""
+"""Rules that several kinds of plugins share, and the parts of other rules."""
 
 import copy
 import inspect

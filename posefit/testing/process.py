@@ -150,10 +150,10 @@ def _checks(
 
     offer = registry().offer(kind, name)
     if rivals := registry().rivals(offer):
-        theirs = ", ".join(
-            f"{plugin.name} ({plugin.distribution} {plugin.version})"
-            for plugin in rivals
-        )
+        labels = []
+        for plugin in rivals:
+            labels.append(f"{plugin.name} ({plugin.distribution} {plugin.version})")
+        theirs = ", ".join(labels)
         raise InputError(
             f"{kind} {name!r} must be of one plugin, "
             f"got that of {offer.distribution}, which is used, "
@@ -169,7 +169,9 @@ def _checks(
     names = [check.name for check in checks]
     for rule in only:
         one_of("--only", rule, names)
-    return offer.label, [check for check in checks if not only or check.name in only]
+    if only:
+        checks = [check for check in checks if check.name in only]
+    return offer.label, checks
 
 
 if __name__ == "__main__":

@@ -99,19 +99,17 @@ class Report:
             )
             # one traceback per cause
             if result.traceback and _cause(result.detail) not in causes:
-                lines += [
-                    f"           {line}".rstrip()
-                    for line in result.traceback.splitlines()
-                ]
+                for line in result.traceback.splitlines():
+                    lines.append(f"           {line}".rstrip())
             causes.add(_cause(result.detail))
         return "\n".join(lines)
 
     @property
     def summary(self) -> str:
         """How many checks ran, failed and were skipped."""
-        passed, failed, skipped = (
-            len(self.of(outcome)) for outcome in ("passed", "failed", "skipped")
-        )
+        passed = len(self.of("passed"))
+        failed = len(self.of("failed"))
+        skipped = len(self.of("skipped"))
         return f"{passed + failed} checks ran, {failed} failed, {skipped} skipped"
 
 

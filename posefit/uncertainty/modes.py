@@ -175,9 +175,10 @@ def other_modes(
     if len(modes) < 2:
         return []
     nearest = _nearest(skeleton, modes, skeleton.joints(pose))[0]
-    others = [
-        mode for k, mode in enumerate(modes) if k != nearest and mode.weight > above
-    ]
+    others = []
+    for k, mode in enumerate(modes):
+        if k != nearest and mode.weight > above:
+            others.append(mode)
     return sorted(others, key=lambda mode: -mode.weight)
 
 
@@ -252,10 +253,10 @@ def track_modes(
     poses = np.array([frame.poses for frame in coherent])
     translations = np.array([frame.translations for frame in coherent])
     clusters = clusters_of(distances, weights, apart)
-    return [
-        TrackMode(weight, poses[:, row], translations[:, row])
-        for weight, row, _ in clusters
-    ]
+    tracks = []
+    for weight, row, _ in clusters:
+        tracks.append(TrackMode(weight, poses[:, row], translations[:, row]))
+    return tracks
 
 
 def clusters_of(

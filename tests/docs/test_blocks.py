@@ -21,7 +21,10 @@ from tests.docs.pages import ROOT, RUN, SHOWN, Block, blocks, pages
 BLOCKS = [block for page in pages() for block in blocks(page)]
 # pages that take seconds of a processor
 SLOW = (
-    *(f"docs/{page}.md" for page in ("ways/sweep", "howto/suite", "howto/masks")),
+    *(
+        f"docs/{page}.md"
+        for page in ("ways/sweep", "howto/suite", "howto/masks", "howto/report")
+    ),
     *(
         "docs/reference/settings.md",
         "docs/notebooks/array_to_angles.ipynb",
@@ -74,7 +77,12 @@ def test_the_blocks_of_a_page_run_in_order_and_print_what_it_shows(
 
 
 def _prepare(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Put in `folder` what the blocks of slow runs need: the video, and the page's own optimiser as installed."""
+    """Put in `folder` what the blocks of slow runs need.
+
+    These are the studies, the video, and the page's own optimiser as installed.
+    """
+    for name in ("docs", "tests"):
+        (folder / name).symlink_to(ROOT / name)
     if VIDEO.is_dir():
         (folder / "sports2d/Sports2D").mkdir(parents=True)
         (folder / "sports2d/Sports2D/Demo").symlink_to(VIDEO)

@@ -10,7 +10,7 @@ import pytest
 
 import posefit
 from posefit.footage.cameras import calibrated, order_by_name, unit_of_heights
-from posefit.footage.segmentation import Extraction
+from posefit.footage.extraction import Extraction
 from posefit.footage.source import scene_of
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.units import METRES, UNIT_NAMES
@@ -30,6 +30,7 @@ from tests.footage.conftest import (
 )
 from tests.footage.test_footage import toml
 from tests.geometry import programs
+from tests.geometry.test_dialects import OF_ONE_UNIT
 
 AZIMUTHS = (np.pi / 2, 0.6)
 
@@ -126,18 +127,31 @@ def test_a_scene_that_was_reconstructed_has_the_scale_of_the_person(
     assert said.startswith("the calibration's unit is ")
 
 
-def test_a_file_in_millimetres_by_its_program_needs_no_unit(tmp_path: Path) -> None:
-    path = tmp_path / "a.xcp"
-    path.write_text(programs.vicon())
+@pytest.mark.parametrize("program", OF_ONE_UNIT)
+def test_a_file_whose_program_writes_one_unit_needs_none(
+    tmp_path: Path, program: str
+) -> None:
+    write, suffix, _ = programs.SAMPLES[program]
+    path = tmp_path / f"left{suffix}"
+    path.write_text(write())
     masks = np.zeros((2, 480, 640), dtype=bool)
     masks[:, 100:400, 280:340] = True
     scene = scene_of([masks], camera=[path], height=1.7)
     np.testing.assert_allclose(scene.cameras[0].position, [0, 1, 4], atol=1e-6)
     assert not [guess for guess in scene.guesses if "calibration is in" in guess]
     with pytest.raises(
-        ValueError, match="unit must be left out for 'left', whose file"
+        ValueError, match="unit must be left out for 'left', whose unit"
     ):
         scene_of([masks], camera=[path], height=1.7, unit="mm")
+
+
+def test_a_place_that_was_added_to_a_chain_may_be_in_any_unit(tmp_path: Path) -> None:
+    path = tmp_path / "left.yaml"
+    path.write_text(programs.kalibr(rvec=[np.pi / 2, 0.0, 0.0], tvec=[0, 1000, 4000]))
+    masks = np.zeros((2, 480, 640), dtype=bool)
+    masks[:, 100:400, 280:340] = True
+    scene = scene_of([masks], camera=[path], height=1.7)
+    assert "the calibration is in millimetres" in scene.guesses
 
 
 def test_a_camera_under_the_floor_is_doubted(tmp_path: Path) -> None:

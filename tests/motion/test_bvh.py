@@ -89,7 +89,7 @@ def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None
         (
             "JOINT LeftLeg",
             "JOINT Knot",
-            r"expected a BVH file with a person's joints, got one without left shin",
+            r"expected a BVH file with a person's joints, got a person without left shin",
         ),
         ("JOINT RightHand\n", "JOINT A\n", "got one without right hand"),
         ("Frames: 6", "Frames: 7", "bvh:[0-9]+: expected 7 frames, got 6"),
@@ -301,11 +301,11 @@ def test_a_stature_that_nobody_has_is_refused_or_said(tmp_path: Path) -> None:
     path = write_rig(tmp_path / "a.bvh", walk, STYLES["motionbuilder"], 3e-3)
     with pytest.raises(
         ValueError,
-        match=r"a.bvh: expected a person of a stature .* --unit m\|cm.*, got one of 0.005",
+        match=r"a.bvh: expected a person whose height is plausible .* --unit m\|cm.*, got a height of 0.005",
     ):
         read_bvh(path)
     (note,) = read_bvh(path, unit="cm").notes
-    assert "stands 0.00 m with lengths in centimetres" in note
+    assert "with lengths in centimetres the person is 0.00 m tall" in note
     with pytest.raises(
         ValueError, match="unit must be one of m, cm, mm, inch, foot, cmu, got 'ell'"
     ):
@@ -435,4 +435,4 @@ def test_the_other_people_of_a_file_are_named(tmp_path: Path, below: str) -> Non
     np.testing.assert_allclose(two.joints, one.joints, atol=1e-6)
     assert not any("left out" in note for note in one.notes)
     (note,) = [note for note in two.notes if "left out" in note]
-    assert "the person of 'Hips' is read; 'Partner_Hips' left out" in note
+    assert "the person with the root 'Hips' is read, 'Partner_Hips' left out" in note

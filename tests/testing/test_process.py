@@ -183,7 +183,7 @@ def test_a_thread_that_a_plugin_leaves_running_does_not_keep_a_track_from_ending
     assert ran.returncode == 0
     assert (
         ran.stderr.splitlines()[-1]
-        == "posefit: not waiting for what a plugin left running: planted"
+        == "posefit: not waiting for threads that a plugin left running: planted"
     )
 
 
