@@ -312,6 +312,17 @@ def optimiser(name: str) -> "OptimiserFactory":
     Raises:
         InputError: there is none; the message lists the known names.
         ImportError: a library that it needs is not installed.
+
+    Args:
+        name: The optimiser's name, such as "sapso", or "nevergrad:DE".
+
+    Returns:
+        The factory, which takes a space, a generator and settings.
+
+    Example:
+        >>> import posefit
+        >>> posefit.optimiser("sapso").__name__
+        'SAPSO'
     """
     return registry().optimiser(name)
 
@@ -322,6 +333,19 @@ def prior(name: str) -> "PriorFactory":
     Raises:
         InputError: there is none; the message lists the known names.
         ImportError: a library that it needs is not installed.
+
+    Args:
+        name: The prior's name, such as "pca".
+
+    Returns:
+        The factory, which takes settings.
+
+    Example:
+        >>> import posefit
+        >>> poses = posefit.load_motion("walk-a").poses
+        >>> fitted = posefit.prior("pca")(components=3).fit(poses[:, 3:])
+        >>> fitted.low.shape
+        (3,)
     """
     return registry().prior(name)
 

@@ -133,6 +133,16 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     Args:
         skeleton: the skeleton.
         poses: successive poses (T, 66).
+
+    Returns:
+        The angles (T,) in degrees by name.
+
+    Example:
+        >>> from posefit import clinical_angles, load_motion
+        >>> walk = load_motion("16_15")
+        >>> angles = clinical_angles(walk.skeleton, walk.poses)
+        >>> round(float(angles["left_knee_flexion"].max()), -1)
+        70.0
     """
     segments = segment_rotations(skeleton, poses)
     columns: dict[str, Array] = {}

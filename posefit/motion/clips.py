@@ -135,6 +135,15 @@ def load_motion(
     Raises:
         InputError: there is no such motion, or unit or up is given for a source that is
             not a file.
+
+    Returns:
+        The motion.
+
+    Example:
+        >>> from posefit import load_motion
+        >>> motion = load_motion("walk", fps=60.0)
+        >>> motion.fps, motion.poses.shape[1]
+        (60.0, 66)
     """
     suffix = ""
     if not isinstance(source, Motion) and source not in built_in.names():

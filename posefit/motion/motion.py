@@ -40,6 +40,14 @@ class Motion:
     Raises:
         InputError: an array has a wrong shape or is not finite, or the rate is not
             allowed.
+
+    Example:
+        >>> from posefit import Motion, load_motion
+        >>> walk = load_motion("walk")
+        >>> places = walk.translations[:5]
+        >>> part = Motion("part", walk.skeleton, walk.poses[:5], places, 30.0)
+        >>> len(part), part.joints.shape
+        (5, (5, 27, 3))
     """
 
     name: str

@@ -118,6 +118,17 @@ class Ledger:
 
     Raises:
         InputError: There is no ledger, it is damaged, or it cannot be read here.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> import posefit
+        >>> few = {"seeds": 1, "frames": 2, "evaluations": 40}
+        >>> with TemporaryDirectory() as folder:
+        ...     out = f"{folder}/results"
+        ...     result = posefit.compare(["random@pca"], out=out, **few)
+        ...     with posefit.Ledger(out) as ledger:
+        ...         print(len(list(ledger.rows())))
+        1
     """
 
     def __init__(self, *paths: str | Path) -> None:

@@ -49,6 +49,12 @@ def check_optimiser(
 
     Returns:
         The report. It is true if no check failed.
+
+    Example:
+        >>> import posefit
+        >>> from posefit.plugin import check_optimiser
+        >>> check_optimiser(posefit.optimiser("random")).of("failed")
+        []
     """
     return run_checks(factory, checks_of("optimiser", factory, settings, next_frame))
 
@@ -62,6 +68,12 @@ def check_prior(factory: Factory, *, settings: Settings = None) -> Report:
 
     Returns:
         The report. It is true if no check failed.
+
+    Example:
+        >>> import posefit
+        >>> from posefit.plugin import check_prior
+        >>> check_prior(posefit.prior("pca")).of("failed")
+        []
     """
     return run_checks(factory, checks_of("prior", factory, settings))
 

@@ -91,7 +91,7 @@ def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None
             "JOINT Knot",
             r"expected a BVH file with a person's joints, got a person without left shin",
         ),
-        ("JOINT RightHand\n", "JOINT A\n", "got one without right hand"),
+        ("JOINT RightHand\n", "JOINT A\n", "got a person without right hand"),
         ("Frames: 6", "Frames: 7", "bvh:[0-9]+: expected 7 frames, got 6"),
         (
             f"Frame Time: {1 / 120!r}",
@@ -228,7 +228,7 @@ def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     motion = read_bvh(write_rig(tmp_path / "rig.bvh", walk, STYLES["vrm"]))
     (note,) = motion.notes
     assert (
-        "without ltoes, rtoes, upperneck, head, lwrist, lhand, rwrist, rhand, which are"
+        "the file lacks ltoes, rtoes, upperneck, head, lwrist, lhand, rwrist, rhand; they are"
         in note
     )
     forwards = (
@@ -244,7 +244,7 @@ def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())  # as some editors save it
     short = read_bvh(path)
     assert (
-        "without lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand, which are"
+        "the file lacks lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand; they are"
         in short.notes[0]
     )
     above = [
