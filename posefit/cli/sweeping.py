@@ -58,11 +58,12 @@ def sweep(
 
     seconds = places.pop("cell_seconds")
     gigabytes = places.pop("cell_gigabytes")
-    start = command.engine(Limits(seconds, gigabytes), **places)
+    limits = Limits(seconds, gigabytes)
+    start = command.engine(limits, **places)
     if dry_run:
         # a plugin may print, too
         with results_alone() if as_json else nullcontext():
-            preview = previewing.preview(plan, out, shard)
+            preview = previewing.preview(plan, out, shard, limits)
         line = previewing.time_line(preview.seconds, places["workers"] or cores())
         value = {"cells": preview.cells, "seconds": preview.seconds}
         return print_result([*preview.lines, line], value, as_json)

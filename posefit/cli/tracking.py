@@ -210,7 +210,7 @@ def extract(
     at the same time.
     """
     from posefit.footage.extract import extract as run
-    from posefit.footage.segmentation import Extraction
+    from posefit.footage.extraction import Extraction
     from posefit.footage.source import resolve
 
     resolved = resolve(source)
@@ -283,7 +283,7 @@ def extraction_of(
         InputError: The options are given for a source that is not segmented.
 
     """
-    from posefit.footage.segmentation import Extraction, segmenter_name
+    from posefit.footage.extraction import Extraction, segmenter_name
     from posefit.footage.source import useless_for
     from posefit.registry import registry
     from posefit.settings import parse_texts

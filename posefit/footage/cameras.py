@@ -12,6 +12,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError, NoPersonError
+from posefit.footage.facing import yaws_of
 from posefit.footage.images import IMAGES
 from posefit.footage.people import Persons, part_at, paste
 from posefit.footage.quality import (
@@ -39,9 +40,6 @@ from posefit.reading import cut, quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
-AROUND = 0.5  # seconds before and after a frame over which facings are averaged
-# least length of the mean of unit vectors: shorter means that facings contradict
-AGREEMENT = 0.6
 GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
 # distance of a camera from its world's origin, in the calibration's unit. Above FAR the
 # unit cannot be metres, and above FARTHER not even centimetres
@@ -443,31 +441,6 @@ def unit_of_heights(ratio: float) -> Unit:
 
     """
     return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
-
-
-def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Array:
-    """Return about which way a person faces in each frame (T,), NaN if unknown.
-
-    Angles are radians about the vertical. Each is the mean direction over the second
-    around its frame, so that a few wrong facings do not count.
-
-    Args:
-        facings: (T,) as `Segmenter.facing`.
-        camera: The camera that they are relative to.
-        fps: Frames per second.
-
-    """
-    values = np.asarray(facings, dtype=np.float64)
-    reach = max(round(AROUND * fps), 1)
-    towards = np.arctan2(-camera.rotation[2, 0], -camera.rotation[2, 2])
-    known = np.isfinite(values)
-    directions = np.where(known, np.exp(1j * (np.nan_to_num(values) + towards)), 0.0)
-    around = [slice(max(k - reach, 0), k + reach + 1) for k in range(len(values))]
-    total = np.array([directions[rows].sum() for rows in around])  # (T,) complex
-    count = np.array([known[rows].sum() for rows in around])
-    # the limit excludes frames without any facing, whose total is 0
-    agrees = np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9)
-    return np.where(agrees, np.angle(total), np.nan)
 
 
 def _unequal(views: Sequence[View]) -> list[str]:

@@ -14,8 +14,10 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.files import check_new, new_folder, opencv_name
 from posefit.footage.cleaning import cleaned
+from posefit.footage.extraction import Extraction
+from posefit.footage.scanner import Progress
 from posefit.footage.scene import observed_views
-from posefit.footage.segmentation import Extraction, Progress, Segmentation
+from posefit.footage.segmentation import Segmentation
 from posefit.footage.source import (
     Resolved,
     films_of,

@@ -29,6 +29,7 @@ from posefit.footage.cameras import (
     world_of,
 )
 from posefit.footage.cleaning import cleaned
+from posefit.footage.extraction import Extraction
 from posefit.footage.images import IMAGES, PAGED, is_photo, page_count
 from posefit.footage.people import Choice
 from posefit.footage.readers import (
@@ -44,7 +45,7 @@ from posefit.footage.readers import (
     together,
 )
 from posefit.footage.scene import Scene, synthetic
-from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
 from posefit.footage.views import Range, View
 from posefit.geometry.body import Body
@@ -569,7 +570,7 @@ def _of_films(
 
 
 def _taken_out(
-    parts: Sequence[Segmentation],
+    parts: list[Segmentation],
     known: Sequence[Camera | Calibration],
     progress: Progress,
 ) -> list[View]:
@@ -578,7 +579,9 @@ def _taken_out(
     Raises NoPersonError if a film's masks cannot be a person's.
     """
     views = list[View]()
-    for k, part in enumerate(parts):
+    for k in range(len(parts)):
+        # a background and the kept frames take much memory: each is freed after use
+        part = parts.pop(0)
         progress.log(f"segmenting {part.video.path} by {part.how.name}")
         choose = None
         if views:
@@ -592,7 +595,8 @@ def _taken_out(
         view, _, doubt = part.read(progress.steps, choose)
         if doubt is not None and doubt.refused:
             raise NoPersonError(doubt.text)
-        views.append(view)
+        # a track shows the pictures of the first camera only
+        views.append(replace(view, pictures=None) if views else view)
     return views
 
 

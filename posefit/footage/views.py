@@ -32,6 +32,8 @@ MOST = 0.5
 Range = tuple[int | None, int | None]
 # (T, bytes): the pixels of each frame as bits, row by row; unused bits at the end are 0
 Planes = NDArray[np.uint8]
+# the fields of a `View` with one row per frame; some may be None
+PER_FRAME = ("numbers", "times", "bits", "known", "usable", "landmarks", "facings")
 # cache of decoded masks: large enough for a short film
 DECODED_BYTES = 64_000_000
 # a decoded silhouette per pixel: two arrays of bytes, and two of bits
@@ -74,8 +76,9 @@ class View:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only, because several views share them."""
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
+        for name in PER_FRAME:
+            value = getattr(self, name)
+            if value is not None:
                 value.flags.writeable = False
 
     def __len__(self) -> int:
@@ -84,19 +87,20 @@ class View:
     def __getitem__(self, rows: slice) -> "View":
         """Return the view of a slice of its frames, counted from 0."""
         cut: dict[str, Any] = {}
-        for name in self._array_names():
-            cut[name] = getattr(self, name)[rows]
+        for name in PER_FRAME:
+            value = getattr(self, name)
+            cut[name] = None if value is None else value[rows]
         return replace(self, **cut)
-
-    def _array_names(self) -> list[str]:
-        """Return the names of the fields that hold one row per frame."""
-        fields = vars(self).items()
-        return [name for name, value in fields if isinstance(value, np.ndarray)]
 
     def silhouette(self, k: int) -> Silhouette:
         """Decode and return the silhouette of frame k, counted from 0."""
         known = None if self.known is None else unpacked(self.known[k], self.size)
         return Silhouette.of(unpacked(self.bits[k], self.size), known)
+
+    def masks(self) -> Iterator[Mask]:
+        """Decode and yield the mask of each frame."""
+        for bits in self.bits:
+            yield unpacked(bits, self.size)
 
     @property
     def shows(self) -> NDArray[np.bool_]:
@@ -107,11 +111,26 @@ class View:
 
 
 def joined(views: Sequence[View]) -> View:
-    """Return one view of all frames of several views, in order, without pictures."""
-    arrays: dict[str, Any] = {}
-    for name in views[0]._array_names():
-        arrays[name] = np.concatenate([getattr(view, name) for view in views])
-    return replace(views[0], **arrays, pictures=None)
+    """Return one view of all frames of several views, in order, without pictures.
+
+    What some of the views do not know is None in the joined one, except for `known`.
+    """
+    if any(view.known is not None for view in views):
+        views = [_with_known(view) for view in views]
+    rows: dict[str, Any] = {}
+    for name in PER_FRAME:
+        values = [getattr(view, name) for view in views]
+        rows[name] = None
+        if all(value is not None for value in values):
+            rows[name] = np.concatenate(values)
+    return replace(views[0], **rows, pictures=None)
+
+
+def _with_known(view: View) -> View:
+    """Return a view that states which pixels are known."""
+    if view.known is not None:
+        return view
+    return replace(view, known=full_planes(len(view), view.size))
 
 
 def times_of(numbers: NDArray[np.int64], fps: float | None) -> Array:

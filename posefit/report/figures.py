@@ -10,7 +10,7 @@ from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
 from posefit.report.charts import Chart, track_charts
 from posefit.report.columns import Score
-from posefit.report.kind import Row, Runs
+from posefit.report.contest import Row, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.page import LIGHT
 from posefit.report.table import board_rows

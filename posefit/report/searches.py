@@ -11,7 +11,7 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, mean, median
-from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.statistics.means import mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
@@ -71,7 +71,7 @@ SCORE = Score(
 
 
 class Searches:
-    """The kind of runs of single searches."""
+    """The kind of runs of single searches, with the attributes of `Tracks`."""
 
     name = "search"
     noun = "searches"
@@ -273,4 +273,4 @@ def _function(number: int) -> str:
     return f"{number} {suite_function(number).name}"
 
 
-SEARCHES: Kind = Searches()
+SEARCHES = Searches()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import listed, p_text
-from posefit.report.kind import Contest, Row
+from posefit.report.contest import Contest, Row
 from posefit.statistics.paired import POWER, SIGNIFICANCE
 
 # If a difference would take more seeds or instances, the methods are practically equal.

@@ -17,8 +17,9 @@ from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed, mean
-from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
+from posefit.report.repeat import command_head
 from posefit.statistics.means import block_means
 from posefit.uncertainty.calibration import BINS
 
@@ -148,7 +149,18 @@ SCORE = Score(
 
 
 class Tracks:
-    """The kind of runs of tracks."""
+    """The kind of runs of tracks.
+
+    Attributes:
+        name: The kind's name, in the singular.
+        noun: Its runs, in the plural.
+        title: The title of the page.
+        columns: Its figures by name.
+        score: The figure that orders the methods.
+        named: The fields that an instance's name contains.
+        data: The names of a row's other data.
+        baselines: The label of each baseline by name.
+    """
 
     name = "track"
     noun = "tracks"
@@ -164,7 +176,10 @@ class Tracks:
     def read(
         self, row: Row, shared: dict[bytes, Any], /
     ) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data."""
+        """Return the figures of a row and its other data.
+
+        `shared` holds arrays that many rows have in common, to save memory.
+        """
         used = np.array(row["trace"]["evaluations"], np.float32)
         # many rows have the same evaluations in their traces
         used = shared.setdefault(used.tobytes(), used)
@@ -306,10 +321,11 @@ class Tracks:
         instances = []
         for name, place in zip(runs.instances, runs.places, strict=True):
             instances.append({"name": name, "number": _exact(place["instance"])})
+        heads, head = _heads(runs)
         rows = {
             "method": runs.method,
             "instance": runs.instance,
-            "head": runs.head,
+            "head": head,
             "seed": runs.seed,
             **{name: runs.figures[name] for name in runs.table_figures},
             "key": [key[:8] for key in runs.keys],
@@ -321,8 +337,22 @@ class Tracks:
             "instances": instances,
             "rows": rows,
             "seeds": [_exact(seed) for seed in runs.seeds],
-            "heads": runs.heads,
+            "heads": heads,
         }
+
+
+def _heads(runs: Runs) -> tuple[list[str], list[int]]:
+    """Return the beginnings of the commands that run rows again, and each row's index.
+
+    Rows that differ only in their last fields have the same beginning.
+    """
+    pairs = list(zip(runs.method.tolist(), runs.instance.tolist(), strict=True))
+    commands = {}
+    for m, i in set(pairs):
+        commands[m, i] = command_head({**runs.variants[m], **runs.places[i]})
+    heads = sorted(set(commands.values()))
+    index = {head: k for k, head in enumerate(heads)}
+    return heads, [index[commands[pair]] for pair in pairs]
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:
@@ -368,4 +398,4 @@ def _exact(number: int) -> int | str:
     return number if abs(number) < 2**53 else str(number)
 
 
-TRACKS: Kind = Tracks()
+TRACKS = Tracks()

@@ -9,7 +9,7 @@ from posefit.files import check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.content import data_of
-from posefit.report.kind import Kind
+from posefit.report.contest import Kind
 from posefit.report.page import MARK, document
 from posefit.report.runs import KINDS, runs_of
 from posefit.report.table import LATEX_MARK, board_lines, latex_table
@@ -89,7 +89,6 @@ def write_report(
         "out": out,
         "kind": runs.kind.name,
         **dict(plain({name: data[name] for name in PRINTED if name in data})),
-        "gaps": data["header"]["dropped"],
     }
 
 

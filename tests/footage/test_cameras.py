@@ -10,7 +10,7 @@ import pytest
 
 import posefit
 from posefit.footage.cameras import calibrated, order_by_name, unit_of_heights
-from posefit.footage.segmentation import Extraction
+from posefit.footage.extraction import Extraction
 from posefit.footage.source import scene_of
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.units import METRES, UNIT_NAMES

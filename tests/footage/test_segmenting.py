@@ -14,13 +14,10 @@ import pytest
 from posefit.errors import InputError, NoPersonError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage import source
-from posefit.footage.cameras import yaws_of
+from posefit.footage.extraction import Extraction
+from posefit.footage.facing import facings_on_the_spot, yaws_of
 from posefit.footage.quality import FrameQuality, Verdict, moved_pixels, verdict
-from posefit.footage.segmentation import (
-    Extraction,
-    Segmentation,
-    facings_on_the_spot,
-)
+from posefit.footage.segmentation import Segmentation
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.footage.views import View
@@ -113,7 +110,8 @@ def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_th
         registry().offers["segmenter"]["mediapipe"], factory=Network, needs=None
     )
     installed = Registry((*plugins, plugins[0]._replace(offers=(offer,))))
-    monkeypatch.setattr("posefit.footage.segmentation.registry", lambda: installed)
+    for module in ("extraction", "segmenter"):
+        monkeypatch.setattr(f"posefit.footage.{module}.registry", lambda: installed)
     target = np.array([0.0, 0.9, 0.0])
     around = [
         Camera.around(target, 0.5 * k, 4.0, Video.of(path).size) for k in range(cameras)

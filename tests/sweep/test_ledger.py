@@ -252,7 +252,7 @@ def test_a_lock_file_that_is_not_posefits_stays_as_it_is(
     else:
         name.mkdir()
     with pytest.raises(
-        ValueError, match="driver: expected|expected a file that can be"
+        ValueError, match="driver: expected|expected a ledger that can be"
     ):
         Writer(folder / FILE)
     assert mine.read_text() == "mine"

@@ -12,8 +12,8 @@ import pytest
 import posefit
 from posefit import Problem, minimise
 from posefit.fitting.validation import BrokenRuleError
+from posefit.footage.extraction import Extraction
 from posefit.footage.scene import synthetic
-from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.motion import built_in, recorded
 from posefit.progress import Progress

@@ -86,7 +86,10 @@ function chart(width, lines, { x_label, y_label, most, log }) {
       14,
       30,
       height - 42,
-    ).forEach((place, k) => svg.append(drawText(width - longest - 8, place + 4, METHODS[lines[k].m])));
+    ).forEach((place, k) => {
+      const style = `fill: ${colour(lines[k].m)}`;
+      svg.append(drawText(width - longest - 8, place + 4, METHODS[lines[k].m], { style }));
+    });
   return svg;
 }
 

@@ -16,7 +16,7 @@ const methodColumn = (of) => {
 };
 const buttonColumn = (title, show) => ({ title, text: true, show });
 const intervalColumn = (about, of, digits, [low, high] = ["low", "high"]) => {
-  const ends = (row) => `${number(row[low], digits)} – ${number(row[high], digits)}`;
+  const ends = (row) => `${number(row[low], digits)} to ${number(row[high], digits)}`;
   return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : "–") };
 };
 const bad = (count) => make("span", { class: count ? "bad" : null }, whole(count));
