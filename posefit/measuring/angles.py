@@ -1,9 +1,9 @@
 """Clinical joint angles, in degrees: of hip, knee and ankle, of shoulder and elbow.
 
 Each is zero in the anatomical position, and has the same sign on both sides of the
-body. The axes are those of `posefit.measuring.segments`. The shoulder's plane and
-rotation are undefined if the arm hangs straight down, like longitudes at a pole; near
-that pose they are left out.
+body. `posefit.measuring.segments` defines the axes. The shoulder's plane and rotation
+are undefined if the arm hangs straight down, like longitudes at a pole; near that pose
+they are left out.
 """
 
 from collections.abc import Iterator

@@ -35,7 +35,7 @@ class FileOptions(NamedTuple):
         unit: length unit; None to recognise it.
         up: axis that points up; None for y, or in a .bvh file for the axis along which
             the person stands.
-        rate: frames per second of an .amc file; None for what it states, or 120.
+        rate: frames per second of an .amc file; None for the stated rate, or 120.
     """
 
     asf: str | Path | None = None

@@ -35,7 +35,7 @@ class Motion:
         fps: frames per second.
         first: number of the first frame, in the footage or in the longer motion that
             this one was cut from.
-        notes: what was guessed when a file was read.
+        notes: the guesses that were made when a file was read.
 
     Raises:
         InputError: an array has a wrong shape or is not finite, or the rate is not

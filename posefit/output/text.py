@@ -133,7 +133,7 @@ def held_frames(track: Content) -> str:
 
 
 def undetermined(track: Content) -> str:
-    """Return one sentence about what the method did not determine, or ""."""
+    """Return one sentence about everything that a method left undetermined, or ""."""
     sides = len(track.log.unknown_sides or ())
     lost = len(track.log.lost_frames or ())
     of = f" of {track.setup.frames}"

@@ -158,7 +158,7 @@ def compare(
     if factories and folder.exists():
         names = ", ".join(factories)
         say(
-            f"cells of {names} run again, whatever {folder} holds: "
+            f"cells of {names} run again, although {folder} may hold them: "
             "only rows of registered methods are reused"
         )
     pool = Pool(

@@ -232,7 +232,7 @@ class Ledger:
         file = self._open[self._places[key][0]][0]
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
-            f"{file}: the row of cell {name} must be one that posefit wrote: "
+            f"{file}: the row of cell {name} must be written by posefit: "
             f"{cut(text_of(error))}; "
             f'to run it again: sqlite3 {FILE} "{statement}"'
         )

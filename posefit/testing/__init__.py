@@ -44,7 +44,7 @@ def check_optimiser(
 
     Args:
         factory: takes (space, rng) and keyword-only settings.
-        next_frame: what the optimiser does at a new frame, as it is registered.
+        next_frame: the registered treatment of the optimiser at a new frame.
         settings: passed to the factory.
 
     Returns:
@@ -85,7 +85,7 @@ def check_tracker(
 
     Args:
         factory: takes (task) and keyword-only settings.
-        looks_ahead: whether the tracker reads later frames first, as it is registered.
+        looks_ahead: whether the tracker is registered to read later frames first.
         settings: passed to the factory.
 
     Returns:
