@@ -8,8 +8,8 @@
 | Nevergrad | nevergrad_function | a function of its benchmarks |
 
 The problem's `infeasible` decides the cost of an infeasible proposal. Each result has
-an attribute `problem`, the suite's problem with its trace. Let the tool hold the budget: a
-problem's budget ends the tool's loop with an error.
+an attribute `problem`, the suite's problem with its trace. Let the tool hold the
+budget: a problem's budget ends the tool's loop with an error.
 
 >>> import posefit
 >>> from posefit_bridges.problems import pymoo_problem
