@@ -302,7 +302,7 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
             ["16_999"],
             "motion must be a file, a folder, a recorded motion that posefit motions lists, or one of walk, ",
         ),
-        (["library"], "a recorded one that posefit motions lists, or one of walk, "),
+        (["library"], "a recorded motion that posefit motions lists, or one of walk, "),
         (["lost/"], "lost: expected a file or a folder, got nothing of that name"),
         (
             ["walk", "--train", "lost/"],
