@@ -168,7 +168,7 @@ def check_decoded(name: str, size: int) -> None:
 def allowed_bytes() -> int:
     """Return the memory in bytes that this process may use.
 
-    It is the least of what the machine, its container and the process' limits allow.
+    It is the least of the limits of the machine, its container and the process.
     """
     limits = []
     with suppress(ImportError):

@@ -102,7 +102,7 @@ def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[
 
 @contextmanager
 def results_alone() -> Iterator[None]:
-    """Send to stderr whatever the body prints, because stdout is for results.
+    """Send the body's prints to stderr, because stdout is for results.
 
     That includes compiled code and other processes.
     """

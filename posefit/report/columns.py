@@ -95,7 +95,7 @@ class Score:
         points: The unit of differences between values.
         digits: Its digits after the point.
         down: Whether a higher value is better.
-        paired: What the tests pair, in the plural: runs or instances.
+        paired: The blocks of paired tests, in the plural: runs or instances.
         caption: The caption of the first figure.
         leaderboard: The text above the leaderboard.
     """

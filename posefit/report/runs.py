@@ -118,8 +118,8 @@ def runs_of(
         ledger: An open ledger, of tracks or of single searches.
         methods: The methods whose runs are returned, by their names in the report or in
             the plan. All if empty.
-        latest: Whether to return only one version of each method: the installed one, or
-            else the one that was planned last.
+        latest: Whether to return only one version of each method: the installed
+            version, or else the one planned last.
 
     Returns:
         The runs, and the failures. If every cell failed, there are no runs.
@@ -230,7 +230,7 @@ def _positions(order: Sequence[int], count: int) -> "Array":
 def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
     """Return one version of each method, by their indices.
 
-    It is the installed version, or else the one that was planned last.
+    It is the installed version, or else the one planned last.
     """
     best: dict[str, tuple[bool, int]] = {}
     for m, variant in enumerate(variants):

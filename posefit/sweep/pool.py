@@ -42,7 +42,7 @@ class Pool:
         self._count = workers
         self._limits = limits
         self._task = cloudpickle.dumps((run, prepare))
-        self._workers: list[Worker] = []  # the one that was used last is last
+        self._workers: list[Worker] = []  # by the time of their last use
 
     def window(self) -> int:
         """Return how many jobs may run at a time."""

@@ -34,7 +34,7 @@ from posefit.limits import end_with_parent, memory
 from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
 MARK = "POSEFIT_WORKER"  # the environment variable of a process' mark
-BEGUN = b""  # what a worker sends when it begins a job
+BEGUN = b""  # a worker sends this when it begins a job
 END_SECONDS = 1.0  # the longest that a process without a connection takes to end
 _starting = threading.Lock()
 # all signals but the two that no process can handle
@@ -232,7 +232,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 @contextmanager
 def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards what the body changes in this process.
+    """Undo afterwards the changes that the body makes in this process.
 
     These are the folder, the environment variables, `sys.path`, the signal handlers,
     the global random numbers and NumPy's handling of floating-point errors. A worker
@@ -256,7 +256,7 @@ def left_as_it_was() -> Iterator[None]:
             os.environ.update(variables)
         sys.path[:] = path
         for number, before, now in zip(_SIGNALS, handlers, _handlers(), strict=True):
-            # None stands for a handler that Python did not install
+            # None means a handler that Python did not install
             if before is not None and now != before:
                 signal.signal(number, before)
         random.setstate(numbers)

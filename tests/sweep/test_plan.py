@@ -310,7 +310,7 @@ def test_a_file_that_changed_after_it_was_planned_is_not_followed(
         run_cell(cell)
 
 
-def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_evaluations() -> (
+def test_a_trace_is_the_mean_best_cost_of_the_frames_after_each_number_of_evaluations() -> (
     None
 ):
     def frame(costs: list[float], step: int) -> Frame:

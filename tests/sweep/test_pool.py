@@ -118,7 +118,7 @@ def test_a_process_that_ends_itself_or_dies_is_noticed_at_once_and_a_kill_costs_
     ]
 
 
-def test_the_processors_counted_are_those_of_this_process(
+def test_the_processors_of_this_process_are_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # 0 is this process; another may have all of the machine
@@ -187,7 +187,7 @@ def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
     wait_until(lambda: not any(is_running(states[0]) for states in found))
 
 
-def test_a_process_that_ran_jobs_of_one_tenant_runs_none_of_another(
+def test_a_process_runs_jobs_of_one_tenant_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("posefit.sweep.pool.SPARE", 1)
@@ -376,7 +376,7 @@ def test_dask_workers_without_this_posefit_are_refused_before_a_cell_is_lost(
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on(
+def test_a_lost_scheduler_leaves_all_rows_and_the_same_command_continues(
     tmp_path: Path,
 ) -> None:
     with ExitStack() as served, Writer(tmp_path / "results" / FILE) as ledger:
