@@ -12,6 +12,7 @@ from posefit.report.coco import write_coco
 from posefit.report.content import data_of
 from posefit.report.kind import Kind
 from posefit.report.page import MARK, document
+from posefit.report.repeat import repeat_command
 from posefit.report.runs import KINDS, runs_of
 from posefit.report.table import LATEX_MARK, board_lines, latex_table
 from posefit.sweep.ledger import Ledger
@@ -128,14 +129,18 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
 
 
 def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the CSV file, with the figures that are computed from a row."""
+    """Yield the rows of the CSV file.
+
+    They also have the figures that are computed from a row, and the command that
+    repeats it.
+    """
     for row in ledger.all_rows():
         columns = flat(row)
         if row["status"] == "done":
             for column in kind.columns.values():
                 if column.compute is not None:
                     columns[column.name] = column.value(row)
-        yield columns
+        yield {**columns, "command": repeat_command(row["spec"])}
 
 
 def _check_files(files: Sequence[tuple[str | None, str]]) -> None:
