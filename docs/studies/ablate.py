@@ -130,6 +130,9 @@ MECHANISMS: Mapping[str, Change] = {
         "path.SIMILAR_YAW": 1e-6,
     },
     "half as many states": {"proposals.BEAM_STATES": 200},
+    "a yaw bin has a sixteenth of the candidates": {"proposals.YAW_SHARES": 16},
+    "no steps that cost more than a jump": {"proposals.MAX_EXCESS_COST": 0.0},
+    "half as many searches everywhere": {"path.SEARCHES_PER_SECOND": 5.0},
     "only the nearest group is searched": {"exemplars.NEAR_GROUPS": 1},
     "half of the evaluations": {f"{CELL}.evaluations": EVALUATIONS // 2},
 }
