@@ -15,17 +15,12 @@ from posefit.errors import InputError
 from posefit.files import check_new, new_folder, opencv_name
 from posefit.footage.cleaning import cleaned
 from posefit.footage.extraction import Extraction
+from posefit.footage.kinds import Resolved, resolve
 from posefit.footage.scanner import Progress
 from posefit.footage.scene import observed_views
 from posefit.footage.segmentation import Segmentation
-from posefit.footage.source import (
-    Resolved,
-    films_of,
-    resolve,
-    scene_of,
-    useless_for,
-    views_of_masks,
-)
+from posefit.footage.source import films_of, scene_of, views_of_masks
+from posefit.footage.uses import useless_for
 from posefit.footage.video import VideoWriter
 from posefit.footage.views import Range, View, border_of
 from posefit.motion.clips import FPS

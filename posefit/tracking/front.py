@@ -12,15 +12,11 @@ from typing import Any, TypeGuard
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
+from posefit.footage.kinds import Resolved, first_of, resolve
+from posefit.footage.named import Footage
 from posefit.footage.scene import Scene
-from posefit.footage.source import (
-    Footage,
-    Resolved,
-    check_used,
-    first_of,
-    resolve,
-    scene_of,
-)
+from posefit.footage.source import scene_of
+from posefit.footage.uses import check_used
 from posefit.motion import built_in
 from posefit.motion.clips import (
     Source,

@@ -16,10 +16,13 @@ from threadpoolctl import threadpool_limits
 from posefit.errors import InputError
 from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.cameras import calibrated, combined, straightening
+from posefit.footage.cameras import combined
 from posefit.footage.live import Stream, live_views
+from posefit.footage.pairing import calibrated
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of, check_used, logged
+from posefit.footage.source import body_of, logged
+from posefit.footage.straightening import straightening
+from posefit.footage.uses import check_used
 from posefit.footage.views import Observations, View, joined
 from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress

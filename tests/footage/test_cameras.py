@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage.cameras import calibrated, order_by_name, unit_of_heights
 from posefit.footage.extraction import Extraction
+from posefit.footage.pairing import calibrated, order_by_name
 from posefit.footage.source import scene_of
+from posefit.footage.world import unit_of_heights
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.units import METRES, UNIT_NAMES
 from posefit.silhouette.cost import project

@@ -17,8 +17,9 @@ from posefit.footage import images
 from posefit.footage.cameras import combined
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import read_image, read_marks
-from posefit.footage.readers import Images
-from posefit.footage.source import body_of, resolve, scene_of
+from posefit.footage.kinds import resolve
+from posefit.footage.numbering import Images
+from posefit.footage.source import body_of, scene_of
 from posefit.footage.views import View
 from posefit.tracking.options import text_person
 from tests.cases import each

@@ -10,8 +10,10 @@ from PIL import Image
 
 from posefit.errors import InputError
 from posefit.footage.cleaning import cleaned
-from posefit.footage.readers import numbered
-from posefit.footage.source import resolve, scene_of, sources_of
+from posefit.footage.kinds import resolve
+from posefit.footage.named import sources_of
+from posefit.footage.numbering import numbered
+from posefit.footage.source import scene_of
 from posefit.progress import Progress
 from tests.cases import each
 from tests.footage.conftest import ALL, read_masks

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from posefit.files import opencv_name
-from posefit.footage.source import resolve, scene_of
+from posefit.footage.kinds import resolve
+from posefit.footage.source import scene_of
 from posefit.footage.video import Video, _rate
 from tests.cases import each
 from tests.commands import error_of

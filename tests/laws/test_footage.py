@@ -11,10 +11,11 @@ import pytest
 import posefit
 from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
+from posefit.footage.kinds import KINDS, Kind, resolve
 from posefit.footage.live import live_views
 from posefit.footage.readers import read_array
 from posefit.footage.scene import Scene
-from posefit.footage.source import KINDS, Kind, resolve, scene_of, views_of_masks
+from posefit.footage.source import scene_of, views_of_masks
 from posefit.footage.views import View, joined
 from posefit.progress import QUIET
 from tests.laws.sources import (
