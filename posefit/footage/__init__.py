@@ -1,9 +1,10 @@
 """Turn masks and videos into a `Scene`: the person, cameras and observations.
 
+    from posefit.footage.options import SourceOptions
     from posefit.footage.source import scene_of
 
     # two cameras see a built-in motion
-    scene = scene_of(["walk"], view_degrees=[0.0, 90.0])
+    scene = scene_of(["walk"], SourceOptions(view_degrees=[0.0, 90.0]))
     print(scene.count, scene.observations[0].silhouettes[1].mask.shape)
 
 Each row is one step, in one file:

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError, NoPersonError
+from posefit.fitting.tracker import Observation
 from posefit.footage.facing import yaws_of
+from posefit.footage.options import SourceOptions
 from posefit.footage.people import Persons, part_at, paste
 from posefit.footage.quality import (
     apparent_size,
@@ -17,13 +20,12 @@ from posefit.footage.quality import (
     meeting,
 )
 from posefit.footage.scene import Scene
-from posefit.footage.straightening import fitting, straight_view
+from posefit.footage.straightening import fitting, straightening
 from posefit.footage.views import Observations, View
 from posefit.footage.world import unit_by_height, world_of
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Up
+from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
-from posefit.geometry.units import Unit
 from posefit.motion.clips import FPS
 from posefit.silhouette.mask import Silhouette
 
@@ -33,13 +35,9 @@ LEAST_HEIGHT = 1e-9
 
 def combined(
     views: Sequence[View],
-    name: str,
     body: Body,
     known: Sequence[Camera | Calibration],
-    view_degrees: float | None,
-    up: Up | None,
-    fps: float | None = None,
-    unit: Unit | None = None,
+    options: SourceOptions,
 ) -> Scene:
     """Return the scene of what cameras saw at the same times.
 
@@ -48,21 +46,19 @@ def combined(
 
     Args:
         views: What each camera saw.
-        name: Name of the scene.
         body: The person's body.
         known: The cameras of `calibrated`. Empty for one view without a camera, which
             gets a guess: level, 40 degrees across.
-        view_degrees: Which way the person faces at first, relative to the first camera.
-        up: Which axis of the calibrations points up; None to guess it.
-        fps: Frames per second; None for what the views state.
-        unit: Unit of the calibrations; None to guess it.
+        options: `up` and `unit` of the calibrations, `fps`, and `view_degrees`: which
+            way the person faces at first, relative to the first camera.
 
     Raises:
         InputError: Views and cameras do not fit each other.
         NoPersonError: Several cameras cannot all see one person of this size.
 
     """
-    rate, stated = _rate(views, fps)
+    name = Path(views[0].name).stem
+    rate, stated = _rate(views, options.fps)
     guesses = [guess for view in views for guess in view.guesses]
     if not stated and len(views[0]) > 1:
         guesses.append(f"{rate:g} frames a second")
@@ -70,42 +66,23 @@ def combined(
         guesses.append(
             "a level camera, 40 degrees across: distances and sizes are as good as that"
         )
-    world, metres, of_cameras = world_of(known, up, unit)
-    if known:
-        cameras = []
-        straight = []
-        for camera, view in zip(known, views, strict=True):
-            without_distortion = straight_view(world, metres, camera, view)
-            cameras.append(without_distortion.camera)
-            straight.append(without_distortion.view)
-            guesses += without_distortion.said
-        views = straight
-    else:
-        cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)]
+    world, metres, of_cameras = world_of(known, options.up, options.unit)
+    cameras, views, said = _straightened(views, known, world, metres)
     # several cameras distinguish front and back themselves
     facings = views[0].facings if len(views) == 1 else None
     yaws = yaws_of(() if facings is None else facings, cameras[0], rate)
     observations = Observations(views, yaws)
-    apparent = apparent_sizes(observations, cameras) if len(views) > 1 else None
-    if apparent is not None:
-        miss, tall = apparent
-        if unit is None:
-            factor, guess = unit_by_height(miss, tall, known, metres, body.stature)
-            if guess:
-                of_cameras["unit"] = guess
-            cameras = [
-                replace(camera, translation=factor * camera.translation)
-                for camera in cameras
-            ]
-            miss = factor * miss
-            tall = factor * tall
-        if wrong := disagreement(miss, tall, body.stature):
-            raise NoPersonError(f"{name}: {wrong}")
+    if len(views) > 1:
+        unit = metres, options.unit is None
+        try:
+            cameras, guess = _of_one_size(
+                observations, cameras, known, unit, body.stature
+            )
+        except NoPersonError as error:
+            raise NoPersonError(f"{name}: {error}") from None
+        if guess:
+            of_cameras["unit"] = guess
     first = observations[observations.first]
-    yaw = first.yaw
-    if view_degrees is not None:
-        to_camera = -cameras[0].rotation[2]
-        yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
     warnings = [warning for view in views for warning in view.warnings]
     return Scene(
         name=name,
@@ -113,17 +90,98 @@ def combined(
         cameras=cameras,
         fps=rate,
         count=len(observations),
-        yaw=yaw,
+        yaw=_first_yaw(options.degrees, cameras[0], first),
         anchor=place_of(first.silhouettes, cameras, body.stature),
         truth=None,
         observations=observations,
         placing="given" if known else "guessed",
         warnings=[*warnings, *_unequal(views)],
-        guesses=[*guesses, *of_cameras.values()],
+        guesses=[*guesses, *said, *of_cameras.values()],
         pictures=views[0].pictures,
         first=int(views[0].numbers[0]),
         camera_moves=views[0].moves,
     )
+
+
+def _straightened(
+    views: Sequence[View],
+    known: Sequence[Camera | Calibration],
+    world: Array,
+    metres: float,
+) -> tuple[list[Camera], list[View], list[str]]:
+    """Return cameras without distortion, what they saw, and sentences for the user.
+
+    A camera that is not known is level, 40 degrees across. `world` and `metres` are the
+    axes and the unit of the calibrations, see `world_of`.
+    """
+    if not known:
+        guessed = Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)
+        return [guessed], [*views], []
+    cameras = list[Camera]()
+    straight = list[View]()
+    said = list[str]()
+    for each, view in zip(known, views, strict=True):
+        camera, how, words = straightening(each, view.size, view.filmed, world, metres)
+        cameras.append(camera)
+        straight.append(view if how is None else how.of(view))
+        said += words
+    return cameras, straight, said
+
+
+def _of_one_size(
+    observations: Observations,
+    cameras: Sequence[Camera],
+    known: Sequence[Camera | Calibration],
+    unit: tuple[float, bool],
+    stature: float,
+) -> tuple[list[Camera], str]:
+    """Return cameras in which the person is about as tall as they are.
+
+    Args:
+        observations: What the cameras saw.
+        cameras: The cameras without distortion.
+        known: The same cameras as the user gave them.
+        unit: The unit of the calibrations in metres, and whether it is a guess.
+        stature: The person's height in metres.
+
+    Returns:
+        The cameras, in another unit if that one was a wrong guess, and what to say
+        about it; "" if it was not.
+
+    Raises:
+        NoPersonError: The cameras cannot all see one person of this size.
+
+    """
+    apparent = apparent_sizes(observations, cameras)
+    if apparent is None:
+        return [*cameras], ""
+    miss, tall = apparent
+    metres, is_guess = unit
+    factor = 1.0
+    guess = ""
+    if is_guess:
+        factor, guess = unit_by_height(miss, tall, known, metres, stature)
+    if wrong := disagreement(factor * miss, factor * tall, stature):
+        raise NoPersonError(wrong)
+    scaled = [
+        replace(camera, translation=factor * camera.translation) for camera in cameras
+    ]
+    return scaled, guess
+
+
+def _first_yaw(
+    view_degrees: Sequence[float], camera: Camera, first: Observation
+) -> float | None:
+    """Return which way the person faces at first, in radians about the vertical.
+
+    This is what the user gave relative to the camera, or else what the segmenter
+    reported, which may be None.
+    """
+    if not view_degrees:
+        return first.yaw
+    to_camera = -camera.rotation[2]
+    towards = np.arctan2(to_camera[0], to_camera[2])
+    return float(towards - np.radians(view_degrees[0]))
 
 
 def same_person(

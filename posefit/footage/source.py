@@ -1,8 +1,9 @@
 """Turn a source into a scene.
 
+from posefit.footage.options import SourceOptions
 from posefit.footage.source import scene_of
 
-scene = scene_of(["a.mp4", "b.mp4"], camera=["cameras.toml"])
+scene = scene_of(["a.mp4", "b.mp4"], SourceOptions(camera="cameras.toml"))
 """
 
 from collections.abc import Callable, Sequence
@@ -16,15 +17,15 @@ from posefit.footage.cameras import combined, same_person
 from posefit.footage.cleaning import cleaned
 from posefit.footage.extraction import Extraction
 from posefit.footage.kinds import Resolved, resolve
+from posefit.footage.options import SourceOptions
 from posefit.footage.pairing import calibrated, listed
-from posefit.footage.people import Choice
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
 from posefit.footage.views import Range, View, together
 from posefit.footage.world import world_of
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Up
+from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
 from posefit.geometry.units import Unit
 from posefit.motion import built_in
@@ -36,23 +37,7 @@ SIZE = (320, 240)  # width and height of rendered masks, by default
 
 
 def scene_of(
-    source: Any,
-    progress: Progress = QUIET,
-    *,
-    asf: str | Path | None = None,
-    camera: Sequence[Camera | Calibration | str | Path] = (),
-    view_degrees: Sequence[float] = (),
-    size: tuple[int, int] | None = None,
-    fps: float | None = None,
-    frames: Range = (None, None),
-    extraction: Extraction | None = None,
-    height: float | None = None,
-    up: Up | None = None,
-    unit: Unit | None = None,
-    rate: float | None = None,
-    label: int | None = None,
-    holes: float | None = None,
-    person: Choice | None = None,
+    source: Any, options: SourceOptions | None = None, progress: Progress = QUIET
 ) -> Scene:
     """Return the scene of a motion, or of what cameras saw at the same times.
 
@@ -61,22 +46,8 @@ def scene_of(
 
     Args:
         source: As for `resolve`, or its result.
+        options: Its cameras, its person, and how it is read.
         progress: Shows how far reading is.
-        asf: Skeleton file of the person.
-        camera: Cameras, calibrations, or their files; by default one is guessed.
-        view_degrees: Angles of the cameras around a motion, or which way the person
-            faces in footage.
-        size: Width and height of rendered masks.
-        fps: Frames per second; by default what the source states, or else 30.
-        frames: First frame, and the frame after the last.
-        extraction: How the person is segmented in a film.
-        height: Height of the person in metres.
-        up: Which axis of the calibrations or the motion's file points up.
-        unit: Unit of the calibrations or the motion's file.
-        rate: Frames per second of a motion's file that does not state them.
-        label: The person's value in masks with several labels.
-        holes: Share of the person's area up to which holes are filled.
-        person: Which of several people is followed.
 
     Returns:
         The scene, whose guesses are logged.
@@ -86,55 +57,63 @@ def scene_of(
 
     """
     source = resolve(source)
+    options = options or SourceOptions()
     if source.medium == "motion":
-        # `up` and `unit` describe the calibrations if given, or else the motion's file
-        cameras, guesses = _placed(listed(camera), size or SIZE, up, unit)
-        stated = FileOptions(
-            asf, None if cameras else unit, None if cameras else up, rate
-        )
-        motion = load_motion(cast(Source, source.places[0]), fps or FPS, stated)
-        scene = synthetic(motion, view_degrees, size or SIZE, cameras, frames, guesses)
-        return logged(scene, progress)
-    if len(view_degrees) > 1:
+        return logged(_of_motion(source, options), progress)
+    return logged(_of_footage(source, options, progress), progress)
+
+
+def _of_motion(source: Resolved, options: SourceOptions) -> Scene:
+    """Return the scene of a known motion."""
+    size = options.size or SIZE
+    cameras, guesses = _placed(options, size)
+    # `up` and `unit` describe the calibrations if given, or else the motion's file
+    of_file = FileOptions(options.asf, rate=options.rate)
+    if not cameras:
+        of_file = of_file._replace(unit=options.unit, up=options.up)
+    (place,) = source.places
+    motion = load_motion(cast(Source, place), options.fps or FPS, of_file)
+    return synthetic(motion, options.degrees, size, cameras, options.frames, guesses)
+
+
+def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) -> Scene:
+    """Return the scene of masks or films."""
+    if len(options.degrees) > 1:
         raise InputError(
             "view_degrees must be one for footage, of its first camera, "
-            f"got {len(view_degrees)}"
+            f"got {len(options.degrees)}"
         )
-    body, notes, of_height = body_of(asf, height, None if camera else unit)
-    facing = view_degrees[0] if view_degrees else None
-    films = films_of(source, fps)
-    sizes = [film.size for film in films]
-    known = calibrated(camera, sizes or [None] * len(source.places), source.names)
+    # `unit` describes the calibrations if given, or else the skeleton's file
+    unit = None if options.cameras else options.unit
+    body, notes, of_height = body_of(options.asf, options.height, unit)
+    films = films_of(source, options.fps)
+    filmed = [film.size for film in films] or [None] * len(source.places)
+    known = calibrated(options.cameras, filmed, source.names)
 
     def combine(views: Sequence[View]) -> Scene:
-        name = Path(views[0].name).stem
-        return combined(views, name, body, known, facing, up, fps, unit)
+        return combined(views, body, known, options)
 
     if films:
-        how = replace(extraction or Extraction(), person=person)
-        result = _of_films(films, known, how, frames, progress, combine)
+        scene = _of_films(films, known, options, progress, combine)
     else:
-        views = views_of_masks(source, frames, label, fps)
-        result = combine(_of_one_person(views, known, holes, person))
-    result = replace(
-        result,
-        warnings=[*notes, *result.warnings],
-        guesses=[*result.guesses, *of_height],
+        views = views_of_masks(source, options.frames, options.label, options.fps)
+        scene = combine(_of_one_person(views, known, options))
+    return replace(
+        scene,
+        warnings=[*notes, *scene.warnings],
+        guesses=[*scene.guesses, *of_height],
     )
-    return logged(result, progress)
 
 
 def _placed(
-    known: Sequence[Camera | Calibration],
-    size: tuple[int, int],
-    up: Up | None,
-    unit: Unit | None,
+    options: SourceOptions, size: tuple[int, int]
 ) -> tuple[list[Camera], list[str]]:
     """Return the cameras around a known motion, and what was guessed about them.
 
     `size` is used for calibrations that do not state theirs.
     """
-    world, metres, guesses = world_of(known, up, unit)
+    known = listed(options.cameras)
+    world, metres, guesses = world_of(known, options.up, options.unit)
     cameras = list[Camera]()
     for each in known:
         if isinstance(each, Calibration):
@@ -197,14 +176,13 @@ def views_of_masks(
 def _of_one_person(
     views: Sequence[View],
     known: Sequence[Camera | Calibration],
-    holes: float | None,
-    person: Choice | None,
+    options: SourceOptions,
 ) -> list[View]:
     """Return cleaned views of one person: the one that the first view follows."""
-    clean = [cleaned(views[0], holes, person)]
+    clean = [cleaned(views[0], options.holes, options.person)]
     for k, view in enumerate(views[1:], 1):
         choose = partial(same_person, [known[0], known[k]], clean[0], view.size)
-        clean.append(cleaned(view, holes, choose))
+        clean.append(cleaned(view, options.holes, choose))
     return clean
 
 
@@ -219,17 +197,17 @@ class _Attempt(NamedTuple):
 def _of_films(
     films: Sequence[Video],
     known: Sequence[Camera | Calibration],
-    how: Extraction,
-    frames: Range,
+    options: SourceOptions,
     progress: Progress,
     combine: Callable[[Sequence[View]], Scene],
 ) -> Scene:
     """Return the scene of films. Raises NoPersonError if nobody is found in them."""
+    how = replace(options.extraction or Extraction(), person=options.person)
     attempts = list[_Attempt]()
     for way in how.ways(len(films)):
         among = how if len(films) == 1 and way is not how else None
         # all are checked before any is read
-        parts = [Segmentation(film, way, frames, among) for film in films]
+        parts = [Segmentation(film, way, options.frames, among) for film in films]
         try:
             views = _taken_out(parts, known, progress)
             doubts = [view.doubt for view in views if view.doubt]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -129,19 +129,3 @@ def fitting(
     raise InputError(
         f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
     )
-
-
-class StraightView(NamedTuple):
-    """A camera without distortion, and what it saw."""
-
-    camera: Camera
-    view: View
-    said: list[str]  # sentences for the user
-
-
-def straight_view(
-    world: Array, metres: float, known: Camera | Calibration, view: View
-) -> StraightView:
-    """Return a view without distortion, and its camera, see `straightening`."""
-    camera, how, said = straightening(known, view.size, view.filmed, world, metres)
-    return StraightView(camera, view if how is None else how.of(view), said)

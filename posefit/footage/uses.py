@@ -1,10 +1,11 @@
 """The kinds of source to which the options of a source apply."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from posefit.errors import InputError
 from posefit.footage.kinds import Medium
+from posefit.footage.options import SourceOptions
 from posefit.reading import quoted
 
 # the same, as messages call it
@@ -35,25 +36,26 @@ _USED_FOR = {
 }
 
 
-def check_used(medium: Medium, view: Mapping[str, Any]) -> None:
+def check_used(medium: Medium, options: SourceOptions) -> None:
     """Raise InputError if a given option does not apply to this kind of source.
 
     Args:
         medium: The kind of source.
-        view: The options by name; None if not given.
+        options: The options; None if not given.
 
     """
     for name, use in _USED_FOR.items():
-        if medium not in use.media and view.get(name) is not None:
-            raise useless_for(medium, name, view[name], use.where)
-    if medium == "motion" or view.get("camera"):
+        value = getattr(options, name)
+        if medium not in use.media and value is not None:
+            raise useless_for(medium, name, value, use.where)
+    if medium == "motion" or options.cameras:
         return
     # without these files nothing is left that has an axis or a unit
     files = "calibrations and files of motions"
-    if view.get("up") is not None:
-        raise useless_for(medium, "up", view["up"], files)
-    if view.get("unit") is not None and view.get("asf") is None:
-        raise useless_for(medium, "unit", view["unit"], files)
+    if options.up is not None:
+        raise useless_for(medium, "up", options.up, files)
+    if options.unit is not None and options.asf is None:
+        raise useless_for(medium, "unit", options.unit, files)
 
 
 def useless_for(medium: Medium, name: str, value: object, where: str) -> InputError:

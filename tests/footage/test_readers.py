@@ -115,7 +115,7 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
     clean = cleaned(masks)
     assert (clean.usable.tolist(), clean.warnings) == (masks.usable.tolist(), [])
     messages: list[str] = []
-    scene = scene_of([tmp_path], Progress(messages.append))
+    scene = scene_of([tmp_path], progress=Progress(messages.append))
     assert (scene.count, scene.observations[2].usable) == (9, False)
     assert f"guessed: {'; '.join(scene.guesses)}" in messages
     assert list(scene.guesses[:2]) == [*masks.guesses, "30 frames a second"]

@@ -13,6 +13,7 @@ from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
 from posefit.footage.kinds import KINDS, Kind, resolve
 from posefit.footage.live import live_views
+from posefit.footage.options import SourceOptions
 from posefit.footage.readers import read_array
 from posefit.footage.scene import Scene
 from posefit.footage.source import scene_of, views_of_masks
@@ -41,7 +42,7 @@ START, STOP = 2, 6
 
 def seen(source: Any, **options: Any) -> Scene:
     """Return what a tracker gets of a source."""
-    return scene_of(source, **options)
+    return scene_of(source, SourceOptions(**options))
 
 
 def check_numbered(scene: Scene, start: int, stop: int) -> None:
