@@ -87,7 +87,8 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
     unit = None if options.cameras else options.unit
     body, notes, of_height = body_of(options.asf, options.height, unit)
     films = films_of(source, options.fps)
-    filmed = [film.size for film in films] or [None] * len(source.places)
+    filmed: Sequence[tuple[int, int] | None] = [film.size for film in films]
+    filmed = filmed or [None] * len(source.places)
     known = calibrated(options.cameras, filmed, source.names)
 
     def combine(views: Sequence[View]) -> Scene:

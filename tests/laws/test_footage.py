@@ -220,7 +220,7 @@ def test_a_kind_of_source_is_a_line_of_the_table(
         return read_array(pixels, *how)
 
     line = Kind("masks", lambda place: str(place).endswith(".h5"), view=read)
-    monkeypatch.setattr("posefit.footage.source.KINDS", (line, *KINDS))
+    monkeypatch.setattr("posefit.footage.kinds.KINDS", (line, *KINDS))
     check_numbered(seen(path, frames=(START, STOP), fps=FPS), START, STOP)
     check_alike(seen(path, fps=FPS), seen(masks(), fps=FPS))
 
