@@ -13,7 +13,8 @@ Each row is one step, in one file:
 |---|---|---|
 | what a user names | one source per camera | named.py |
 | a source | its kind, its files and its reader | kinds.py |
-| a source and its options | its scene, by the steps below | source.py, options.py, uses.py |
+| options of a source | the same, checked for its kind | options.py, uses.py |
+| a source and its options | its scene, by the steps below | source.py |
 | names of images | the frames that they are | numbering.py |
 | a picture | the values by which it marks a person | images.py |
 | values of all masks | the ones that are the person | values.py |

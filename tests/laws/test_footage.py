@@ -1,6 +1,7 @@
 """Numbers, times and cuts, for every kind of source: frames are those of the footage, whatever it is read from."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +158,25 @@ def test_frames_of_a_stream_keep_their_numbers_and_times(
     if kind == "masks":
         for k, number in enumerate(numbers.tolist()):
             np.testing.assert_array_equal(view.silhouette(k).mask, masks()[number])
+
+
+@pytest.mark.parametrize("knows", [(False, False), (True, False), (False, True)])
+def test_a_joined_view_knows_what_each_of_its_parts_knows(
+    knows: tuple[bool, bool],
+) -> None:
+    views = list[View]()
+    for count, known in zip((3, 2), knows, strict=True):
+        view = read_array(masks()[:count], (None, None), None, FPS)
+        landmarks = np.ones((count, 27, 3)) if known else None
+        if known:
+            view = replace(view, known=np.zeros_like(view.bits))
+        views.append(replace(view, landmarks=landmarks))
+    view = joined(views)
+    assert len(view) == 5
+    # frames of which some have no landmarks have none together
+    assert view.landmarks is None
+    shown = [view.silhouette(k).valid.any() for k in range(len(view))]
+    assert shown == [not knows[0]] * 3 + [not knows[1]] * 2
 
 
 @pytest.mark.parametrize("kind", MASKS)
