@@ -95,7 +95,8 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
         return combined(views, body, known, options)
 
     if films:
-        scene = _of_films(films, known, options, progress, combine)
+        how = replace(options.extraction or Extraction(), person=options.person)
+        scene = _of_films(films, known, how, options.frames, progress, combine)
     else:
         views = views_of_masks(source, options.frames, options.label, options.fps)
         scene = combine(_of_one_person(views, known, options))
@@ -198,17 +199,17 @@ class _Attempt(NamedTuple):
 def _of_films(
     films: Sequence[Video],
     known: Sequence[Camera | Calibration],
-    options: SourceOptions,
+    how: Extraction,
+    frames: Range,
     progress: Progress,
     combine: Callable[[Sequence[View]], Scene],
 ) -> Scene:
     """Return the scene of films. Raises NoPersonError if nobody is found in them."""
-    how = replace(options.extraction or Extraction(), person=options.person)
     attempts = list[_Attempt]()
     for way in how.ways(len(films)):
         among = how if len(films) == 1 and way is not how else None
         # all are checked before any is read
-        parts = [Segmentation(film, way, options.frames, among) for film in films]
+        parts = [Segmentation(film, way, frames, among) for film in films]
         try:
             views = _taken_out(parts, known, progress)
             doubts = [view.doubt for view in views if view.doubt]
