@@ -101,8 +101,8 @@ def run() -> None:
         )
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
-        # Python waits for every thread that is no daemon, so a thread that a plugin left
-        # running could keep the process alive for ever.
+        # Python waits for every thread that is no daemon, so a thread that a plugin
+        # left running could keep the process alive for ever
         running = []
         for thread in threading.enumerate():
             own = thread.name.startswith(f"{POOL}_")
