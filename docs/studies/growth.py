@@ -207,12 +207,15 @@ class Instant:
         self._errors = np.random.default_rng(0)
 
     def window(self) -> int:
+        """Return how many cells may wait."""
         return 64
 
     def submit(self, job: Any, tenant: str = "") -> None:
+        """Take a cell."""
         self._jobs.append(job)
 
     def wait(self, _: float) -> list[Any]:
+        """Return the outcomes of all cells that wait."""
         from posefit.sweep.engine import Outcome
 
         jobs = self._jobs
