@@ -9,8 +9,10 @@ import click
 from click.shell_completion import CompletionItem
 
 from posefit.errors import InputError
+from posefit.footage.options import text_range
+from posefit.options import declared
 from posefit.reading import quoted
-from posefit.tracking.options import TrackOptions, declared, text_range
+from posefit.tracking.options import TrackOptions
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 

@@ -25,7 +25,7 @@ from posefit.errors import InputError
 from posefit.progress import Progress
 
 if TYPE_CHECKING:
-    from posefit.footage.source import Medium
+    from posefit.footage.kinds import Medium
     from posefit.output.content import Content
 
 _OF_FILES = ("source", "out", "force", "resume", "write")
@@ -212,7 +212,7 @@ def extract(
     """
     from posefit.footage.extract import extract as run
     from posefit.footage.extraction import Extraction
-    from posefit.footage.source import resolve
+    from posefit.footage.kinds import resolve
 
     resolved = resolve(source)
     how = extraction_of(options, resolved.medium, settings) or Extraction()
@@ -246,7 +246,7 @@ def _arguments(
 
     `medium` is given for a stream; otherwise the source is resolved.
     """
-    from posefit.footage.source import resolve
+    from posefit.footage.kinds import resolve
     from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
 
@@ -285,7 +285,7 @@ def extraction_of(
 
     """
     from posefit.footage.extraction import Extraction, segmenter_name
-    from posefit.footage.source import useless_for
+    from posefit.footage.uses import useless_for
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
