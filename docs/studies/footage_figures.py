@@ -33,6 +33,7 @@ from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
 from posefit.footage.extraction import Extraction
+from posefit.footage.options import SourceOptions
 from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
 from posefit.footage.source import scene_of
@@ -176,10 +177,9 @@ def filmed_scene(
     camera = () if recording.calibration is None else (recording.calibration,)
     scene = scene_of(
         [recording.film],
-        camera=camera,
-        frames=(start, stop),
-        asf=recording.skeleton,
-        **view,
+        SourceOptions(
+            camera=camera, frames=(start, stop), asf=recording.skeleton, **view
+        ),
     )
     return replace(scene, name=recording.name), start
 

@@ -209,7 +209,7 @@ class Instant:
     def window(self) -> int:
         return 64
 
-    def submit(self, job: Any) -> None:
+    def submit(self, job: Any, tenant: str = "") -> None:
         self._jobs.append(job)
 
     def wait(self, _: float) -> list[Any]:

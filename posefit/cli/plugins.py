@@ -114,7 +114,7 @@ def check(
     """Check an installed plugin against the rules of its kind.
 
     KIND is optimiser, prior, tracker, start or segmenter.
-    The rules are checked in a separate process; what the plugin prints goes to stderr.
+    The rules are checked in a separate process; the plugin's prints go to stderr.
     Once two rules fail for the same cause, the others are not checked.
     The exit status is 1 if a rule is broken.
     """

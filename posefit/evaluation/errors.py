@@ -345,7 +345,7 @@ def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
     fps = scene.fps
     mean = mean_known(acceleration(joints, fps))
     ratio = None
-    reference = joints  # the joints that decide when a foot stands
+    reference = joints  # the joints that decide whether a foot is on the ground
     if scene.truth is not None:
         reference = scene.truth.joints
         true_mean = mean_known(acceleration(reference, fps))

@@ -118,20 +118,20 @@ def hidden_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
     return hidden / float(known[-1] + 1 - known[0])
 
 
-def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
+def stance_spread(joints: Array, in_stance: NDArray[np.bool_]) -> float | None:
     """Return the spread of the heights at which feet stand, in metres.
 
     It is the standard deviation over stances of the height of the foot's ball.
 
     Args:
         joints: The joints (T, 27, 3) in metres; y is up.
-        stands: Whether each foot stands (T, 2).
+        in_stance: Whether each foot stands (T, 2).
 
     Returns:
         The spread, or None if there are fewer than two stances.
     """
     heights = []
-    for ball, flags in zip(BALLS, stands.T, strict=True):
+    for ball, flags in zip(BALLS, in_stance.T, strict=True):
         for start, stop in runs(flags):
             heights.append(joints[start:stop, ball, 1].mean())
     return float(np.std(heights)) if len(heights) > 1 else None
@@ -476,7 +476,7 @@ def trust_of(
     fps = scene.fps
     joints = scene.motion(frames).joints
     camera = scene.cameras[0]
-    stands = standing(joints, fps) & usable[:, None]
+    in_stance = standing(joints, fps) & usable[:, None]
     in_place = few
     if not few:
         ground = joints[usable, 0][:, [0, 2]]  # (n, 2), the root's path
@@ -498,11 +498,11 @@ def trust_of(
         ),
         "foot_share": _figure(
             {TOO_FEW: few, IN_PLACE: in_place},
-            lambda: float(stands.any(axis=1)[usable].mean()),
+            lambda: float(in_stance.any(axis=1)[usable].mean()),
         ),
         "stance_spread_m": _figure(
             {TOO_FEW: few},
-            lambda: stance_spread(joints, stands),
+            lambda: stance_spread(joints, in_stance),
             "no foot stands twice",
         ),
         "explained": _figure(

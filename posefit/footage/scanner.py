@@ -84,50 +84,36 @@ class Scanner:
                 frame's index and its picture.
 
         """
-        segmenter = self.segmenter
         video = self.scaled.video
         size = self.scaled.size
         room = self.stop - self.start
         people = People(video.fps)
         camera = CameraMotion(size)
+        rows = _Rows(self)
         facings = list[float]()
         landmarks = list[Array]()
-        blank_quality = segmenter.quality()
-        largest_quality = segmenter.quality()
-        blanks = list[dict[str, Any]]()
-        largest = list[dict[str, Any]]()
-        masks = empty_planes(room, size)
-        valid = empty_planes(room, size)
+        bits = empty_planes(room, size)
+        known = empty_planes(room, size)
         images = self.scaled.frames(self.start, self.stop)
         for k, image in enumerate(progress(images, room) if progress else images):
             camera.add(k, image)
             given = image if changed is None else changed(k, image)
-            blobs, facing, points = segmenter.frame(given)
+            blobs, facing, points = self.segmenter.frame(given)
             facings.append(facing)
             landmarks.append(points)
-            known = blobs[0].valid
-            masks[k] = np.packbits(blobs[0].mask)
-            valid[k] = np.packbits(known)
+            bits[k] = np.packbits(blobs[0].mask)
+            known[k] = np.packbits(blobs[0].valid)
             present = people.add([blob.mask for blob in blobs if blob.area], image)
-            empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
-            for tracklet in people.active:
-                # a new person was in none of the earlier frames
-                tracklet.quality = tracklet.quality or deepcopy(blank_quality)
-                person = empty
-                if tracklet in present:
-                    person = _alone(tracklet, present, blobs, k)
-                tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
-            blanks.append(self._row(blank_quality, image, empty, k))
-            largest.append(self._row(largest_quality, image, blobs[0], k))
-        count = len(blanks)  # the file may break off
+            rows.add(k, image, blobs, people, present)
+        count = len(rows.blanks)  # the file may break off
         numbers = np.arange(self.start, self.start + count)
         view = View(
             name=str(video.path),
             numbers=numbers,
             times=times_of(numbers, video.fps),
-            bits=masks[:count],
-            known=valid[:count],
-            usable=np.array([row["usable"] for row in largest], dtype=bool),
+            bits=bits[:count],
+            known=known[:count],
+            usable=np.array([row["usable"] for row in rows.largest], dtype=bool),
             size=size,
             fps=video.fps,
             filmed=video.size,
@@ -137,16 +123,61 @@ class Scanner:
             guesses=video.guesses,
             pictures=partial(self.scaled.frames, self.start, self.stop),
         )
-        return Scan(view, people, largest, blanks, self.how.person)
+        return Scan(view, people, rows.largest, rows.blanks, self.how.person)
+
+
+class _Rows:
+    """The rows of quality.csv of all frames.
+
+    Each frame has one of every person who is expected in it, one of its largest blob,
+    and one of an empty mask.
+    """
+
+    def __init__(self, scanner: Scanner) -> None:
+        self.blanks = list[dict[str, Any]]()
+        self.largest = list[dict[str, Any]]()
+        self._scanner = scanner
+        self._of_blanks = scanner.segmenter.quality()
+        self._of_largest = scanner.segmenter.quality()
+
+    def add(
+        self,
+        k: int,
+        image: Image,
+        blobs: Sequence[Person],
+        people: People,
+        present: Sequence[Tracklet],
+    ) -> None:
+        """Judge the masks of a frame.
+
+        Args:
+            k: The frame, counted from 0.
+            image: Its picture.
+            blobs: What the segmenter found in it, the largest first.
+            people: The people of the frames up to this one. They get their rows.
+            present: The people in this one.
+
+        """
+        known = blobs[0].valid
+        empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
+        for tracklet in people.active:
+            # a new person was in none of the earlier frames
+            tracklet.quality = tracklet.quality or deepcopy(self._of_blanks)
+            person = empty
+            if tracklet in present:
+                person = _alone(tracklet, present, blobs, k)
+            tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
+        self.blanks.append(self._row(self._of_blanks, image, empty, k))
+        self.largest.append(self._row(self._of_largest, image, blobs[0], k))
 
     def _row(
         self, quality: FrameQuality, image: Image, person: Person, k: int
     ) -> dict[str, Any]:
-        """Return the row of quality.csv for a person in frame k, counted from 0."""
-        number = self.start + k
-        row = self.segmenter.row(quality, image, person, number)
+        """Return the row of a person in frame k, counted from 0."""
+        number = self._scanner.start + k
+        row = self._scanner.segmenter.row(quality, image, person, number)
         # a repeated frame does not show where the person is at its time
-        usable = row["usable"] and self.scaled.video.is_filmed(number)
+        usable = row["usable"] and self._scanner.scaled.video.is_filmed(number)
         return row | {"usable": int(usable)}
 
 

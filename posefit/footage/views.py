@@ -133,6 +133,41 @@ def _with_known(view: View) -> View:
     return replace(view, known=full_planes(len(view), view.size))
 
 
+def together(views: Sequence[View]) -> list[View]:
+    """Cut the views of several cameras to the frames that all of them have.
+
+    Frames are compared by their numbers, if all cameras state them.
+
+    Raises:
+        InputError: The cameras have no frame in common, or they begin at different
+            frames and not all of them state numbers.
+
+    """
+    starts = [int(view.numbers[0]) for view in views]
+    stops = [int(view.numbers[-1]) + 1 for view in views]
+    names = [view.name for view in views]
+    if not all(view.counted for view in views):
+        if len(set(starts)) > 1:
+            each = zip(starts, names, strict=True)
+            came = " and ".join(f"{first} of {name}" for first, name in each)
+            raise InputError(f"cameras must begin with one frame, got frame {came}")
+        return list(views)
+    start = max(starts)
+    stop = min(stops)
+    spans = zip(starts, stops, names, strict=True)
+    came = ", ".join(f"{first}:{last} of {name}" for first, last, name in spans)
+    if start >= stop:
+        raise InputError(f"cameras must have frames in common, got {came}")
+    if len(set(starts)) > 1 or len(set(stops)) > 1:
+        used = f"the frames {start}:{stop} are used, which all cameras have, of {came}"
+        first_view = replace(views[0], guesses=[*views[0].guesses, used])
+        views = [first_view, *views[1:]]
+    return [
+        view[start - first : stop - first]
+        for view, first in zip(views, starts, strict=True)
+    ]
+
+
 def times_of(numbers: NDArray[np.int64], fps: float | None) -> Array:
     """Return the times (T,) of frames in seconds, at 30 per second if `fps` is None."""
     return np.asarray(numbers / (fps or FPS))

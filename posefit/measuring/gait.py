@@ -140,6 +140,15 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     Args:
         motion: the motion.
         unknown: numbers of frames that count for nothing, such as held or lost ones.
+
+    Returns:
+        The gait, with `why` if it has no figures.
+
+    Example:
+        >>> from posefit import gait_of, load_motion
+        >>> gait = gait_of(load_motion("16_15"))
+        >>> 90.0 < gait.cadence < 130.0
+        True
     """
     if motion.fps < MIN_FPS:
         return Gait(why=f"fewer than {MIN_FPS:g} frames a second")

@@ -35,7 +35,7 @@ class FileOptions(NamedTuple):
         unit: length unit; None to recognise it.
         up: axis that points up; None for y, or in a .bvh file for the axis along which
             the person stands.
-        rate: frames per second of an .amc file; None for what it states, or 120.
+        rate: frames per second of an .amc file; None for the stated rate, or 120.
     """
 
     asf: str | Path | None = None
@@ -135,6 +135,15 @@ def load_motion(
     Raises:
         InputError: there is no such motion, or unit or up is given for a source that is
             not a file.
+
+    Returns:
+        The motion.
+
+    Example:
+        >>> from posefit import load_motion
+        >>> motion = load_motion("walk", fps=60.0)
+        >>> motion.fps, motion.poses.shape[1]
+        (60.0, 66)
     """
     suffix = ""
     if not isinstance(source, Motion) and source not in built_in.names():

@@ -134,7 +134,7 @@ def held_frames(track: Content) -> str:
 
 
 def undetermined(track: Content) -> str:
-    """Return one sentence about what the method did not determine, or ""."""
+    """Return one sentence about everything that a method left undetermined, or ""."""
     parts = []
     words = {"unknown_sides": "left and right unknown in", "lost": "lost in"}
     for name, verb in words.items():

@@ -1,7 +1,7 @@
 """Reads the finished rows of a ledger into a table, which holds a hundred thousand."""
 
 import json
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -39,26 +39,15 @@ class _Distinct:
 
     def __init__(self) -> None:
         self.values: list[dict[str, Any]] = []
-        self._numbers: dict[Hashable, int] = {}
+        self._numbers: dict[str, int] = {}
 
     def number(self, value: dict[str, Any]) -> int:
         """Return the number of a value, and add it if it is new."""
-        if (key := _frozen(value)) not in self._numbers:
+        key = _text(value)
+        if key not in self._numbers:
             self._numbers[key] = len(self.values)
             self.values.append(value)
         return self._numbers[key]
-
-
-def _frozen(value: Any) -> Hashable:
-    """Return a hashable key of a JSON value. The keys of 1, 1.0 and true differ."""
-    if isinstance(value, dict):
-        return tuple(sorted((name, _frozen(inner)) for name, inner in value.items()))
-    if isinstance(value, list):
-        return tuple(map(_frozen, value))
-    if isinstance(value, str):
-        return value
-    # as 1 == 1.0 == True in Python
-    return type(value), value
 
 
 class _Rows:
@@ -129,8 +118,8 @@ def runs_of(
         ledger: An open ledger, of tracks or of single searches.
         methods: The methods whose runs are returned, by their names in the report or in
             the plan. All if empty.
-        latest: Whether to return only one version of each method: the installed one, or
-            else the one that was planned last.
+        latest: Whether to return only one version of each method: the installed
+            version, or else the one planned last.
 
     Returns:
         The runs, and the failures. If every cell failed, there are no runs.
@@ -241,14 +230,14 @@ def _positions(order: Sequence[int], count: int) -> "Array":
 def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
     """Return one version of each method, by their indices.
 
-    It is the installed version, or else the one that was planned last.
+    It is the installed version, or else the one planned last.
     """
-    best: dict[Hashable, tuple[bool, int]] = {}
+    best: dict[str, tuple[bool, int]] = {}
     for m, variant in enumerate(variants):
         versions = variant["version"].split(", ")
         installed = not any(map(other_version, versions))
         other_fields = {**variant, "version": ""}
-        key = _frozen(other_fields)
+        key = _text(other_fields)
         best[key] = max(best.get(key, (False, -1)), (installed, m))
     return sorted(m for _, m in best.values())
 
@@ -381,4 +370,5 @@ def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
 
 
 def _text(value: Any) -> str:
+    """Return the JSON text of a value. Those of 1, 1.0 and true differ."""
     return json.dumps(value, sort_keys=True)

@@ -47,10 +47,8 @@ _ABOVE = Measure(
     "above", "above", "", 2, "Median of the best costs above the true pose's"
 )
 COLUMNS = {
-    "reached": Column(
-        "reached", _REACHED, _reached, higher_is_better=True, average=mean
-    ),
-    "above": Column("above", _ABOVE, _above, average=median),
+    "reached": Column(_REACHED, _reached, higher_is_better=True, average=mean),
+    "above": Column(_ABOVE, _above, average=median),
 }
 SCORE = Score(
     name="reached",

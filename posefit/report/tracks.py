@@ -21,6 +21,7 @@ from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
 from posefit.report.repeat import command_head
 from posefit.statistics.means import block_means
+from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
 
 LOSS = "error_with_losses_degrees"
@@ -82,43 +83,47 @@ def _columns() -> list[Column]:
         measure = MEASURES["skill"]
         skill_measure = replace(
             measure,
+            name=f"skill.{name}",
             label=f"{measure.label}: {label}",
             meaning=f"{measure.meaning}; compared with the {label}",
         )
-        skills.append(Column(f"skill.{name}", skill_measure, higher_is_better=True))
-        baseline_measure = replace(MEASURES["baselines_degrees"], label=label)
-        baselines.append(
-            Column(f"baselines_degrees.{name}", baseline_measure, in_tables=False)
+        skills.append(Column(skill_measure, higher_is_better=True))
+        baseline_measure = replace(
+            MEASURES["baselines_degrees"], name=f"baselines_degrees.{name}", label=label
         )
+        baselines.append(Column(baseline_measure, in_tables=False))
     intervals = []
     for level in charts.LEVEL_NAMES:
         shown = level == TABLE_LEVEL
-        coverage = replace(_share("coverage"), label=f"{level} % interval holds")
-        width = replace(MEASURES["interval_mm"], label=f"{level} % interval")
+        coverage = replace(
+            _share("coverage"),
+            name=f"coverage.{level}",
+            label=f"{level} % interval holds",
+        )
+        width = replace(
+            MEASURES["interval_mm"],
+            name=f"interval_mm.{level}",
+            label=f"{level} % interval",
+        )
         intervals += [
-            Column(
-                f"coverage.{level}",
-                coverage,
-                higher_is_better=True,
-                in_tables=shown,
-                optional=True,
-            ),
-            Column(f"interval_mm.{level}", width, in_tables=shown, optional=True),
+            Column(coverage, higher_is_better=True, in_tables=shown, optional=True),
+            Column(width, in_tables=shown, optional=True),
         ]
+    error = replace(MEASURES["error_degrees"], name="error_degrees.mean")
     return [
-        Column(LOSS, loss, compute=error_with_losses),
+        Column(loss, compute=error_with_losses),
         # only in rows and the CSV: a page with 100,000 rows has no room for it
-        Column("error_degrees.mean", MEASURES["error_degrees"], in_tables=False),
+        Column(error, in_tables=False),
         *skills,
-        Column("lost_rate", _share("lost_rate")),
-        Column("swap_rate", _share("swap_rate")),
-        Column("unknown_rate", _share("unknown_rate"), optional=True),
+        Column(_share("lost_rate")),
+        Column(_share("swap_rate")),
+        Column(_share("unknown_rate"), optional=True),
         *intervals,
-        Column("mpjpe_mm", MEASURES["mpjpe_mm"]),
-        Column("iou", MEASURES["iou"], higher_is_better=True),
-        Column("seconds_per_frame", MEASURES["seconds_per_frame"]),
-        Column("cpu_seconds_per_frame", MEASURES["cpu_seconds_per_frame"]),
-        Column("evaluations_used", MEASURES["evaluations"]),
+        Column(MEASURES["mpjpe_mm"]),
+        Column(MEASURES["iou"], higher_is_better=True),
+        Column(MEASURES["seconds_per_frame"]),
+        Column(MEASURES["cpu_seconds_per_frame"]),
+        Column(replace(MEASURES["evaluations"], name="evaluations_used")),
         *baselines,
     ]
 
@@ -380,17 +385,6 @@ def _skills(
         if error is not None and baseline is not None:
             skills[f"skill.{name}"] = skill(error, baseline)
     return skills
-
-
-def views(place: Place) -> list[str]:
-    """Return the directions of an instance's cameras in degrees."""
-    return [f"{view:g}" for view in place["view_degrees"]]
-
-
-def damage(place: Place) -> list[str]:
-    """Return the kinds of damage of an instance with their strengths."""
-    kinds = sorted(place["corruption"].items())
-    return [f"{kind} {strength:g}" for kind, strength in kinds]
 
 
 def _exact(number: int) -> int | str:

@@ -163,10 +163,11 @@ class TrackCell(Cell):
         """
         from posefit.evaluation.errors import anytime_trace, mode_reliability
         from posefit.evaluation.measures import MEASURES
+        from posefit.footage.options import SourceOptions
         from posefit.geometry.skeleton import joint_distances
         from posefit.motion.clips import training_clips, training_motions
         from posefit.tracking.defaults import completed
-        from posefit.tracking.options import VIEW, TrackOptions
+        from posefit.tracking.options import TrackOptions
         from posefit.tracking.pipeline import track_scene
 
         for path, digest in self.files.items():
@@ -180,7 +181,7 @@ class TrackCell(Cell):
         training = training_motions(clips, scene.fps)
         # the scene has the views already, and the training motions are loaded
         option_names = {field.name for field in fields(TrackOptions)}
-        option_names -= {*VIEW, "train"}
+        option_names -= {each.name for each in fields(SourceOptions)} | {"train"}
         values = {}
         for each in fields(self):
             if each.name in option_names:

@@ -118,6 +118,17 @@ class Ledger:
 
     Raises:
         InputError: There is no ledger, it is damaged, or it cannot be read here.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> import posefit
+        >>> few = {"seeds": 1, "frames": 2, "evaluations": 40}
+        >>> with TemporaryDirectory() as folder:
+        ...     out = f"{folder}/results"
+        ...     result = posefit.compare(["random@pca"], out=out, **few)
+        ...     with posefit.Ledger(out) as ledger:
+        ...         print(len(list(ledger.rows())))
+        1
     """
 
     def __init__(self, *paths: str | Path) -> None:
@@ -221,7 +232,7 @@ class Ledger:
         file = self._open[self._places[key][0]][0]
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
-            f"{file}: the row of cell {name} must be one that posefit wrote: "
+            f"{file}: the row of cell {name} must be written by posefit: "
             f"{cut(text_of(error))}; "
             f'to run it again: sqlite3 {FILE} "{statement}"'
         )

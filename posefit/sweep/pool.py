@@ -15,9 +15,9 @@ from posefit.errors import InputError
 from posefit.sweep.engine import Limits, Outcome, Run
 from posefit.sweep.worker import Worker
 
-# The most processes for each job that may run. Those beyond the first are idle, and
-# wait for the next job of their tenant.
-PROCESSES = 2
+# The most processes beyond one for each job that may run. They are idle, and wait for
+# the next job of their tenant, as starting one takes about a second.
+SPARE = 4
 
 
 class Pool:
@@ -42,7 +42,7 @@ class Pool:
         self._count = workers
         self._limits = limits
         self._task = cloudpickle.dumps((run, prepare))
-        self._workers: list[Worker] = []  # the one that was used last is last
+        self._workers: list[Worker] = []  # by the time of their last use
 
     def window(self) -> int:
         """Return how many jobs may run at a time."""
@@ -61,7 +61,7 @@ class Pool:
             worker = mine[-1]
             self._workers.remove(worker)
         else:
-            if idle and len(self._workers) >= PROCESSES * self._count:
+            if idle and len(self._workers) >= self._count + SPARE:
                 self._end(idle[0])
             worker = Worker(self._task, self._limits, tenant)
         self._workers.append(worker)

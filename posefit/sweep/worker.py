@@ -16,6 +16,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from math import inf
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
@@ -33,7 +34,7 @@ from posefit.limits import end_with_parent, memory
 from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
 MARK = "POSEFIT_WORKER"  # the environment variable of a process' mark
-BEGUN = b""  # what a worker sends when it begins a job
+BEGUN = b""  # a worker sends this when it begins a job
 END_SECONDS = 1.0  # the longest that a process without a connection takes to end
 _starting = threading.Lock()
 # all signals but the two that no process can handle
@@ -111,8 +112,11 @@ class Worker:
                 answer = self.connection.recv_bytes()
                 self._deadline = time.monotonic() + self._limits.seconds
         except (EOFError, OSError):
-            # the process has ended, or a job has closed the connection
-            self._process.join(END_SECONDS)
+            # The process has ended, or a job has closed the connection. `join` would
+            # wait without limit for a job that has closed its other files, too.
+            until = time.monotonic() + END_SECONDS
+            while self.is_alive and time.monotonic() < until:
+                time.sleep(0.01)
             return self._ended()
         if answer == BEGUN:
             if not self.is_alive:
@@ -161,9 +165,7 @@ class Worker:
         with suppress(OSError, AttributeError):
             os.killpg(pid, signal.SIGKILL)
         # unless it has left the group
-        for process in _marked(self._process.mark):
-            with suppress(OSError):
-                os.kill(process, signal.SIGKILL)
+        _end_marked(self._process.mark)
         self._process.kill()
         self._process.join()
         self.connection.close()
@@ -196,19 +198,18 @@ class _Process(SpawnProcess):
                 os.environ[MARK] = process.mark
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
             finally:
-                del os.environ[MARK]
+                os.environ.pop(MARK, None)
                 vars(main).update(before)
 
 
-def _marked(mark: str) -> list[int]:
-    """Return the processes whose environment has a mark, where /proc lists them."""
-    found = []
+def _end_marked(mark: str) -> None:
+    """End all other processes whose environment has a mark, where /proc lists them."""
     for path in Path("/proc").glob("[0-9]*/environ"):
+        process = int(path.parent.name)
         # a process may end meanwhile, and others do not let us read theirs
         with suppress(OSError):
-            if mark.encode() in path.read_bytes():
-                found.append(int(path.parent.name))
-    return found
+            if process != os.getpid() and mark.encode() in path.read_bytes():
+                os.kill(process, signal.SIGKILL)
 
 
 @contextmanager
@@ -234,7 +235,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 @contextmanager
 def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards what the body changes in this process.
+    """Undo afterwards the changes that the body makes in this process.
 
     These are the folder, the environment variables, `sys.path`, the signal handlers,
     the global random numbers and NumPy's handling of floating-point errors. A worker
@@ -258,7 +259,7 @@ def left_as_it_was() -> Iterator[None]:
             os.environ.update(variables)
         sys.path[:] = path
         for number, before, now in zip(_SIGNALS, handlers, _handlers(), strict=True):
-            # None stands for a handler that Python did not install
+            # None means a handler that Python did not install
             if before is not None and now != before:
                 signal.signal(number, before)
         random.setstate(numbers)
@@ -295,7 +296,7 @@ def become_worker(parent: int, path: list[str]) -> None:
     # the driver has already issued these warnings
     warnings.simplefilter("ignore", PluginWarning)
     single_thread()
-    end_with_parent(parent)
+    end_with_parent(parent, partial(_end_marked, os.environ[MARK]))
 
 
 def _serve(
@@ -306,12 +307,14 @@ def _serve(
     An answer is a pair: the job's result, and the reason if it failed.
     """
     become_worker(parent, path)
+    process = os.getpid()
     run: Run | None = None
     while True:
         try:
             job = connection.recv_bytes()
-        except EOFError:
-            return
+        except (EOFError, OSError):
+            # the driver has ended: `end_with_parent` ends this process and all others
+            threading.Event().wait()
         connection.send_bytes(BEGUN)
         try:
             if run is None:
@@ -325,6 +328,9 @@ def _serve(
         # also SystemExit: a cell that exits must not end its worker
         except BaseException as error:
             answer = pickle.dumps((None, text_of(error)))
+        # a job may have forked the process, but there is one answer
+        if os.getpid() != process:
+            os._exit(0)
         connection.send_bytes(answer)
 
 

@@ -14,7 +14,8 @@ import pytest
 import posefit
 from posefit.footage import extraction
 from posefit.footage import segmenter as segmenters
-from posefit.footage.source import resolve, views_of_masks
+from posefit.footage.kinds import resolve
+from posefit.footage.source import views_of_masks
 from posefit.footage.views import Range, View
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in

@@ -16,6 +16,7 @@ from posefit.fitting import metrics
 from posefit.footage.camera_motion import CameraMotion
 from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
+from posefit.footage.options import SourceOptions
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.footage.views import Observations, undistorted
@@ -144,7 +145,7 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(
     assert views[3].silhouettes[0].valid.all()
     stack(tmp_path / "b.npz", front, usable=~usable)  # no frame shows enough in both
     calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
-    scene = scene_of(paths, camera=[calibration], up="y")
+    scene = scene_of(paths, SourceOptions(camera=[calibration], up="y"))
     assert np.linalg.norm(scene.anchor - walk().translations[8]) < 1.0
 
 

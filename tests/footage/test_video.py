@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from posefit.files import opencv_name
-from posefit.footage.source import resolve, scene_of
+from posefit.footage.kinds import resolve
+from posefit.footage.options import SourceOptions
+from posefit.footage.source import scene_of
 from posefit.footage.video import Video, _rate
 from tests.cases import each
 from tests.commands import error_of
@@ -149,7 +151,8 @@ def test_pictures_are_a_film(filmed: Film, tmp_path: Path, suffix: str) -> None:
     # a single one, which is refused there
     assert resolve(folder / f"frame0{suffix}").medium == "masks"
     scene, other = (
-        scene_of([source], fps=fps) for source, fps in ((folder, 25.0), (path, None))
+        scene_of([source], SourceOptions(fps=fps))
+        for source, fps in ((folder, 25.0), (path, None))
     )
     assert (scene.count, scene.fps) == (len(masks), 25.0)
     views = [

@@ -217,7 +217,7 @@ def test_of_who_walks_in_place_only_times_are_known(
     )
 
 
-def test_a_stride_of_the_knee_is_that_between_two_strikes() -> None:
+def test_a_stride_of_the_knee_lasts_from_strike_to_strike() -> None:
     motion = walker(fps=100.0)
     bent = np.zeros(motion.poses.shape)
     # a fifth of a degree a frame
@@ -288,7 +288,7 @@ def test_hips_that_go_back_by_less_than_a_leg_are_no_walk(
     assert walks_backwards(motion).any() == back
 
 
-def test_unknown_frames_and_those_about_them_count_for_nothing() -> None:
+def test_unknown_frames_and_their_neighbours_do_not_count() -> None:
     assert np.flatnonzero(walks_backwards(turned(180.0), {30})).tolist() == [
         *range(8, 22),
         *range(39, 52),

@@ -22,7 +22,7 @@ def read(path: Path, *results: dict[str, Any]) -> Runs:
     return runs_in(ledger(path / "results", results))
 
 
-def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_first(
+def test_methods_of_the_same_name_are_named_by_their_differences_best_first(
     tmp_path: Path,
 ) -> None:
     runs = read(
@@ -57,7 +57,7 @@ def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
     )
 
 
-def test_names_are_distinct_and_printable_whatever_they_hold() -> None:
+def test_names_are_distinct_and_printable_with_any_content() -> None:
     details = [
         {"version": "1", "evaluations": "2"},
         {"version": "1", "evaluations": "3"},
@@ -93,7 +93,7 @@ def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -
     assert np.bincount(runs.instance).tolist() == [1, 2, 1, 1]
 
 
-def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(
+def test_the_order_follows_the_specs_and_not_the_order_in_which_cells_finish(
     tmp_path: Path,
 ) -> None:
     made = results_of(full({"a": 1.0, "b": 1.0}, instances=3))

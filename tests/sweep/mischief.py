@@ -36,6 +36,7 @@ from tests.sweep.fake import quarantined_in, rows_in, scheduler, swept
 
 LEFT = "POSEFIT_LEFT"  # the file that lists the processes that are left
 SLEEP = [sys.executable, "-c", "import time; time.sleep(900)"]
+END_SECONDS = 20.0  # a worker of Dask takes a while to notice that its parent ended
 LIMITS = Limits(seconds=20.0, gigabytes=1.0)
 # the figures that two runs of a cell differ by
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
@@ -61,6 +62,13 @@ def leaves_a_fork() -> None:
         time.sleep(900.0)
         os._exit(0)
     _note(process)
+
+
+def forks_and_goes_on() -> None:
+    # once: each process that goes on would fork again
+    if "FORKED" not in os.environ:
+        os.environ["FORKED"] = "yes"
+        os.fork()
 
 
 def leaves_a_session() -> None:
@@ -202,7 +210,7 @@ def traces() -> None:
 
 
 MISCHIEF: tuple[Callable[[], None], ...] = (
-    changes_the_folder, leaves_a_process, leaves_a_fork, leaves_a_session, leaves_a_thread,
+    changes_the_folder, leaves_a_process, leaves_a_fork, forks_and_goes_on, leaves_a_session, leaves_a_thread,
     replaces_a_function, replaces_a_builtin, replaces_a_method, replaces_the_clock, writes_into_arrays,
     forgets_modules, handles_signals, sets_an_alarm, seeds_random_numbers, clears_the_environment,
     closes_descriptors, closes_output, prints_much, raises, exits, ends_its_process, kills_itself, stops_itself,
@@ -289,9 +297,14 @@ def engine_of(name: str, workers: int) -> Iterator[Engine]:
 
 
 def left(noted: Path) -> list[int]:
-    """Return the processes that were noted and have not ended."""
+    """Return the processes that were noted and have not ended within some seconds."""
     numbers = noted.read_text().split() if noted.exists() else []
-    return [int(number) for number in numbers if _runs(int(number))]
+    processes = [int(number) for number in numbers]
+    until = time.monotonic() + END_SECONDS
+    while processes and time.monotonic() < until:
+        time.sleep(0.1)
+        processes = [process for process in processes if _runs(process)]
+    return processes
 
 
 def _runs(process: int) -> bool:

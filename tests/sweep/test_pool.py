@@ -118,7 +118,7 @@ def test_a_process_that_ends_itself_or_dies_is_noticed_at_once_and_a_kill_costs_
     ]
 
 
-def test_the_processors_counted_are_those_of_this_process(
+def test_the_processors_of_this_process_are_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # 0 is this process; another may have all of the machine
@@ -187,7 +187,10 @@ def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
     wait_until(lambda: not any(is_running(states[0]) for states in found))
 
 
-def test_a_process_that_ran_jobs_of_one_tenant_runs_none_of_another() -> None:
+def test_a_process_runs_jobs_of_one_tenant_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("posefit.sweep.pool.SPARE", 1)
     chosen = cells(5)
     tenants = ["", "a 1.0", "", "b 1.0", ""]
     processes: dict[str, set[int]] = {}
@@ -197,13 +200,32 @@ def test_a_process_that_ran_jobs_of_one_tenant_runs_none_of_another() -> None:
             while not (ended := pool.wait(1.0)):
                 pass
             processes.setdefault(tenant, set()).add(ended[0].result)
-    # one stays idle beside another; the one that waits longest makes room
+    # the process that was idle for longest made room
     assert len(processes[""]) == 1
     assert len(set().union(*processes.values())) == sum(map(len, processes.values()))
 
 
 def process_of(_: TrackCell) -> int:
     return os.getpid()
+
+
+def fork_or_close(cell: TrackCell) -> int:
+    """Fork this process where the seed is even, else close its connection and go on."""
+    if cell.seed % 2 == 0:
+        os.fork()
+    else:
+        os.closerange(3, 256)
+        time.sleep(60.0)
+    return cell.seed
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks processes")
+def test_a_forked_process_gives_no_second_answer_and_one_that_cannot_answer_ends() -> (
+    None
+):
+    ended = one_by_one(Pool(1, LIMITS, fork_or_close), [cells(4)[k] for k in (0, 2, 1)])
+    assert [outcome.result for outcome in ended] == [0, 2, None]
+    assert ended[-1].reason == "it closed the connection of its process"
 
 
 def wait_until(true: Callable[[], bool]) -> None:
@@ -373,7 +395,7 @@ def test_dask_workers_without_this_posefit_are_refused_before_a_cell_is_lost(
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on(
+def test_a_lost_scheduler_leaves_all_rows_and_the_same_command_continues(
     tmp_path: Path,
 ) -> None:
     with ExitStack() as served, Writer(tmp_path / "results" / FILE) as ledger:

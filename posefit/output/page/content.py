@@ -160,7 +160,7 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
 
 
 def _verdict(content: Content) -> str:
-    """Return what was not determined, preceded by the trust in the track.
+    """Return the trust in the track, and everything undetermined.
 
     If the truth is known, no trust is reported.
     """
