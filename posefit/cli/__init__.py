@@ -2,7 +2,7 @@
 
 Messages and progress go to stderr, results to stdout. A user's mistake is one line and
 exit status 2. The commands are in `tracking`, `sweeping`, `motions`, `suite` and
-`plugins`; plugins add others, see `posefit.hooks`. A command imports what it needs only
+`plugins`; plugins add others, see `posefit.hooks`. A command imports its modules only
 when it runs.
 """
 
@@ -35,7 +35,7 @@ class _Commands(Command, Group):
     """The commands of posefit and of plugins."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
-        """Return the names of all commands, those of plugins last."""
+        """Return the names of all commands, plugins' commands last."""
         return [*self.commands, *_added()]
 
     def format_commands(
@@ -75,7 +75,7 @@ def main(debug: bool) -> None:
 
     \b
     posefit track walk --out walk           a first track: open walk/track.html
-    posefit track video.mp4 --out walker    a person before a still background
+    posefit track video.mp4 --out walker    a person against a still background
     posefit sweep default --out results     compare eight methods
     """  # noqa: D301
 
@@ -110,7 +110,7 @@ def run() -> None:
         alive = {thread.name for thread in running if thread.is_alive()}
         if alive:
             names = cut(", ".join(sorted(alive)))
-            say(f"posefit: not waiting for what a plugin left running: {names}")
+            say(f"posefit: not waiting for threads that a plugin left running: {names}")
             sys.stdout.flush()
             if isinstance(end.code, int):
                 os._exit(end.code)

@@ -301,9 +301,15 @@ def extraction_of(
         values["method"] = values.pop("extraction")
     name = segmenter_name(values.get("method"), values.get("background"))
     if settings is None and "settings" in options:
-        texts = options["settings"]
-        settings = [text for text in texts if text.partition(".")[0] == name]
-        options["settings"] = tuple(text for text in texts if text not in settings)
+        own = []
+        others = []
+        for text in options["settings"]:
+            if text.partition(".")[0] == name:
+                own.append(text)
+            else:
+                others.append(text)
+        settings = own
+        options["settings"] = tuple(others)
     if settings:
         factory = registry().offer("segmenter", name).factory
         values["settings"] = parse_texts(name, factory, settings)

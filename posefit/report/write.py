@@ -9,7 +9,7 @@ from posefit.files import check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.content import data_of
-from posefit.report.kind import Kind
+from posefit.report.contest import Kind
 from posefit.report.page import MARK, document
 from posefit.report.runs import KINDS, runs_of
 from posefit.report.table import LATEX_MARK, board_lines, latex_table
@@ -73,23 +73,19 @@ def write_report(
         if latex is not None and "leaderboard" not in data:
             raise InputError("--latex must be of runs with errors, got none")
         if out is not None:
-            with replaced_file(out, MARK.encode()) as building:
-                building.write_text(document(data), encoding="utf-8", newline="\n")
+            _write(out, MARK, document(data))
         if figures is not None:
             write_figures(runs, figures)
         if csv is not None:
             with replaced_file(csv, CSV_MARK.encode()) as building:
-                building.unlink()
                 write_csv(_csv_rows(ledger, runs.kind), building)
         if latex is not None:
-            with replaced_file(latex, LATEX_MARK.encode()) as building:
-                text = latex_table(runs.kind.score, data["leaderboard"])
-                building.write_text(text, encoding="utf-8", newline="\n")
+            text = latex_table(runs.kind.score, data["leaderboard"])
+            _write(latex, LATEX_MARK, text)
     return {
         "out": out,
         "kind": runs.kind.name,
         **dict(plain({name: data[name] for name in PRINTED if name in data})),
-        "gaps": data["header"]["dropped"],
     }
 
 
@@ -104,7 +100,9 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     Returns:
         The lines.
     """
-    lines = [*report["answer"]] if "leaderboard" in report else []
+    lines = []
+    if "leaderboard" in report:
+        lines += report["answer"]
     for text, details in report["header"]["problems"]:
         lines += [text, *(f"  {detail}" for detail in details)]
     if "leaderboard" in report:
@@ -113,6 +111,12 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     if report["out"] is not None:
         lines.append(f"written to {report['out']}: open it in any browser")
     return lines
+
+
+def _write(path: str, mark: str, text: str) -> None:
+    """Write a text as a new file, or in place of an earlier one with this mark."""
+    with replaced_file(path, mark.encode()) as building:
+        building.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:

@@ -74,11 +74,9 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
         raise InputError(
             f"train must not contain the motion itself, got {values['motion']}"
         )
-    files = {
-        path: digest
-        for motion in (values["motion"], *train)
-        for path, digest in _files(motion)
-    }
+    files: dict[str, str] = {}
+    for motion in (values["motion"], *train):
+        files.update(_files(motion))
     version = version_of(offer.origin for offer in offers)
     cell = TrackCell(
         **{
@@ -172,11 +170,12 @@ def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
 
     Raises InputError if a name is unknown or a value is invalid.
     """
-    if unknown := [name for name in spec if name not in checks]:
-        known = suggestion(unknown[0], checks)
-        raise InputError(
-            f"a cell must hold {', '.join(checks)}, got {quoted(unknown[0])}{known}"
-        )
+    for name in spec:
+        if name not in checks:
+            raise InputError(
+                f"a cell must hold {', '.join(checks)}, "
+                f"got {quoted(name)}{suggestion(name, checks)}"
+            )
     return {name: checks[name](name, value) for name, value in spec.items()}
 
 

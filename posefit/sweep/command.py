@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -13,7 +12,7 @@ from posefit.progress import bars_shown
 from posefit.reading import counted, cut
 from posefit.sweep.cell import Cell, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
-from posefit.sweep.engine import Engine, Limits, Run
+from posefit.sweep.engine import Engine, Limits
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS
 from posefit.sweep.pool import Pool, cores
@@ -53,8 +52,7 @@ def swept(
     from tqdm.auto import tqdm
 
     with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
-        versions = Counter(spec["version"] for spec in ledger.old_specs())
-        for version, count in versions.items():
+        for version, count in ledger.versions().items():
             if any(map(other_version, version.split(", "))):
                 say(
                     f"{counted(count, 'row')} in {out} are of another version, "
@@ -135,7 +133,6 @@ def done_elsewhere(out: Path) -> set[str]:
 
 def engine(
     limits: Limits,
-    run: Run = run_cell,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -144,7 +141,6 @@ def engine(
 
     Args:
         limits: The longest time and the most memory of a cell.
-        run: Called with each cell in a worker.
         workers: Number of processes on this machine, by default one per processor.
         scheduler: The address of a Dask scheduler whose workers run the cells instead.
 
@@ -165,8 +161,8 @@ def engine(
         if scheduler is not None:
             from posefit.sweep.cluster import Cluster
 
-            return Cluster(scheduler, limits, run)
-        return Pool(workers or cores(), limits, run)
+            return Cluster(scheduler, limits, run_cell)
+        return Pool(workers or cores(), limits, run_cell)
 
     return start
 

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, Unpack
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
@@ -33,6 +33,7 @@ from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
 from posefit.tracking.defaults import completed
+from posefit.tracking.keywords import FitKeywords, TrackKeywords
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
@@ -52,7 +53,7 @@ def track(
     resume: bool = False,
     write: str | Sequence[str] = (),
     progress: Progress | None = None,
-    **options: Any,
+    **options: Unpack[TrackKeywords],
 ) -> Track:
     """Track a person through a source's silhouettes.
 
@@ -140,7 +141,7 @@ def fit(
     source: Footage | Sequence[Any] = "walk",
     *,
     frame: int | None = None,
-    **options: Any,
+    **options: Unpack[FitKeywords],
 ) -> Fit:
     """Estimate the pose in one frame.
 

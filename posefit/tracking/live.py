@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -29,6 +29,7 @@ from posefit.options import declared
 from posefit.progress import QUIET, Progress
 from posefit.tracking.defaults import completed
 from posefit.tracking.initialise import initialise, task_of
+from posefit.tracking.keywords import TrackKeywords
 from posefit.tracking.method import method_names, prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_hypothesis, with_notes
@@ -67,7 +68,7 @@ class LiveFrame:
 
 
 def track_live(
-    source: str = "-", *, progress: Progress = QUIET, **options: Any
+    source: str = "-", *, progress: Progress = QUIET, **options: Unpack[TrackKeywords]
 ) -> Iterator[LiveFrame]:
     """Yield the tracked frames of a stream.
 

@@ -249,7 +249,7 @@ def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
     assert done.returncode == 2, done.stderr
     assert len(lines) == 1
-    assert "expected room to write to, got File too large" in lines[0]
+    assert "expected room on the disk, got File too large" in lines[0]
     assert "finished frames are kept" in lines[0]
     assert not (tmp_path / "out").exists()
     again = run(*words, "--resume")

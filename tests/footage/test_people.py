@@ -90,6 +90,26 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     assert np.mean(shares, axis=0)[1 - which] < 0.05
 
 
+@each("scale", [1.0, 2.0])
+def test_a_place_chooses_who_is_nearest_across_and_down(scale: float) -> None:
+    middles = {(40, 60): "left", (140, 50): "right", (140, 120): "below"}
+    image = np.full((170, 180, 3), 160, dtype=np.uint8)
+    masks = []
+    for across, down in middles:
+        mask = np.zeros(image.shape[:2], dtype=bool)
+        mask[down - 20 : down + 20, across - 7 : across + 7] = True
+        masks.append(mask)
+    people = People(30.0)
+    for _ in range(20):
+        people.add(masks, image)
+    for across, down in middles:
+        near = scale * (across + 12.0), scale * (down - 12.0)
+        parts, sentence = people.chosen(near, str, scale)
+        shown = parts[0].first[1:]
+        assert np.hypot(shown[0] - across, shown[1] - down) < 3.0
+        assert f"{scale * shown[0]:.0f},{scale * shown[1]:.0f}" in sentence
+
+
 @cache
 def pairs() -> list[list[Any]]:
     """Return what is visible of each of two people in every frame of a film, which is empty first."""

@@ -16,7 +16,7 @@ const methodColumn = (of) => {
 };
 const buttonColumn = (title, show) => ({ title, text: true, show });
 const intervalColumn = (about, of, digits, [low, high] = ["low", "high"]) => {
-  const ends = (row) => `${number(row[low], digits)} – ${number(row[high], digits)}`;
+  const ends = (row) => `${number(row[low], digits)} to ${number(row[high], digits)}`;
   return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : "–") };
 };
 const bad = (count) => make("span", { class: count ? "bad" : null }, whole(count));
@@ -115,7 +115,7 @@ function leaderboard() {
   table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
 }
 
-// The command that runs a row again, and a button for one that needs no ledger.
+// The command that runs a row again, and a button for a command that needs no ledger.
 const rerun = (key) => make("code", {}, `posefit rerun ${D.ledger} ${key}`);
 function repeatButton(k) {
   const R = D.rows;
