@@ -374,18 +374,12 @@ ROWS = {
         partial(track_known, pixels_high),
     ),
     "proposals": Row("proposals", doubled(1, 1_000_000), cost_of),
-    "environments": Row(
-        "environments", doubled(1, 16_384), environments_side_by_side
-    ),
+    "environments": Row("environments", doubled(1, 16_384), environments_side_by_side),
     "steps": Row("steps", doubled(250, 10_000_000), steps_in_a_row),
     "plan": Row("cells", doubled(1_000, 1_000_000), plan_cells, of=MILLION),
     "run": Row("cells", doubled(1_000, 1_000_000), run_cells, of=MILLION),
-    "resume": Row(
-        "cells", doubled(1_000, 1_000_000), run_cells, run_cells, MILLION
-    ),
-    "report": Row(
-        "cells", doubled(1_000, 1_000_000), report_cells, run_cells, MILLION
-    ),
+    "resume": Row("cells", doubled(1_000, 1_000_000), run_cells, run_cells, MILLION),
+    "report": Row("cells", doubled(1_000, 1_000_000), report_cells, run_cells, MILLION),
 }
 
 
