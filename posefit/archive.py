@@ -1,6 +1,6 @@
 """Arrays of .npz and .npy files, whose sizes are checked before they are unpacked.
 
-`numpy.load` unpacks whatever a file asks for, which a hostile file may abuse. Here the
+`numpy.load` unpacks any amount of data, which a hostile file may abuse. Here the
 archive's directory and the header of each array are read first. An array is not
 unpacked if its size differs from what they say, or exceeds what the caller allows.
 """

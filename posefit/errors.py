@@ -28,7 +28,7 @@ def printable(text: str) -> str:
 class InputError(ValueError):
     """An argument, a setting or a file is invalid.
 
-    The message says what was expected and what came. The command line shows it as one
+    The message has the expected and the actual value. The command line shows it as one
     line; any other ValueError is a fault of the program and shows its traceback. The
     message may contain names from outside, and so it is made `printable`.
     """

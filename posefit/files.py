@@ -2,7 +2,7 @@
 
 Files are first written in the same folder, under a random name that begins with a dot.
 They are created exclusively, so that nothing is written through another file or link.
-A call removes only what it has made, or what carries the mark of an earlier call that
+A call removes only its own files, or files with the mark of an earlier call that
 has ended.
 """
 
@@ -61,9 +61,7 @@ def opencv_name(path: str | Path) -> str:
     try:
         name.encode()
     except UnicodeEncodeError:
-        raise InputError(
-            f"{path}: expected a name in UTF-8, got one that is not"
-        ) from None
+        raise InputError(f"{path}: expected a name in UTF-8, got other bytes") from None
     return name
 
 
@@ -144,7 +142,7 @@ def _built(
 
 
 def replaceable(path: str | Path, mark: bytes) -> bool:
-    """Return whether a name is free, or is that of a file that begins with `mark`.
+    """Return whether a name is free, or names a file that begins with `mark`.
 
     A link is never replaceable.
     """

@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -101,12 +101,19 @@ class timed:  # noqa: N801, named like the context managers of contextlib
             raise TimeoutError from error  # the cause's traceback says where it was
 
 
-def end_with_parent(parent: int) -> None:
-    """End this process soon after its parent process has ended in any way."""
+def end_with_parent(parent: int, clean_up: Callable[[], None] | None = None) -> None:
+    """End this process soon after its parent process has ended in any way.
+
+    Args:
+        parent: the parent's process id.
+        clean_up: is called before.
+    """
 
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(PARENT_POLL_SECONDS)
+        if clean_up is not None:
+            clean_up()
         # also end what this process has started, if it leads a process group
         if hasattr(os, "getpgrp") and os.getpgrp() == os.getpid():
             os.killpg(0, signal.SIGKILL)
@@ -161,7 +168,7 @@ def check_decoded(name: str, size: int) -> None:
 def allowed_bytes() -> int:
     """Return the memory in bytes that this process may use.
 
-    It is the least of what the machine, its container and the process' limits allow.
+    It is the least of the limits of the machine, its container and the process.
     """
     limits = []
     with suppress(ImportError):

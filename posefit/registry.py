@@ -1,4 +1,4 @@
-"""Loads plugins, and finds what they offer by kind and name.
+"""Loads plugins, and finds their offers by kind and name.
 
 A plugin is left out if it cannot be imported, misspells a hook, fails inside a hook, or
 registers a name that is taken. A warning then names its distribution; the others work.
@@ -41,7 +41,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 CHECKED_KINDS = tuple(kind for kind in KINDS if kind != "device")
 # distribution of an optimiser that no plugin but the program itself has registered
 OWN = "this process"
-COMMAND: Literal["command"] = "command"  # what a plugin may register besides KINDS
+COMMAND: Literal["command"] = "command"  # plugins may register commands besides KINDS
 Registrable: TypeAlias = Kind | Literal["command"]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 
@@ -80,7 +80,7 @@ class Offer:
 
     @property
     def origin(self) -> str:
-        """What its results depend on.
+        """The origin of its results.
 
         That is its distribution and version, a digest of its package's source, and its
         library. posefit's own plugins have the same version; their packages' names
@@ -124,7 +124,7 @@ class Offer:
 
 
 class Plugin(NamedTuple):
-    """One entry point, and what it offers.
+    """One entry point, and its offers.
 
     Attributes:
         name: of the entry point.
@@ -290,7 +290,7 @@ def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
 def plugins_of(
     kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()
 ) -> tuple[Plugin, ...]:
-    """Return all installed plugins with what they offer of some kinds; see `load`.
+    """Return all installed plugins with their offers of some kinds; see `load`.
 
     A plugin in a group whose name only begins with posefit's is included as broken.
     """
@@ -312,6 +312,17 @@ def optimiser(name: str) -> "OptimiserFactory":
     Raises:
         InputError: there is none; the message lists the known names.
         ImportError: a library that it needs is not installed.
+
+    Args:
+        name: The optimiser's name, such as "sapso", or "nevergrad:DE".
+
+    Returns:
+        The factory, which takes a space, a generator and settings.
+
+    Example:
+        >>> import posefit
+        >>> posefit.optimiser("sapso").__name__
+        'SAPSO'
     """
     return registry().optimiser(name)
 
@@ -322,6 +333,19 @@ def prior(name: str) -> "PriorFactory":
     Raises:
         InputError: there is none; the message lists the known names.
         ImportError: a library that it needs is not installed.
+
+    Args:
+        name: The prior's name, such as "pca".
+
+    Returns:
+        The factory, which takes settings.
+
+    Example:
+        >>> import posefit
+        >>> poses = posefit.load_motion("walk-a").poses
+        >>> fitted = posefit.prior("pca")(components=3).fit(poses[:, 3:])
+        >>> fitted.low.shape
+        (3,)
     """
     return registry().prior(name)
 
@@ -371,7 +395,7 @@ def load(
                     offers=tuple(methods),
                     commands=tuple(commands),
                 )
-            # the others must work, no matter what a plugin does
+            # the others must work even if a plugin fails
             except (Exception, SystemExit) as error:
                 trace = "".join(traceback.format_exception(error))
                 plugin = plugin._replace(
@@ -398,7 +422,7 @@ def _offers(
     release: str,
     owners: Mapping[str, str],
 ) -> "dict[str, Offer | click.Command]":
-    """Return what a plugin offers, by its name in errors. Let all errors through."""
+    """Return a plugin's offers, by its name in errors. Let all errors through."""
     if point.group != PROJECT:
         raise InputError(
             f"its entry point must be in the group {PROJECT!r}, got {point.group!r}"

@@ -210,7 +210,7 @@ class Instant:
         """Return how many cells may run at a time."""
         return 64
 
-    def submit(self, job: Any) -> None:
+    def submit(self, job: Any, tenant: str = "") -> None:
         """Take a cell."""
         self._jobs.append(job)
 

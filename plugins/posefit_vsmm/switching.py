@@ -363,7 +363,7 @@ class Switching:
         return after
 
     def keep_only(self, group: str, belief: Belief) -> Belief:
-        """End the other groups, and return the belief over the one that is kept."""
+        """End the other groups, and return the belief over the remaining group."""
         old = self.active
         self.active = self.groups[group]
         self.group = group

@@ -1,4 +1,4 @@
-"""Texts of `posefit plugins`: what is installed, and what is wrong with it."""
+"""Texts of `posefit plugins`: the installed plugins, and their faults."""
 
 import os
 import shutil

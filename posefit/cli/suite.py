@@ -10,7 +10,7 @@ from posefit.cli.group import Group
 from posefit.cli.options import parsed_by
 from posefit.cli.output import print_result, progress, results_alone, say
 from posefit.errors import InputError
-from posefit.tracking.options import text_range
+from posefit.footage.options import text_range
 
 if TYPE_CHECKING:
     from posefit.suites.running import SuiteScore

@@ -25,7 +25,7 @@ from posefit.errors import InputError
 from posefit.progress import Progress
 
 if TYPE_CHECKING:
-    from posefit.footage.source import Medium
+    from posefit.footage.kinds import Medium
     from posefit.output.content import Content
 
 _OF_FILES = ("source", "out", "force", "resume", "write")
@@ -68,6 +68,7 @@ def track(
     if live is not None:
         return _track_live(live, as_json, options, shown)
 
+    # plugins may print, and stdout must hold nothing but the JSON object
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
     shown.log(f"took {_times(shown)}")
@@ -210,8 +211,8 @@ def extract(
     at the same time.
     """
     from posefit.footage.extract import extract as run
-    from posefit.footage.segmentation import Extraction
-    from posefit.footage.source import resolve
+    from posefit.footage.extraction import Extraction
+    from posefit.footage.kinds import resolve
 
     resolved = resolve(source)
     how = extraction_of(options, resolved.medium, settings) or Extraction()
@@ -245,7 +246,7 @@ def _arguments(
 
     `medium` is given for a stream; otherwise the source is resolved.
     """
-    from posefit.footage.source import resolve
+    from posefit.footage.kinds import resolve
     from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
 
@@ -283,8 +284,8 @@ def extraction_of(
         InputError: The options are given for a source that is not segmented.
 
     """
-    from posefit.footage.segmentation import Extraction, segmenter_name
-    from posefit.footage.source import useless_for
+    from posefit.footage.extraction import Extraction, segmenter_name
+    from posefit.footage.uses import useless_for
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
@@ -301,6 +302,7 @@ def extraction_of(
         values["method"] = values.pop("extraction")
     name = segmenter_name(values.get("method"), values.get("background"))
     if settings is None and "settings" in options:
+        # `--set` has the settings of all plugins, and the tracker refuses unknown ones
         own = []
         others = []
         for text in options["settings"]:

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,6 +110,39 @@ def unseen(table: Table) -> set[int]:
     return set(table["frame"][is_unseen].tolist())
 
 
+class Flagged(NamedTuple):
+    """The frames that are called lost, or whose sides are called unknown."""
+
+    frames: NDArray[np.bool_]  # (T,)
+    count: int  # of the frames that it is known of
+
+
+def flagged(table: Table, name: str) -> Flagged | None:
+    """Return the frames that are called lost, or whose sides are called unknown.
+
+    Only frames that show enough of the person count: in the others the pose was held,
+    not searched. Counts and shares of both kinds are all taken from here.
+
+    Args:
+        table: The columns.
+        name: `lost` or `unknown_sides`.
+
+    Returns:
+        The frames, or None if it is known of no frame.
+    """
+    least = {"lost": LOST, "unknown_sides": 1.0}[name]
+    known = (table["usable"] == 1.0) & np.isfinite(table[name])
+    if not known.any():
+        return None
+    return Flagged(known & (table[name] >= least), int(known.sum()))
+
+
+def flagged_share(table: Table, name: str) -> float | None:
+    """Return the share of the frames that `flagged` returns, None if it is unknown."""
+    frames = flagged(table, name)
+    return None if frames is None else float(frames.frames.sum()) / frames.count
+
+
 def evaluated(
     scene: Scene,
     frames: Sequence[Frame],
@@ -170,6 +203,8 @@ def evaluated(
     measures = Measures(
         **error_measures,
         **certainty_measures,
+        unknown_rate=flagged_share(table, "unknown_sides"),
+        lost_flagged_rate=flagged_share(table, "lost"),
         **_steadiness(scene, frames),
         iou=float(iou[usable].mean()),
         cost=float(cost[usable].mean()),
@@ -285,13 +320,10 @@ def _certainty(
             off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
             inside.append(np.linalg.norm(off, axis=1)[1:] <= radii)
     swapped_known = None if swapped is None else mean_known(swapped[sides == 0.0])
-    is_lost = lost[np.isfinite(lost)] >= LOST
     measures = {
         "coverage": _by_level(inside),
         "interval_mm": _by_level(radii_mm),
-        "unknown_rate": mean_known(sides),
         "swapped_known_rate": swapped_known,
-        "lost_flagged_rate": mean_known(is_lost.astype(np.float64)),
     }
     return {"unknown_sides": sides, "lost": lost, "interval_mm": radius_mm}, measures
 
@@ -313,7 +345,7 @@ def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
     fps = scene.fps
     mean = mean_known(acceleration(joints, fps))
     ratio = None
-    reference = joints  # the joints that decide when a foot stands
+    reference = joints  # the joints that decide whether a foot is on the ground
     if scene.truth is not None:
         reference = scene.truth.joints
         true_mean = mean_known(acceleration(reference, fps))

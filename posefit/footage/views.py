@@ -36,6 +36,8 @@ Range = tuple[int | None, int | None]
 Planes = NDArray[np.uint8]
 # masks of one camera that are held in memory
 PLANES_BYTES = 128_000_000
+# the fields of a `View` with one row per frame; some may be None
+PER_FRAME = ("numbers", "times", "bits", "known", "usable", "landmarks", "facings")
 # cache of decoded masks: large enough for a short film
 DECODED_BYTES = 64_000_000
 # a decoded silhouette per pixel: two arrays of bytes, and two of bits
@@ -78,8 +80,9 @@ class View:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only, because several views share them."""
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
+        for name in PER_FRAME:
+            value = getattr(self, name)
+            if value is not None:
                 value.flags.writeable = False
 
     def __len__(self) -> int:
@@ -88,19 +91,20 @@ class View:
     def __getitem__(self, rows: slice) -> "View":
         """Return the view of a slice of its frames, counted from 0."""
         cut: dict[str, Any] = {}
-        for name in self._array_names():
-            cut[name] = getattr(self, name)[rows]
+        for name in PER_FRAME:
+            value = getattr(self, name)
+            cut[name] = None if value is None else value[rows]
         return replace(self, **cut)
-
-    def _array_names(self) -> list[str]:
-        """Return the names of the fields that hold one row per frame."""
-        fields = vars(self).items()
-        return [name for name, value in fields if isinstance(value, np.ndarray)]
 
     def silhouette(self, k: int) -> Silhouette:
         """Decode and return the silhouette of frame k, counted from 0."""
         known = None if self.known is None else unpacked(self.known[k], self.size)
         return Silhouette.of(unpacked(self.bits[k], self.size), known)
+
+    def masks(self) -> Iterator[Mask]:
+        """Decode and yield the mask of each frame."""
+        for bits in self.bits:
+            yield unpacked(bits, self.size)
 
     @property
     def shows(self) -> NDArray[np.bool_]:
@@ -116,11 +120,61 @@ class View:
 
 
 def joined(views: Sequence[View]) -> View:
-    """Return one view of all frames of several views, in order, without pictures."""
-    arrays: dict[str, Any] = {}
-    for name in views[0]._array_names():
-        arrays[name] = np.concatenate([getattr(view, name) for view in views])
-    return replace(views[0], **arrays, pictures=None)
+    """Return one view of all frames of several views, in order, without pictures.
+
+    What some of the views do not know is None in the joined one, except for `known`.
+    """
+    if any(view.known is not None for view in views):
+        views = [_with_known(view) for view in views]
+    rows: dict[str, Any] = {}
+    for name in PER_FRAME:
+        values = [getattr(view, name) for view in views]
+        rows[name] = None
+        if all(value is not None for value in values):
+            rows[name] = np.concatenate(values)
+    return replace(views[0], **rows, pictures=None)
+
+
+def _with_known(view: View) -> View:
+    """Return a view that states which pixels are known."""
+    if view.known is not None:
+        return view
+    return replace(view, known=full_planes(len(view), view.size))
+
+
+def together(views: Sequence[View]) -> list[View]:
+    """Cut the views of several cameras to the frames that all of them have.
+
+    Frames are compared by their numbers, if all cameras state them.
+
+    Raises:
+        InputError: The cameras have no frame in common, or they begin at different
+            frames and not all of them state numbers.
+
+    """
+    starts = [int(view.numbers[0]) for view in views]
+    stops = [int(view.numbers[-1]) + 1 for view in views]
+    names = [view.name for view in views]
+    if not all(view.counted for view in views):
+        if len(set(starts)) > 1:
+            each = zip(starts, names, strict=True)
+            came = " and ".join(f"{first} of {name}" for first, name in each)
+            raise InputError(f"cameras must begin with one frame, got frame {came}")
+        return list(views)
+    start = max(starts)
+    stop = min(stops)
+    spans = zip(starts, stops, names, strict=True)
+    came = ", ".join(f"{first}:{last} of {name}" for first, last, name in spans)
+    if start >= stop:
+        raise InputError(f"cameras must have frames in common, got {came}")
+    if len(set(starts)) > 1 or len(set(stops)) > 1:
+        used = f"the frames {start}:{stop} are used, which all cameras have, of {came}"
+        first_view = replace(views[0], guesses=[*views[0].guesses, used])
+        views = [first_view, *views[1:]]
+    return [
+        view[start - first : stop - first]
+        for view, first in zip(views, starts, strict=True)
+    ]
 
 
 def times_of(numbers: NDArray[np.int64], fps: float | None) -> Array:

@@ -1,9 +1,9 @@
 """Clinical joint angles, in degrees: of hip, knee and ankle, of shoulder and elbow.
 
 Each is zero in the anatomical position, and has the same sign on both sides of the
-body. The axes are those of `posefit.measuring.segments`. The shoulder's plane and
-rotation are undefined if the arm hangs straight down, like longitudes at a pole; near
-that pose they are left out.
+body. `posefit.measuring.segments` defines the axes. The shoulder's plane and rotation
+are undefined if the arm hangs straight down, like longitudes at a pole; near that pose
+they are left out.
 """
 
 from collections.abc import Iterator
@@ -53,7 +53,6 @@ BETWEEN = {
 }
 
 
-# columns of angles.csv, in order
 def _columns() -> Iterator[str]:
     for joint, angles in MEANINGS.items():
         for side in SIDES:
@@ -61,6 +60,7 @@ def _columns() -> Iterator[str]:
                 yield f"{side}_{joint}_{angle}"
 
 
+# columns of angles.csv, in order
 COLUMNS = tuple(_columns())
 # mirrors left and right, in segments' axes
 _ACROSS = np.diag([1.0, 1.0, -1.0])
@@ -133,6 +133,16 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     Args:
         skeleton: the skeleton.
         poses: successive poses (T, 66).
+
+    Returns:
+        The angles (T,) in degrees by name.
+
+    Example:
+        >>> from posefit import clinical_angles, load_motion
+        >>> walk = load_motion("16_15")
+        >>> angles = clinical_angles(walk.skeleton, walk.poses)
+        >>> round(float(angles["left_knee_flexion"].max()), -1)
+        70.0
     """
     segments = segment_rotations(skeleton, poses)
     columns: dict[str, Array] = {}

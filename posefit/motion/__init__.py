@@ -7,7 +7,7 @@
 | the built-in motions, which need no data | built_in.py |
 | recorded clips of ten people, with the package | recorded.py |
 | what "instance 17" is: numbers, random streams, variations | instances.py |
-| how joints accelerate, and how far feet slide while they stand | steadiness.py |
+| how joints accelerate, and how far feet slide on the ground | steadiness.py |
 | Acclaim skeletons, such as CMU's `02.asf` | asf.py |
 | Acclaim motions, such as CMU's `02_01.amc`; `read_clip` reads both files | amc.py |
 | lines of text files, with errors that name file and line | lines.py |

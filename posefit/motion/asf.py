@@ -54,7 +54,7 @@ class _Bone(NamedTuple):
 
 
 class Acclaim(NamedTuple):
-    """Content of an .asf file: skeleton, metres per unit, and what was guessed."""
+    """Content of an .asf file: skeleton, metres per unit, and guesses."""
 
     skeleton: Skeleton
     metres: float
@@ -70,7 +70,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
 
     Args:
         path: the file.
-        unit: length unit of the file, by default the one that it states.
+        unit: length unit of the file, by default as stated in it.
 
     Raises:
         InputError: the file is not an Acclaim skeleton with the 26 bones; the message

@@ -147,7 +147,7 @@ def _model(name: str) -> tuple[list[int], Array, float, float]:
 def _check(name: str) -> None:
     if name not in names():
         raise InputError(
-            "motion must be a file, a folder, a recorded one that posefit motions "
+            "motion must be a file, a folder, a recorded motion that posefit motions "
             f"lists, or one of {', '.join(names())}, "
             f"got {quoted(name)}{suggestion(name, names())}"
         )

@@ -155,7 +155,7 @@ def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
     """Return the axis that is up, such as -z, and the turn (3, 3) from it to y."""
     if up is not None:
         if up not in TURNS:
-            raise InputError(f"an axis up of x, y or z, got {quoted(up)}")
+            raise InputError(f"an upward axis of x, y or z, got {quoted(up)}")
         return up, np.array(TURNS[up], dtype=np.float64)
     number, cosine = upward(rig)
     name: Up = ("x", "y", "z")[number]
@@ -318,7 +318,7 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
     joints = joints_of(names, parents)
     if isinstance(joints, list):
         raise InputError(
-            f"a person's joints, got one without {cut(', '.join(joints), 200)}"
+            f"a person's joints, got a person without {cut(', '.join(joints), 200)}"
         )
     wanted: set[int] = set()  # the joints of the person, and all nodes above them
     for number in (

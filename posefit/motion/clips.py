@@ -35,7 +35,7 @@ class FileOptions(NamedTuple):
         unit: length unit; None to recognise it.
         up: axis that points up; None for y, or in a .bvh file for the axis along which
             the person stands.
-        rate: frames per second of an .amc file; None for what it states, or 120.
+        rate: frames per second of an .amc file; None for the stated rate, or 120.
     """
 
     asf: str | Path | None = None
@@ -135,6 +135,15 @@ def load_motion(
     Raises:
         InputError: there is no such motion, or unit or up is given for a source that is
             not a file.
+
+    Returns:
+        The motion.
+
+    Example:
+        >>> from posefit import load_motion
+        >>> motion = load_motion("walk", fps=60.0)
+        >>> motion.fps, motion.poses.shape[1]
+        (60.0, 66)
     """
     suffix = ""
     if not isinstance(source, Motion) and source not in built_in.names():
@@ -221,7 +230,7 @@ def _clips(
         clips = [clip for clip in recorded.named(source) if clip.name != stem]
         if not clips:
             raise InputError(
-                "train must hold another clip than the source, "
+                "train must hold a clip other than the source, "
                 f"got {source} for {followed}"
             )
         yield from (recorded_clip(clip) for clip in clips)
@@ -238,8 +247,8 @@ def _clips(
         others = [path for path in paths if not _same(path, followed)]
         if not others:
             raise InputError(
-                f"{source}: expected a folder with another clip than the source, "
-                "got that one alone"
+                f"{source}: expected a folder with a clip other than the source, "
+                "got only that clip"
             )
         yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):

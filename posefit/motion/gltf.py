@@ -74,8 +74,8 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
-    for node, path, values in moved:
-        target = {"node": node, "path": path}
+    for node, moving, values in moved:
+        target = {"node": node, "path": moving}
         channels.append({"sampler": len(samplers), "target": target})
         samplers.append({"input": times, "output": data.add(values, None)})
     materials = []

@@ -140,7 +140,7 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
         parents: their parents, which come before them; -1 for a root.
 
     Returns:
-        The joints, or a list of what is missing.
+        The joints, or a list of missing ones.
     """
     parts = [part_of(name) for name in names]
     paths: list[list[int]] = []  # for each node, the nodes from a root to it

@@ -146,8 +146,7 @@ def clip(name: str) -> RecordedClip:
     """
     if not is_recorded(name):
         raise InputError(
-            "a recorded motion must be one that posefit motions lists, "
-            f"got {quoted(name)}"
+            f"a recorded motion must be listed by posefit motions, got {quoted(name)}"
         )
     return _stored()[name]
 
@@ -178,7 +177,9 @@ def clips(
         if clip.subject in only and clip.subject not in without:
             chosen.append(clip)
     if not chosen:
-        raise InputError("the library must keep at least one person, got all left out")
+        raise InputError(
+            "the library must keep at least one person, got everybody left out"
+        )
     return chosen
 
 

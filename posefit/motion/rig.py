@@ -228,7 +228,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     legs = [rig.length(side) for side in ("left", "right")]
     scale = float(np.mean(legs)) / average_leg
     if not scale > 0.0:
-        raise InputError("legs with a length, got some without")
+        raise InputError("legs with a length, got a length of 0")
     bones = _bones(rig, scale)
     rest = _like_rest(rig, bones)
     turned, directions, lengths = _bones_at_rest(rig, bones, rest, scale)

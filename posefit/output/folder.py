@@ -145,7 +145,7 @@ class OutputFolder(Recorder):
         if isinstance(error, OSError):
             cause = f"{error.strerror or error}{notice}"
             raise InputError(
-                f"{self.path}: expected room to write to, got {cause}"
+                f"{self.path}: expected room on the disk, got {cause}"
             ) from error
         if notice and isinstance(error, InputError):
             raise InputError(f"{error}{notice}") from error

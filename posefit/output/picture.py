@@ -199,7 +199,7 @@ class Painter:
     ) -> Image:
         """Return a picture (height, width, 3) of the body in all cameras' views.
 
-        The body is drawn on what was `filmed` by the first camera, and on the masks of
+        The body is drawn on the first camera's picture `filmed`, and on the masks of
         the other cameras. On masks, coloured bones show which side is left.
         """
         body = self._scene.body

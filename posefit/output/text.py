@@ -9,6 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 from posefit.errors import printable
+from posefit.evaluation.errors import flagged
 from posefit.evaluation.measures import BASELINES, MEASURES, Measures
 from posefit.evaluation.trust import trust_line
 from posefit.output.content import Content
@@ -133,17 +134,16 @@ def held_frames(track: Content) -> str:
 
 
 def undetermined(track: Content) -> str:
-    """Return one sentence about what the method did not determine, or ""."""
-    sides = len(track.log.unknown_sides or ())
-    lost = len(track.log.lost_frames or ())
-    of = f" of {track.setup.frames}"
+    """Return one sentence about everything that a method left undetermined, or ""."""
     parts = []
-    if sides:
-        parts.append(f"left and right: unknown in {_frames(sides, of)}")
-    if lost:
-        # the number of all frames is said once
-        parts.append(f"{_frames(lost, '' if sides else of)} lost")
-    return "; ".join(parts)
+    words = {"unknown_sides": "left and right unknown in", "lost": "lost in"}
+    for name, verb in words.items():
+        frames = flagged(track.table, name)
+        if frames is not None and frames.frames.any():
+            parts.append(f"{verb} {frames.frames.sum()} of {frames.count}")
+    if not parts:
+        return ""
+    return f"{', '.join(parts)} frames that show enough of the person"
 
 
 def gait_line(gait: Mapping[str, Any], *, by_side: bool = True) -> str:
@@ -210,10 +210,6 @@ def _effort(track: Content) -> str:
     besides = f" (and {', '.join(others)})" if others else ""
     evaluations = f"{frame:,.0f}{of} evaluations{besides}"
     return f"{_shown(measures, 'iou')}, {evaluations} and {seconds} ms a frame"
-
-
-def _frames(count: int, of: str) -> str:
-    return f"{count}{of} frame{'' if count == 1 and not of else 's'}"
 
 
 def _shown(measures: Measures, name: str) -> str:

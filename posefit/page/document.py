@@ -42,7 +42,7 @@ def assembled(mark: str, markup: str, style: str, data: Any, script: str) -> str
 
 
 def one_script(package: str, names: Sequence[str]) -> str:
-    """Return the shared scripts and those of a package as one script.
+    """Return the shared scripts and a package's scripts as one script.
 
     Its names are not global.
     """
@@ -52,7 +52,7 @@ def one_script(package: str, names: Sequence[str]) -> str:
 
 
 def embedded(value: Any) -> str:
-    """Return JSON that is safe in a script element, whatever texts it holds.
+    """Return JSON that is safe in a script element, with any texts.
 
     Nan and infinities are null.
     """

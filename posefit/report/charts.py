@@ -11,7 +11,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.report.columns import mean
-from posefit.report.kind import Contest
+from posefit.report.contest import Contest
 from posefit.statistics.means import Intervals, block_means
 from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS

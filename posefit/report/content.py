@@ -8,7 +8,7 @@ from typing import Any
 
 from posefit.errors import printable
 from posefit.reading import counted
-from posefit.report.kind import Contest, Runs
+from posefit.report.contest import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.page import COLOUR_COUNT
 from posefit.report.summary import leader_sentences, unpaired_sentence
@@ -43,8 +43,8 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
     for row, texts in runs.warnings.items():
         warned[row] = list(map(warnings.index, texts))
     methods = []
-    for name, variant in zip(runs.methods, runs.variants, strict=True):
-        methods.append({"name": name, "settings": variant["settings"]})
+    for name, settings in zip(runs.methods, runs.settings, strict=True):
+        methods.append({"name": name, "settings": settings})
     answer = "No run has an error: nothing can be compared."
     if runs.failures:
         answer = "Every cell failed."
@@ -132,20 +132,19 @@ def _problems(
         problems.append((text, named))
 
     if runs.failures:
-        by_method: Counter[str] = Counter()
         reasons: Counter[str] = Counter()
         for failure in runs.failures:
-            by_method[failure["method"]] += 1
             reasons.update(failure["reasons"])
-        text = "; ".join(f"{name} {count}" for name, count in by_method.items())
+        text = "; ".join(f"{name} {count}" for name, count in runs.failed.items())
         failed = counted(len(runs.failures), "cell")
         add(
             f"{failed} failed, left out of all figures: {text}",
             [f"{n} x {reason}" for reason, n in reasons.most_common()],
             REASONS,
         )
-    if runs.unfinished:
-        names = "; ".join(runs.unfinished)
+    unfinished = [name for name in runs.failed if name not in runs.methods]
+    if unfinished:
+        names = "; ".join(unfinished)
         add(f"no cell finished, so not on the leaderboard: {names}", [], 0)
     if unpaired:
         add(unpaired, [], 0)

@@ -10,7 +10,7 @@ from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
 from posefit.report.charts import Chart, track_charts
 from posefit.report.columns import Score
-from posefit.report.kind import Row, Runs
+from posefit.report.contest import Row, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.page import LIGHT
 from posefit.report.table import board_rows
@@ -63,7 +63,9 @@ def chart_figure(
         line = chart.lines[k]
         if line is None:
             continue
+        # from the eighth method on, colours repeat with another line style
         colour = COLOURS[numbers[k] % len(COLOURS)]
+        # steps, because a best cost holds until the next improvement
         axes.plot(
             line.x,
             line.y,
@@ -188,7 +190,7 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     """
     contest = contest_of(runs)
     if contest is None:
-        raise InputError("figures must be of runs with errors, got none")
+        raise InputError("figures need runs with errors, got none")
     board = leaderboard(contest)
     names = [runs.methods[m] for m in contest.methods]
     order = []

@@ -4,7 +4,7 @@ import math
 from dataclasses import astuple
 from typing import Any
 
-from posefit.report.kind import Contest, Runs
+from posefit.report.contest import Contest, Runs
 from posefit.statistics.paired import SIGNIFICANCE
 from posefit.statistics.pairing import most_shared
 
@@ -52,15 +52,16 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     runs = contest.runs
     score = runs.kind.score
     more = runs.kind.board(contest)
+    settings = runs.settings
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
         rows = contest.rows_of(m)
         row = {
             "method": m,
             "name": name,
-            "settings": runs.variants[m]["settings"],
+            "settings": settings[m],
             "runs": len(rows),
-            "failed": runs.failed[m],
+            "failed": runs.failed[name],
             "warned": sum(k in runs.warnings for k in rows.tolist()),
             "taking_part": m in contest.methods,
         }
@@ -75,6 +76,8 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
             return math.inf, 0.0
         return (-value if score.down else value), row.get("above", 0.0)
 
+    # the method of the best score comes first only if it lost no more than others that
+    # a test does not separate from it
     best = min((row for row in board if row["taking_part"]), key=badness)
     best_place = contest.methods.index(best["method"])
     worse_methods = set()

@@ -22,7 +22,7 @@ LAST_FIELDS = ("instance", "seed")
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
 MAX_SHOWN = 12  # the most differing figures that are listed
 _BEGIN = "posefit sweep - --out rerun <<'END'\n"
-# characters that TOML or a terminal does not allow, beyond those that JSON escapes
+# characters that JSON does not escape, but TOML or a terminal does not allow
 _ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x2029)}
 
 

@@ -11,7 +11,7 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, mean, median
-from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.statistics.means import mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
@@ -47,10 +47,8 @@ _ABOVE = Measure(
     "above", "above", "", 2, "Median of the best costs above the true pose's"
 )
 COLUMNS = {
-    "reached": Column(
-        "reached", _REACHED, _reached, higher_is_better=True, average=mean
-    ),
-    "above": Column("above", _ABOVE, _above, average=median),
+    "reached": Column(_REACHED, _reached, higher_is_better=True, average=mean),
+    "above": Column(_ABOVE, _above, average=median),
 }
 SCORE = Score(
     name="reached",
@@ -71,7 +69,7 @@ SCORE = Score(
 
 
 class Searches:
-    """The kind of runs of single searches."""
+    """The kind of runs of single searches, with the attributes of `Tracks`."""
 
     name = "search"
     noun = "searches"
@@ -273,4 +271,4 @@ def _function(number: int) -> str:
     return f"{number} {suite_function(number).name}"
 
 
-SEARCHES: Kind = Searches()
+SEARCHES = Searches()

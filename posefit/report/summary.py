@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import listed, p_text
-from posefit.report.kind import Contest, Row
+from posefit.report.contest import Contest, Row
 from posefit.statistics.paired import POWER, SIGNIFICANCE
 
 # If a difference would take more seeds or instances, the methods are practically equal.
@@ -126,6 +126,7 @@ def _power(contest: Contest, unclear: Sequence[Row]) -> str:
     if score.paired == "runs":
         needed = needed / len(contest.instances)
         unit = "seeds of each instance"
+    # a difference of nearly 0 would need millions of runs, a number that misleads
     if needed > MAX_NEEDED:
         return (
             f"Not even {MAX_NEEDED:,} {unit} would show differences as small as these."

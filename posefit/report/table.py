@@ -6,7 +6,7 @@ from typing import Any
 
 from posefit.evaluation.measures import BASELINES
 from posefit.report.columns import Score
-from posefit.report.kind import Row, Runs
+from posefit.report.contest import Row, Runs
 from posefit.report.leaderboard import EFFECT
 from posefit.report.tracks import LOSS_BASELINE
 

@@ -17,9 +17,11 @@ from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed, mean
-from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
+from posefit.report.repeat import command_head
 from posefit.statistics.means import block_means
+from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
 
 LOSS = "error_with_losses_degrees"
@@ -81,43 +83,47 @@ def _columns() -> list[Column]:
         measure = MEASURES["skill"]
         skill_measure = replace(
             measure,
+            name=f"skill.{name}",
             label=f"{measure.label}: {label}",
             meaning=f"{measure.meaning}; compared with the {label}",
         )
-        skills.append(Column(f"skill.{name}", skill_measure, higher_is_better=True))
-        baseline_measure = replace(MEASURES["baselines_degrees"], label=label)
-        baselines.append(
-            Column(f"baselines_degrees.{name}", baseline_measure, in_tables=False)
+        skills.append(Column(skill_measure, higher_is_better=True))
+        baseline_measure = replace(
+            MEASURES["baselines_degrees"], name=f"baselines_degrees.{name}", label=label
         )
+        baselines.append(Column(baseline_measure, in_tables=False))
     intervals = []
     for level in charts.LEVEL_NAMES:
         shown = level == TABLE_LEVEL
-        coverage = replace(_share("coverage"), label=f"{level} % interval holds")
-        width = replace(MEASURES["interval_mm"], label=f"{level} % interval")
+        coverage = replace(
+            _share("coverage"),
+            name=f"coverage.{level}",
+            label=f"{level} % interval holds",
+        )
+        width = replace(
+            MEASURES["interval_mm"],
+            name=f"interval_mm.{level}",
+            label=f"{level} % interval",
+        )
         intervals += [
-            Column(
-                f"coverage.{level}",
-                coverage,
-                higher_is_better=True,
-                in_tables=shown,
-                optional=True,
-            ),
-            Column(f"interval_mm.{level}", width, in_tables=shown, optional=True),
+            Column(coverage, higher_is_better=True, in_tables=shown, optional=True),
+            Column(width, in_tables=shown, optional=True),
         ]
+    error = replace(MEASURES["error_degrees"], name="error_degrees.mean")
     return [
-        Column(LOSS, loss, compute=error_with_losses),
+        Column(loss, compute=error_with_losses),
         # only in rows and the CSV: a page with 100,000 rows has no room for it
-        Column("error_degrees.mean", MEASURES["error_degrees"], in_tables=False),
+        Column(error, in_tables=False),
         *skills,
-        Column("lost_rate", _share("lost_rate")),
-        Column("swap_rate", _share("swap_rate")),
-        Column("unknown_rate", _share("unknown_rate"), optional=True),
+        Column(_share("lost_rate")),
+        Column(_share("swap_rate")),
+        Column(_share("unknown_rate"), optional=True),
         *intervals,
-        Column("mpjpe_mm", MEASURES["mpjpe_mm"]),
-        Column("iou", MEASURES["iou"], higher_is_better=True),
-        Column("seconds_per_frame", MEASURES["seconds_per_frame"]),
-        Column("cpu_seconds_per_frame", MEASURES["cpu_seconds_per_frame"]),
-        Column("evaluations_used", MEASURES["evaluations"]),
+        Column(MEASURES["mpjpe_mm"]),
+        Column(MEASURES["iou"], higher_is_better=True),
+        Column(MEASURES["seconds_per_frame"]),
+        Column(MEASURES["cpu_seconds_per_frame"]),
+        Column(replace(MEASURES["evaluations"], name="evaluations_used")),
         *baselines,
     ]
 
@@ -148,7 +154,18 @@ SCORE = Score(
 
 
 class Tracks:
-    """The kind of runs of tracks."""
+    """The kind of runs of tracks.
+
+    Attributes:
+        name: The kind's name, in the singular.
+        noun: Its runs, in the plural.
+        title: The title of the page.
+        columns: Its figures by name.
+        score: The figure that orders the methods.
+        named: The fields that an instance's name contains.
+        data: The names of a row's other data.
+        baselines: The label of each baseline by name.
+    """
 
     name = "track"
     noun = "tracks"
@@ -164,7 +181,10 @@ class Tracks:
     def read(
         self, row: Row, shared: dict[bytes, Any], /
     ) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data."""
+        """Return the figures of a row and its other data.
+
+        `shared` holds arrays that many rows have in common, to save memory.
+        """
         used = np.array(row["trace"]["evaluations"], np.float32)
         # many rows have the same evaluations in their traces
         used = shared.setdefault(used.tobytes(), used)
@@ -306,10 +326,11 @@ class Tracks:
         instances = []
         for name, place in zip(runs.instances, runs.places, strict=True):
             instances.append({"name": name, "number": _exact(place["instance"])})
+        heads, head = _heads(runs)
         rows = {
             "method": runs.method,
             "instance": runs.instance,
-            "head": runs.head,
+            "head": head,
             "seed": runs.seed,
             **{name: runs.figures[name] for name in runs.table_figures},
             "key": [key[:8] for key in runs.keys],
@@ -321,8 +342,22 @@ class Tracks:
             "instances": instances,
             "rows": rows,
             "seeds": [_exact(seed) for seed in runs.seeds],
-            "heads": runs.heads,
+            "heads": heads,
         }
+
+
+def _heads(runs: Runs) -> tuple[list[str], list[int]]:
+    """Return the beginnings of the commands that run rows again, and each row's index.
+
+    Rows that differ only in their last fields have the same beginning.
+    """
+    pairs = list(zip(runs.method.tolist(), runs.instance.tolist(), strict=True))
+    commands = {}
+    for m, i in set(pairs):
+        commands[m, i] = command_head({**runs.variants[m], **runs.places[i]})
+    heads = sorted(set(commands.values()))
+    index = {head: k for k, head in enumerate(heads)}
+    return heads, [index[commands[pair]] for pair in pairs]
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:
@@ -352,20 +387,9 @@ def _skills(
     return skills
 
 
-def views(place: Place) -> list[str]:
-    """Return the directions of an instance's cameras in degrees."""
-    return [f"{view:g}" for view in place["view_degrees"]]
-
-
-def damage(place: Place) -> list[str]:
-    """Return the kinds of damage of an instance with their strengths."""
-    kinds = sorted(place["corruption"].items())
-    return [f"{kind} {strength:g}" for kind, strength in kinds]
-
-
 def _exact(number: int) -> int | str:
     """Return a number that a browser can read exactly: as a text if it is too large."""
     return number if abs(number) < 2**53 else str(number)
 
 
-TRACKS: Kind = Tracks()
+TRACKS = Tracks()

@@ -87,7 +87,15 @@ def without_small_pieces(mask: Mask) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """The person's pixels in one camera's image, and which pixels are known."""
+    """The person's pixels in one camera's image, and which pixels are known.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Silhouette
+        >>> silhouette = Silhouette.of(np.eye(8, dtype=bool))
+        >>> silhouette.mask.shape, silhouette.known
+        ((8, 8), True)
+    """
 
     mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
     valid: Mask = field(repr=False)  # (height, width)

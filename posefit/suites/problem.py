@@ -183,6 +183,13 @@ def suite(
 
     Raises:
         ValueError: There is no such problem.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> problem = posefit.suite("posefit-2026.3", 1, 0, 9)
+        >>> problem(np.zeros((3, 9))).shape, problem.evaluations
+        ((3,), 3)
     """
     number, instance, dimension = checked_address(name, function, instance, dimension)
     one_of("infeasible", infeasible, INFEASIBLE)
@@ -221,6 +228,12 @@ class Suite:
 
     Raises:
         ValueError: A number is unknown, or there are no problems.
+
+    Example:
+        >>> import posefit
+        >>> suite = posefit.Suite(functions=[1], dimensions=[9], instances=[0, 1])
+        >>> [problem.dimension for problem in suite]
+        [9, 9]
     """
 
     def __init__(
@@ -272,7 +285,7 @@ class Suite:
         if isinstance(index, slice):
             raise InputError(
                 f"index must be the number of one problem, got {quoted(index)}: "
-                "itertools.islice makes several, one after the other"
+                "itertools.islice gives several"
             )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)

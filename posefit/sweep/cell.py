@@ -7,7 +7,6 @@ import hashlib
 import json
 import time
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -19,6 +18,7 @@ from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.footage.scene import Scene
+    from posefit.registry import Offer
 
 ALL_AROUND = 180.0  # degrees; with an error this large the yaw is unknown
 RNG_STREAM_PERSON = 2001  # of the errors in a method's knowledge of the person
@@ -163,10 +163,11 @@ class TrackCell(Cell):
         """
         from posefit.evaluation.errors import anytime_trace, mode_reliability
         from posefit.evaluation.measures import MEASURES
+        from posefit.footage.options import SourceOptions
         from posefit.geometry.skeleton import joint_distances
         from posefit.motion.clips import training_clips, training_motions
         from posefit.tracking.defaults import completed
-        from posefit.tracking.options import VIEW, TrackOptions
+        from posefit.tracking.options import TrackOptions
         from posefit.tracking.pipeline import track_scene
 
         for path, digest in self.files.items():
@@ -180,7 +181,7 @@ class TrackCell(Cell):
         training = training_motions(clips, scene.fps)
         # the scene has the views already, and the training motions are loaded
         option_names = {field.name for field in fields(TrackOptions)}
-        option_names -= {*VIEW, "train"}
+        option_names -= {each.name for each in fields(SourceOptions)} | {"train"}
         values = {}
         for each in fields(self):
             if each.name in option_names:
@@ -307,8 +308,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     for planned in cell.version.split(", "):
         if installed := other_version(planned):
             raise InputError(f"a worker must have {planned}, got {installed}")
-    with _guarded(cell):
-        figures = cell.measure()
+    figures = cell.measure()
     row = {
         "key": cell.key,
         "spec": cell.spec,
@@ -326,30 +326,19 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     return row
 
 
-def _guarded(cell: Cell) -> AbstractContextManager[None]:
-    """Return a context that undoes a plugin's changes to libraries.
-
-    posefit's own plugins change none, so that they need no such context.
-    """
-    from posefit.sweep.worker import functions_kept
-
-    if _own_origins().issuperset(cell.version.split(", ")[1:]):
-        return nullcontext()
-    return functions_kept()
+def foreign_plugins(version: str) -> str:
+    """Return the part of a cell's version that is about plugins from elsewhere."""
+    own = _own_origins()
+    return ", ".join(part for part in version.split(", ") if part not in own)
 
 
 @lru_cache(maxsize=1)
 def _own_origins() -> frozenset[str]:
-    """Return the origins of posefit's own plugins."""
+    """Return the origins of posefit and its own plugins."""
     from posefit.hooks import PROJECT
-    from posefit.registry import registry
 
-    origins = set()
-    for offers in registry().offers.values():
-        for offer in offers.values():
-            if offer.distribution == PROJECT:
-                origins.add(offer.origin)
-    return frozenset(origins)
+    own = [offer.origin for offer in _offers() if offer.distribution == PROJECT]
+    return frozenset([posefit_build(), *own])
 
 
 def other_version(origin: str) -> str | None:
@@ -379,12 +368,14 @@ def installed() -> frozenset[str]:
 
     See `posefit.registry.Offer.origin`.
     """
+    return frozenset([posefit_build(), *(offer.origin for offer in _offers())])
+
+
+def _offers() -> list["Offer"]:
+    """Return what all plugins offer."""
     from posefit.registry import registry
 
-    origins = {posefit_build()}
-    for offers in registry().offers.values():
-        origins.update(offer.origin for offer in offers.values())
-    return frozenset(origins)
+    return [offer for named in registry().offers.values() for offer in named.values()]
 
 
 def cell_scene(cell: TrackCell) -> "Scene":

@@ -18,6 +18,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import between, whole
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
+from posefit.options import Check, choice, declared, within
 from posefit.reading import SHOWN, quoted, suggestion
 from posefit.registry import Offer, registry, version_of
 from posefit.silhouette.corruption import CORRUPTIONS
@@ -33,7 +34,7 @@ from posefit.sweep.cell import (
     json_of,
 )
 from posefit.tracking.method import method_names, parsed_settings, places_of
-from posefit.tracking.options import Check, TrackOptions, choice, declared, within
+from posefit.tracking.options import TrackOptions
 from posefit.version import source_digest
 
 # the fields of a track that a plan may set; posefit adds the other two
@@ -73,7 +74,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
         raise InputError(
             f"train must not contain the motion itself, got {values['motion']}"
         )
-    files = {}
+    files: dict[str, str] = {}
     for motion in (values["motion"], *train):
         files.update(_files(motion))
     version = version_of(offer.origin for offer in offers)

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.files import new_file
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
 from posefit.settings import settings_text
@@ -94,12 +93,9 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
             columns[name] = value
     columns["settings"] = ", ".join(settings_text(spec["settings"]))
     if spec["kind"] == "track":
-        kinds = sorted(spec["corruption"].items())
-        corruptions = [f"{kind} {strength:g}" for kind, strength in kinds]
-        columns["corruption"] = ", ".join(corruptions)
+        columns["corruption"] = ", ".join(damage(spec))
         columns["train"] = ", ".join(spec["train"])
-        views = [f"{view:g}" for view in spec["view_degrees"]]
-        columns["view_degrees"] = ", ".join(views)
+        columns["view_degrees"] = ", ".join(views(spec))
         columns["size"] = "x".join(map(str, spec["size"]))
     for name, value in row.items():
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability"):
@@ -117,8 +113,19 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return columns
 
 
+def views(spec: Mapping[str, Any]) -> list[str]:
+    """Return the directions of a track's cameras in degrees."""
+    return [f"{view:g}" for view in spec["view_degrees"]]
+
+
+def damage(spec: Mapping[str, Any]) -> list[str]:
+    """Return the kinds of damage of a track's masks with their strengths."""
+    kinds = sorted(spec["corruption"].items())
+    return [f"{kind} {strength:g}" for kind, strength in kinds]
+
+
 def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
-    """Write rows as a new CSV file in UTF-8.
+    """Write rows as a CSV file in UTF-8.
 
     The file has all columns that any row has, in the order of their first row. Missing
     values are empty. If a spreadsheet would run a text as a formula, an apostrophe is
@@ -126,10 +133,11 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
 
     Args:
         rows: The values of each row by column.
-        path: The new file.
+        path: The file.
 
     Raises:
-        ValueError: There is no row, or the file exists or cannot be written.
+        ValueError: There is no row.
+        OSError: The file cannot be written.
     """
     table = list(rows)
     if not table:
@@ -137,10 +145,7 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
     columns: dict[str, None] = {}  # an ordered set
     for row in table:
         columns.update(dict.fromkeys(row))
-    with (
-        new_file(path) as building,
-        building.open("w", newline="", encoding="utf-8") as file,
-    ):
+    with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns, restval="")
         writer.writeheader()
         for row in table:

@@ -209,10 +209,10 @@ def global_random_state() -> tuple[object, ...]:
 
 @contextmanager
 def left_alone() -> Iterator[None]:
-    """Check that the body leaves the global random generators as they are."""
+    """Check that the body leaves the global random generators unchanged."""
     before = global_random_state()
     yield
     expect(
         global_random_state() == before,
-        "the global random state must stay as it is, got another",
+        "the global random state must not change, got another",
     )

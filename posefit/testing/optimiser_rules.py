@@ -37,7 +37,7 @@ SIDES_SEEDS = range(3)
 MAX_SECONDS = 0.05  # a proposal: twenty thousand times a pose's cost
 TURNS = 24  # populations after which true costs must have helped
 LOADED = b"loaded"
-# the program of the new process; what the plugin prints goes to standard error
+# the program of the new process; the plugin's prints go to standard error
 TRACING = f"""
 import os, pickle, sys
 out = os.fdopen(os.dup(1), "wb", 0)
@@ -332,7 +332,7 @@ def new_process(case: Case) -> None:
         raise SkippedError("the factory cannot be imported in another process")
     expect(
         trace,
-        "it must work in a new process, got one that ended in the middle "
+        "it must work in a new process, got an early end: "
         f"{ran.stderr.decode()[-300:]}",
     )
     expect(
@@ -482,7 +482,7 @@ def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     for seed in SEEDS:
         lowest.append(case.best(space, evaluate, seed, BUDGET))
         if sum(cost < below for cost in lowest) > len(SEEDS) // 2:
-            # the median is below, no matter what the other seeds give
+            # the median is below for any results of the other seeds
             break
     best = float(np.median(lowest))
     expect(

@@ -232,10 +232,10 @@ def inputs(case: Case) -> None:
     latents = case.latents
     prior.transform(angles), prior.inverse_transform(latents), prior.feasible(latents)
     same = case.first.inputs_unchanged and np.array_equal(angles, walking_angles())
-    expect(same, "joint angles must stay as they are, got others")
+    expect(same, "joint angles must not change, got others")
     expect(
         np.array_equal(latents, case.latents),
-        "latents must stay as they are, got others",
+        "latents must not change, got others",
     )
 
 

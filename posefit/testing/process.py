@@ -1,7 +1,7 @@
 """Checks an installed plugin in a separate process, so that no plugin stops a report.
 
 `python -m posefit.testing.process` is that process. It reads what to check as JSON,
-and writes a line of JSON before and after each check. What the plugin prints goes to
+and writes a line of JSON before and after each check. The plugin's prints go to
 standard error. If the process ends or hangs during a check, that check has failed, and
 another process continues with the next one.
 """
@@ -109,7 +109,7 @@ def _check() -> None:
     """Run the checks that standard input asks for, and end this process."""
     faulthandler.enable()
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    # what the plugin prints must not mix with the messages
+    # the plugin's prints must not mix with the messages
     os.dup2(2, 1)
     task = json.load(sys.stdin)
     end_with_parent(task["parent"])

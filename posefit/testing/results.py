@@ -16,7 +16,7 @@ SAME_CAUSE = 2  # failures with the same cause after which the other checks are 
 
 
 class BrokenError(AssertionError):
-    """A rule is broken. The message says what was expected and what came."""
+    """A rule is broken. The message has the expected and the actual value."""
 
 
 class SkippedError(Exception):
@@ -36,7 +36,7 @@ class Result:
     name: str
     outcome: Literal["passed", "failed", "skipped"]
     detail: str = ""
-    traceback: str = ""  # of what the plugin raised, from its first own frame
+    traceback: str = ""  # of the plugin's error, from its first own frame
 
 
 @dataclass(frozen=True)

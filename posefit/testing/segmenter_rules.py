@@ -158,7 +158,7 @@ def inputs(case: Case) -> None:
     image = painted()[0].images[20].copy()
     same = unchanged(image)
     case.build().segment(image)
-    expect(same(), "an image must stay as it is, got another")
+    expect(same(), "an image must not change, got another")
 
 
 def background(case: Case) -> str:

@@ -127,7 +127,7 @@ def inputs(case: Case) -> None:
     task, (observation, *_) = images()
     same = unchanged(observation.silhouettes[0].mask, task.anchor)
     case.build().posterior(observation)
-    expect(same(), "observations and task must stay as they are, got others")
+    expect(same(), "observations and task must not change, got others")
 
 
 def gain(case: Case) -> str:

@@ -183,7 +183,7 @@ print(before, compiling_seconds(), perf_counter() - began)
 """
 
 
-def test_the_time_of_compiling_is_counted_once_for_a_function_and_what_it_calls(
+def test_the_time_of_compiling_is_counted_once_for_a_function_and_its_callees(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "posefit_loops.py").write_text(

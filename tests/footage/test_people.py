@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.footage.extraction import Extraction
 from posefit.footage.people import People, _distance, person_indices, planes_of
-from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in

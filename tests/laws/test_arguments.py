@@ -15,6 +15,8 @@ import posefit
 from posefit.errors import InputError
 from posefit.output.identity import digest_of
 from posefit.progress import QUIET
+from posefit.tracking.front import _ARGUMENTS
+from posefit.tracking.keywords import FitKeywords, TrackKeywords
 from posefit.tracking.options import TrackOptions
 from tests.laws.sources import FPS, QUICK, Tensor, camera, masks
 
@@ -139,3 +141,17 @@ def test_what_is_no_source_is_refused_before_any_work(
     with pytest.raises(InputError, match=message):
         posefit.track(source, out=tmp_path / "out", progress=QUIET, **QUICK)
     assert not list(tmp_path.iterdir())
+
+
+def test_type_checkers_know_every_option_with_its_type() -> None:
+    def names_and_types(keywords: Any) -> dict[str, str]:
+        types = {}
+        for name, hint in keywords.__annotations__.items():
+            types[name] = str(getattr(hint, "__forward_arg__", hint)).strip("'\"")
+        return types
+
+    options = names_and_types(TrackOptions)
+    assert names_and_types(TrackKeywords) == options
+    of_fit = names_and_types(FitKeywords)
+    assert of_fit.keys() - options.keys() == set(_ARGUMENTS)
+    assert options.keys() - of_fit.keys() == {"frames"}

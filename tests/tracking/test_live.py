@@ -16,8 +16,8 @@ import pytest
 from posefit.errors import InputError
 from posefit.fitting.tracker import SynthesisTracker
 from posefit.footage import live
+from posefit.footage.extraction import Extraction
 from posefit.footage.live import Stream, live_views, netpbm_images
-from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera

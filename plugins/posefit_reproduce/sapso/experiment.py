@@ -1,6 +1,6 @@
 """The experiments of the SAPSO paper's section 5: all runs.
 
-| kind | what is run |
+| kind | runs |
 |---|---|
 | track | 100 frames, the first yaw known to 45 degrees. Table 2, figure 9 |
 | unknown | the same with the first yaw unknown. Interpretation S17 |

@@ -196,10 +196,11 @@ def patent_tables(results: Results) -> Iterator[Table]:
         )
     films: dict[str, Films] = {}
     for name, figures_of_films in rows.items():
-        films[name] = {}
+        columns = {}
         for figure in figures_of_films[0]:
             values = [figures[figure] for figures in figures_of_films]
-            films[name][figure] = np.array([values])
+            columns[figure] = np.array([values])  # (1, films)
+        films[name] = columns
     methods = {name: films[f"reported {name}"] for name in METHODS}
     yield claims_table("claims", list(claims(methods)))
     yield means_table("compared", methods)

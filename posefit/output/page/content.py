@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evaluation.errors import FRAME, LOST, Table
+from posefit.evaluation.errors import FRAME, Table, flagged
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
@@ -47,8 +47,8 @@ CURVES = (
 )
 MARKS: dict[str, Callable[[Table], NDArray[np.bool_]]] = {
     "held": lambda table: table["usable"] == 0.0,
-    "lost": lambda table: table["lost"] >= LOST,
-    "unknown": lambda table: table["unknown_sides"] == 1.0,
+    "lost": lambda table: _flags(table, "lost"),
+    "unknown": lambda table: _flags(table, "unknown_sides"),
 }
 
 
@@ -61,6 +61,11 @@ def _angle_names() -> list[str]:
 
 
 ANGLE_NAMES = tuple(_angle_names())
+
+
+def _flags(table: Table, name: str) -> NDArray[np.bool_]:
+    frames = flagged(table, name)
+    return np.zeros(len(table["frame"]), bool) if frames is None else frames.frames
 
 
 def track_data(content: Content, stills: Stills) -> dict[str, Any]:
@@ -155,7 +160,7 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
 
 
 def _verdict(content: Content) -> str:
-    """Return what was not determined, preceded by the trust in the track.
+    """Return the trust in the track, and everything undetermined.
 
     If the truth is known, no trust is reported.
     """
