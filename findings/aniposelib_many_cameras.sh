@@ -4,7 +4,7 @@
 # The file has a table for each camera, cam_0, cam_1, ... cam_11. They are read in the order of their names as text:
 # cam_10 and cam_11 come after cam_1. Up to ten cameras keep their order. `triangulate` takes an array by the number of
 # the camera, so that points of twelve cameras, of which the file was written, come out elsewhere: here 0.8 m off, of
-# exact points. The names in the tables are right.
+# exact points. The names in the tables are right, so that cameras can be put in order by `get_name()`.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -2,7 +2,7 @@
 # bvhsdk 0.2.1: a file that is read and written again has its frame time rounded to 5 decimals.
 #
 # 0.0083417 s, of 119.88 frames a second, becomes 0.00834, of 119.90: a second in 83 minutes. Each joint that had three
-# channels has six afterwards, with its offset as a position in each frame.
+# channels has six afterwards, with its offset as a position in each frame. Put the line of the first file in place.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -3,7 +3,8 @@
 #
 # A mask of 14 x 10 pixels from column 6 and row 5 on becomes `"bbox": (6, 5, 13, 9)` beside `"area": 140`; COCO's boxes
 # are left, top, width and height. The polygon runs through the middles of the outer pixels and encloses 117, so that
-# readers which draw it, pycocotools for one, get 13 x 9 pixels back.
+# readers which draw it, pycocotools for one, get 13 x 9 pixels back. pycocotools' encode and toBbox make both from the
+# mask.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -3,7 +3,7 @@
 #
 # A file with a positive POINT:SCALE has its points as signed 16-bit integers times the scale. C3DFile reads them as
 # unsigned: -10 mm at a scale of 0.5 is 32758 mm, 65,536 units more. Files in floating point are read right, and ezc3d
-# reads both.
+# reads both. Take 65,536 scales off what is above 32,767 of them.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu
