@@ -111,7 +111,7 @@ def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target
     )
 
 
-def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
+def test_the_file_of_boxes_follows_from_the_library() -> None:
     """Where another LAPACK decomposes, rounding may differ, and a component may point the other way.
 
     The sign is that of its largest number; those of a left and a right limb are equally large but for rounding.
@@ -126,7 +126,7 @@ def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
     assert np.array_equal(learned["order"], stored.order)
 
 
-def test_a_body_at_rest_leaves_few_frames_and_one_that_moves_all() -> None:
+def test_a_still_body_leaves_few_frames_and_a_moving_one_all() -> None:
     def kept(places: np.ndarray) -> list[int]:
         return kept_frames(average_skeleton(), np.zeros((50, 66)), places).tolist()
 
