@@ -1,4 +1,4 @@
-"""Are observations worth it? FitImage-v0 by blind searches, cloning and PPO.
+"""Are observations worth it? FitImage-v1 by blind searches, cloning and PPO.
 
     python docs/studies/agents.py --rows agents.jsonl --picture agents.png
 
@@ -30,7 +30,7 @@ from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
 from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
-NAME = "posefit_envs:posefit/FitImage-v0"
+NAME = "posefit_envs:posefit/FitImage-v1"
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES = 200
 SEEDS = 3

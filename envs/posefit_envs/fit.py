@@ -1,4 +1,4 @@
-"""FitImage-v0: a few proposals of the pose in one silhouette; observed as pictures."""
+"""FitImage-v1: a few proposals of the pose in one silhouette; observed as pictures."""
 
 from functools import partial
 from typing import Any
@@ -92,11 +92,13 @@ class FitImageEnv(SearchEnv):
     no answer to read.
 
     ## Arguments
-    - `motion="walk"`: a built-in motion, or an .amc or .bvh file; or a list of built-in
-      motions; or "all" for all kinds of built-in motions.
-    - `held_out_people=False`: if true, `motion` names kinds of built-in motions. An
-      instance shows one person's style of it; a held-out instance shows the last
-      person's. If false, the mean of all styles is shown.
+    - `motion="walk"`: a kind of built-in motion, a list of kinds, or "all".
+    - `held_out_people=True`: an instance shows a person: one person's style of the
+      motion, and a body whose bones and girths differ by up to 10 % from the average.
+      Held-out instances show the styles of two people of whom training instances and
+      the prior have nothing, in any motion. If false, everybody has the average body
+      and the mean of all styles, in training and in the test; `motion` may then also be
+      a single style, or an .amc or .bvh file.
     - `instance=None`: 0 to 19,999. `split="train"` draws from 0 to 9,999, `"test"` from
       the others, which are held out.
     - `yaw="guessed"`: the root's yaw is known to 20 degrees. "unknown": the person
@@ -117,7 +119,9 @@ class FitImageEnv(SearchEnv):
     - `max_evaluations=8`.
 
     ## Version History
-    - v0: not released yet; until then a version changes without a number.
+    - v1: people are held out by default.
+    - v0: `held_out_people=False`. Three of ten silhouettes of its test walks are in
+      training, byte for byte.
     """
 
     def __init__(

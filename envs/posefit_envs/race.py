@@ -1,4 +1,4 @@
-"""Race-v0: searches share a budget; an action continues one, or starts a new one."""
+"""Race-v1: searches share a budget; an action continues one, or starts a new one."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -271,7 +271,7 @@ class RaceEnv(SearchEnv):
 
     ## Starting State
     The first population of each search, drawn uniformly and evaluated; the budget does
-    not include it. The instance is chosen as in `FitImage-v0`. The budget is drawn from
+    not include it. The instance is chosen as in `FitImage-v1`. The budget is drawn from
     `generations`.
 
     ## Episode End
@@ -283,7 +283,7 @@ class RaceEnv(SearchEnv):
     the best pose's error against the truth.
 
     ## Arguments
-    As in `FitImage-v0`, without `max_evaluations`, and with:
+    As in `FitImage-v1`, without `max_evaluations`, and with:
 
     - `optimiser="pso"`: any optimiser of posefit or a plugin that takes a
       `population_size`.
@@ -296,7 +296,8 @@ class RaceEnv(SearchEnv):
     planned for the largest budget.
 
     ## Version History
-    - v0: not released yet; until then a version changes without a number.
+    - v1: people are held out by default.
+    - v0: `held_out_people=False`.
     """
 
     def __init__(

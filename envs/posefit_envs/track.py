@@ -1,4 +1,4 @@
-"""Track-v0: a sequence of silhouettes, several proposals for each."""
+"""Track-v1: a sequence of silhouettes, several proposals for each."""
 
 from functools import partial
 from typing import Any
@@ -69,19 +69,19 @@ class TrackEnv(SearchEnv):
     moves with the prediction, SAPSO (6).
 
     ## Action Space
-    `Box(-1, 1, (d,), float32)`: a proposal, as in `FitImage-v0`. The yaw and a searched
+    `Box(-1, 1, (d,), float32)`: a proposal, as in `FitImage-v1`. The yaw and a searched
     translation are relative to the pose that was committed last.
 
     ## Observation Space
-    `Box(0, 255, (height, width, 2 views), uint8)`, as in `FitImage-v0`: the silhouette
+    `Box(0, 255, (height, width, 2 views), uint8)`, as in `FitImage-v1`: the silhouette
     of the current frame and of the last proposal. The first picture of a frame shows
     the pose that was committed in the previous frame.
 
     ## Rewards
-    -ln(1 + cost) of the proposal, as in `FitImage-v0`.
+    -ln(1 + cost) of the proposal, as in `FitImage-v1`.
 
     ## Starting State
-    The first frame of an instance, as in `FitImage-v0`.
+    The first frame of an instance, as in `FitImage-v1`.
 
     ## Episode End
     Terminates when the last frame's pose is committed.
@@ -97,11 +97,12 @@ class TrackEnv(SearchEnv):
     and `frame`.
 
     ## Arguments
-    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of
+    As in `FitImage-v1`, with `frames=20` and `evaluations_per_frame=100` instead of
     `max_evaluations`.
 
     ## Version History
-    - v0: not released yet; until then a version changes without a number.
+    - v1: people are held out by default.
+    - v0: `held_out_people=False`.
     """
 
     metadata = SearchEnv.metadata | {"render_fps": 30}

@@ -24,11 +24,11 @@ from posefit_envs.world import first_problem, world_of
 
 MODES = list(AutoresetMode)
 NAMES: dict[str, dict[str, Any]] = {
-    "posefit/FitImage-v0": {"max_evaluations": 3},
-    "posefit/Track-v0": {"frames": 2, "evaluations_per_frame": 2},
-    "posefit/Race-v0": {"searches": 2, "generations": (2, 4)},
+    "posefit/FitImage-v1": {"max_evaluations": 3},
+    "posefit/Track-v1": {"frames": 2, "evaluations_per_frame": 2},
+    "posefit/Race-v1": {"searches": 2, "generations": (2, 4)},
 }
-FIT = "posefit/FitImage-v0"
+FIT = "posefit/FitImage-v1"
 COUNT = 2
 EPISODES = 3
 SEED = 5
@@ -192,7 +192,7 @@ def _policy_of(shape: Any, i: int) -> Callable[[Any, int], Any]:
 
 
 def test_a_rollout_of_episodes_of_several_lengths_keeps_each() -> None:
-    name = "posefit/Race-v0"
+    name = "posefit/Race-v1"
     expected = []
     for i in range(COUNT):
         env = gym.make(name, searches=2, generations=(2, 9))
