@@ -219,7 +219,7 @@ def track_reference(
         raise error.Error(f"env must be posefit/Track-v1, got {type(bare).__name__}")
     instance = bare.instance
     world = bare.world
-    # the prior has learned from a training instance's own motion, so the tracker may too
+    # the prior has learned from training instances too, so the tracker may
     followed = world.motion_of(instance.number) if train else None
     clips = training_clips(train or world.training, followed=followed)
     motions = training_motions(clips, instance.task.fps)

@@ -64,7 +64,7 @@ def other_styles(name: str) -> tuple[str, ...]:
 
 
 def person_of(style: str) -> str:
-    """Return the person whose clip a style was fitted to, with the CMU database's number.
+    """Return the person whose clip a style was fitted to, by the database's number.
 
     Args:
         style: such as `walk-a`, not the mean of a kind's styles.

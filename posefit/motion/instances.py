@@ -13,9 +13,9 @@ are held out. The table says what belongs to a number, and what the number decid
 | problem of a suite | function, dimension | person, pose, cameras, box, noise | suite |
 
 So a sweep's instance 17 of "walk" is the motion of an environment's instance 17 of
-"walk" without held-out people, and both differ from instance 17 of a suite's function. Each row has a separate
-random stream, see `generator`: what one row draws changes nothing in another. Instance
-0 of a motion is the motion itself.
+"walk" without held-out people, and both differ from instance 17 of a suite's function.
+Each row has a separate random stream, see `generator`: what one row draws changes
+nothing in another. Instance 0 of a motion is the motion itself.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
 """Nobody and nothing of the test split is in a training instance, whatever the motion."""
 
-from functools import lru_cache
+from functools import cache
 from itertools import combinations
 from typing import Any
 
@@ -26,7 +26,7 @@ TRAINED = SPLITS["train"][:400]
 TESTED = SPLITS["test"][:60]
 
 
-@lru_cache(maxsize=None)
+@cache
 def silhouettes(kind: str, split: str) -> Any:
     """Return the packed silhouettes (n, bytes) of instances of a kind of motion."""
     world = world_of(motion=kind)
