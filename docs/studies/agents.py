@@ -4,7 +4,7 @@
 
 All are tested on held-out instances. A learner's row is one training: of
 Stable-Baselines3's PPO, or on the truths of training instances. A search's row has
-every instance once. There is a table for each variant of the task.
+every instance once. There is a table for each level.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,22 +30,16 @@ from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
 from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
-NAME = "posefit_envs:posefit/FitImage-v1"
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES = 200
 SEEDS = 3
 STEPS = 270_000
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
-VARIANTS: dict[str, dict[str, Any]] = {
-    "walks": {},
-    "runs": {"motion": "run"},
-    "all motions": {"motion": "all"},
-    "held-out people": {"held_out_people": True},
-    "unknown yaw": {"yaw": "unknown"},
-    "two views": {"view_degrees": [45.0, 135.0]},
-    "searched translation": {"translation": "searched"},
-    "damaged masks": {"noise": {"holes": 0.3, "shadow": 0.5}},
-    "another body": {"mismatch_percent": 10.0},
+LEVELS = {
+    "easy": "FitImage-easy-v1",
+    "default": "FitImage-v1",
+    "medium": "FitImage-medium-v1",
+    "hard": "FitImage-hard-v1",
 }
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
@@ -82,7 +76,7 @@ class Training(NamedTuple):
     `budget` is the steps of a training, or the evaluations of a search.
     """
 
-    variant: str
+    level: str
     agent: str
     budget: int
     seed: int
@@ -94,13 +88,18 @@ def check_learners() -> None:
         raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
 
 
+def name_of(level: str) -> str:
+    """Return the name of a level's environment."""
+    return f"posefit_envs:posefit/{LEVELS[level]}"
+
+
 def made(training: Training, count: int, **arguments: Any) -> Any:
-    """Return a vector environment of a variant with small pictures.
+    """Return a vector environment of a level with small pictures.
 
     For a blank agent the observed silhouettes are blank.
     """
     env = ResizeObservation(
-        gym.make_vec(NAME, count, **VARIANTS[training.variant], **arguments), SHOWN
+        gym.make_vec(name_of(training.level), count, **arguments), SHOWN
     )
     channels = np.arange(env.single_observation_space.shape[-1])
     channels_shown = np.ones_like(channels)
@@ -112,7 +111,7 @@ def made(training: Training, count: int, **arguments: Any) -> Any:
 
 def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array, Array]:
     """Return actions (k, n, d) and costs (k, n) of an episode on each test instance."""
-    env = made(training, INSTANCES, max_evaluations=proposals)
+    env = made(training, INSTANCES, split="test", max_evaluations=proposals)
     pictures, _ = env.reset(seed=0, options={"instance": TESTED})
     actions = []
     costs = []
@@ -155,7 +154,7 @@ def row_of(
 def constant(training: Training) -> Policy:
     """Return the policy of a reference that ignores its observations."""
     rng = np.random.default_rng(training.seed)
-    env = made(training, INSTANCES)
+    env = made(training, INSTANCES, split="test")
     if training.agent == "uniform":
         return lambda _: rng.uniform(-1.0, 1.0, env.action_space.shape)
     env.reset(options={"instance": TESTED})
@@ -200,7 +199,7 @@ def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]
     It searches blindly, or from the proposals of the row `start`.
     """
     name = "cma" if training.agent == STARTED else training.agent
-    env = made(training, INSTANCES)
+    env = made(training, INSTANCES, split="test")
     costs = []
     env.reset(options={"instance": TESTED})
     for number, problem in enumerate(env.unwrapped.problems):
@@ -282,19 +281,16 @@ def cloned(model: Any, env: Any) -> None:
     import torch
 
     pictures, infos = env.reset(seed=model.seed)
-    truths = infos["truth"].copy()
     length = ROLLOUT * ENVIRONMENTS
     for _ in range(CLONING_STEPS // length):
         shown = []
         targets = []
         for _ in range(ROLLOUT):
             shown.append(pictures)
-            targets.append(truths.copy())
+            targets.append(infos["truth"])
             pictures, _, _, _, infos = env.step(
                 np.clip(model.predict(shown[-1])[0], -1.0, 1.0)
             )
-            if "truth" in infos:
-                truths[infos["_truth"]] = infos["truth"][infos["_truth"]]
         inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
         answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
         for rows in [
@@ -309,7 +305,7 @@ def cloned(model: Any, env: Any) -> None:
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the table of a variant's rows.
+    """Yield the table of a level's rows.
 
     It has mean costs, and the evaluations that blind searches need for the same cost.
     """
@@ -385,7 +381,7 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     import cv2
 
     instance = int(np.argsort(row["costs"])[INSTANCES // 2])
-    env = gym.make(NAME, **VARIANTS[row["variant"]], render_mode="rgb_array")
+    env = gym.make(name_of(row["level"]), split="test", render_mode="rgb_array")
     env.reset(options={"instance": HELD_OUT + instance})
     panels = []
     for proposals in row["proposals"]:
@@ -407,11 +403,11 @@ def picture(row: Mapping[str, Any], path: str) -> None:
 
 @click.command(cls=Command, help=__doc__)
 @click.option(
-    "--variant",
+    "--level",
     "names",
     multiple=True,
-    type=click.Choice(list(VARIANTS)),
-    help="By default only walks.",
+    type=click.Choice(list(LEVELS)),
+    help="By default the default one.",
 )
 @click.option(
     "--agent",
@@ -451,15 +447,15 @@ def main(
     if drawn is not None and "PPO" not in (agents or LEARNERS):
         raise InputError("--picture must come with the agent PPO")
     turns = []
-    for variant in names or ("walks",):
-        turns += [Training(variant, agent, 0, 0) for agent in CONSTANTS]
+    for level in names or ("default",):
+        turns += [Training(level, agent, 0, 0) for agent in CONSTANTS]
         turns += [
-            Training(variant, agent, budget, 0)
+            Training(level, agent, budget, 0)
             for agent in SEARCHES
             for budget in BUDGETS
         ]
         turns += [
-            Training(variant, name, CLONING_STEPS if name == "cloning" else STEPS, seed)
+            Training(level, name, CLONING_STEPS if name == "cloning" else STEPS, seed)
             for seed in range(seeds)
             for name in agents or LEARNERS
         ]
@@ -468,13 +464,11 @@ def main(
     )
     for turn in turns:
         if turn.agent == "PPO":
-            started = Training(turn.variant, STARTED, STARTED_BUDGET, turn.seed)
+            started = Training(turn.level, STARTED, STARTED_BUDGET, turn.seed)
             done[started] = row_of(started, done[turn])
-    for variant in names or ("walks",):
-        click.echo(f"\n{variant}, {INSTANCES} held-out instances\n")
-        for line in table(
-            [row for turn, row in done.items() if turn.variant == variant]
-        ):
+    for level in names or ("default",):
+        click.echo(f"\n{level}, {INSTANCES} held-out instances\n")
+        for line in table([row for turn, row in done.items() if turn.level == level]):
             click.echo(line)
     if drawn is not None:
         picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)

@@ -51,21 +51,23 @@ SHOWN_FRAMES = {
 DIMENSIONS = 9  # of a proposal
 
 
-def stacked(count: int) -> tuple[Any, Any]:
+def stacked(count: int, split: str) -> tuple[Any, Any]:
     """Return a vector environment for Stable-Baselines3, and one that stacks it.
 
     There are eight proposals per frame.
     """
     from stable_baselines3.common.vec_env import VecFrameStack
 
-    env = gym.make_vec(NAME, count, evaluations_per_frame=MAX_EVALUATIONS, **PEOPLE)
+    env = gym.make_vec(
+        NAME, count, evaluations_per_frame=MAX_EVALUATIONS, split=split, **PEOPLE
+    )
     vector = to_sb3_vec_env(ResizeObservation(env, SHOWN))
     return vector, VecFrameStack(vector, STACKED)
 
 
 def committed(act: Callable[[Any], Array]) -> Array:
     """Return the costs (n, frames) that a policy commits in the held-out tracks."""
-    vector, env = stacked(INSTANCES)
+    vector, env = stacked(INSTANCES, "test")
     vector.set_options({"instance": TESTED})
     pictures = env.reset()
     costs = []
@@ -78,14 +80,16 @@ def committed(act: Callable[[Any], Array]) -> Array:
 
 def trained(seed: int) -> Callable[[Any], Array]:
     """Return the policy of a training, the mean of its distribution."""
-    model = ppo(stacked(ENVIRONMENTS)[1], seed)
+    model = ppo(stacked(ENVIRONMENTS, "train")[1], seed)
     model.learn(STEPS)
     return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0])
 
 
 def searched(name: str, budget: int) -> Array:
     """Return the costs (n, frames) that an optimiser commits in the held-out tracks."""
-    env: Any = gym.make_vec(NAME, INSTANCES, evaluations_per_frame=2, **PEOPLE)
+    env: Any = gym.make_vec(
+        NAME, INSTANCES, evaluations_per_frame=2, split="test", **PEOPLE
+    )
     env.reset(options={"instance": TESTED})
     costs = []
     for frame in range(FRAMES):

@@ -152,8 +152,10 @@ def final_costs(
     return costs, taken
 
 
-def _made(count: int) -> Any:
-    return gym.make_vec(f"posefit_envs:{NAME}", count, errors=False, **PEOPLE)
+def _made(count: int, split: str = "train") -> Any:
+    return gym.make_vec(
+        f"posefit_envs:{NAME}", count, errors=False, split=split, **PEOPLE
+    )
 
 
 def chosen(policies: Sequence[Policy], seed: int) -> tuple[Policy, int]:
@@ -311,7 +313,7 @@ def policy_of(turn: Turn, env: Any) -> tuple[Policy, int]:
 
 def row_of_turn(turn: Turn) -> dict[str, Any]:
     """Return a row: final costs on held-out instances, and the training's steps."""
-    env = _made(INSTANCES)
+    env = _made(INSTANCES, "test")
     numbers = range(HELD_OUT, HELD_OUT + INSTANCES)
     policy, steps = policy_of(turn, env)
     costs, _ = final_costs(policy, env, numbers, numbers)

@@ -57,6 +57,13 @@ _KNOWN_PEOPLE = {"held_out_people": False}
 _IDS: dict[str, dict[str, Any]] = {
     "FitImage-v0": _KNOWN_PEOPLE,
     "FitImage-v1": {},
+    "FitImage-easy-v1": _KNOWN_PEOPLE,
+    "FitImage-medium-v1": {"motion": "all"},
+    "FitImage-hard-v1": {
+        "motion": "all",
+        "yaw": "unknown",
+        "noise": {"holes": 0.3, "shadow": 0.5},
+    },
     "Track-v0": _KNOWN_PEOPLE,
     "Track-v1": {},
     "Race-v0": _KNOWN_PEOPLE,

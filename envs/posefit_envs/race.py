@@ -209,9 +209,10 @@ class Races:
             "best_cost": problems.best_costs.copy(),
             "proposal": problems.best.copy(),
             "evaluations": problems.evaluations.copy(),
+            "remaining_steps": self.left.copy(),
             "instance": numbers.copy(),
         }
-        if self.world.errors:
+        if self.world.shows_truth:
             # alignment moves the body but not the pose, so no row is aligned
             nobody = self.stage.all_rows[:0]
             poses = self.stage.decode(problems.best[:, None], nobody)[0][:, 0]
@@ -275,12 +276,13 @@ class RaceEnv(SearchEnv):
     `generations`.
 
     ## Episode End
-    Terminates when the budget is used up. It is never truncated.
+    Terminates when the budget is used up. Only a time limit of Gymnasium truncates.
 
     ## Information
     A step and a reset give `best_cost`, the `proposal` (d,) with that cost,
-    `evaluations`, and `instance`. Unless `errors=False` they also give `error_degrees`,
-    the best pose's error against the truth.
+    `evaluations`, `remaining_steps`, and `instance`. In training they also give
+    `error_degrees`, the best pose's error against the truth, unless `errors=False`; in
+    the test only with `evaluate=True`.
 
     ## Arguments
     As in `FitImage-v1`, without `max_evaluations`, and with:
@@ -405,8 +407,7 @@ class RaceVectorEnv(SearchVectorEnv):
         terminated = self.races.left == 0
         infos = self.races.infos(self.numbers)
         observations = self.races.observations()
-        ends = terminated, np.zeros_like(terminated)
-        return self.end_step(stepping, observations, rewards, ends, infos)
+        return self.end_step(stepping, observations, rewards, terminated, infos)
 
     def picture(self, i: int) -> Picture:
         """Return the picture of the best proposal in environment i."""

@@ -95,6 +95,12 @@ class World:
     noise: tuple[tuple[str, float], ...] = ()
     mismatch_percent: float = 0.0
     errors: bool = True
+    evaluate: bool = False
+
+    @property
+    def shows_truth(self) -> bool:
+        """Whether infos hold the truth: those of the test split only to evaluate."""
+        return self.errors and (self.evaluate or self.split == "train")
 
     @cached_property
     def learned(self) -> Prior:
@@ -139,6 +145,21 @@ class World:
             return motion
         styles = styles_of(motion, number in HELD_OUT)
         return styles[turn % len(styles)]
+
+    def numbered(self, number: object) -> int:
+        """Return the number of an instance of the split as an int.
+
+        Raises:
+            ArgumentError: If there is no such instance, or it is of the other split.
+        """
+        chosen: int = checked(instance_number, number)
+        split = SPLITS[self.split]
+        if chosen not in split:
+            raise ArgumentError(
+                f"instance must lie in {split[0]} to {split[-1]} with "
+                f"split={self.split!r}, got {chosen}"
+            )
+        return chosen
 
     def next_instance(self, rng: np.random.Generator) -> int:
         """Return the number of the next instance: fixed, or drawn from the split."""
@@ -202,7 +223,7 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     motion = _motions(world.motion, held_out_people)
     number = world.instance
     if number is not None:
-        number = checked(instance_number, number)
+        number = world.numbered(number)
     return replace(
         world,
         motion=motion,
@@ -214,6 +235,7 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
         noise=_strengths(world.noise),
         mismatch_percent=mismatch,
         errors=flag("errors", world.errors),
+        evaluate=flag("evaluate", world.evaluate),
     )
 
 
@@ -394,6 +416,14 @@ class FirstFrame:
         if name.startswith("_"):
             raise AttributeError(name)
         return getattr(self.cost, name)
+
+
+@lru_cache(maxsize=len(TRAINING))
+def first_truth(world: World, number: int) -> Array:
+    """Return the proposal (d,) nearest to the true first pose of an instance."""
+    truth = FirstFrame(world, number).truth
+    truth.setflags(write=False)
+    return truth
 
 
 def first_problem(world: World, number: int) -> Problem:

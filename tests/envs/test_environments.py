@@ -124,7 +124,7 @@ def test_fit_ends_with_the_budget_and_counts_the_best() -> None:
     env = gym.make("posefit/FitImage-v1", instance=3, max_evaluations=3)
     env.reset(seed=0)
     ends = [env.step(np.full(9, 0.3 * k, np.float32)) for k in range(3)]
-    assert [end[2:4] for end in ends] == [(False, False), (False, False), (False, True)]
+    assert [end[2:4] for end in ends] == [(False, False), (False, False), (True, False)]
     costs = [end[4]["cost"] for end in ends]
     assert [end[1] for end in ends] == pytest.approx(
         [-math.log(1.0 + cost) for cost in costs]
@@ -133,6 +133,7 @@ def test_fit_ends_with_the_budget_and_counts_the_best() -> None:
         min(costs[: k + 1]) for k in range(3)
     ]
     assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
+    assert [end[4]["remaining_steps"] for end in ends] == [2, 1, 0]
 
 
 class OnePopulation:

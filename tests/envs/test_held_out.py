@@ -119,3 +119,19 @@ def test_people_differ_and_a_number_is_always_the_same_person() -> None:
         assert (
             one.instance.truth.poses.tobytes() == other.instance.truth.poses.tobytes()
         )
+
+
+def test_levels_are_registrations_and_each_asks_for_more() -> None:
+    worlds = {}
+    for level in ("easy-", "", "medium-", "hard-"):
+        name = f"posefit/FitImage-{level}v1"
+        env: Any = gym.make(name).unwrapped
+        vector: Any = gym.make_vec(name, 2).unwrapped
+        assert vector.world == env.world
+        worlds[level] = env.world
+    held_out = [world.held_out_people for world in worlds.values()]
+    assert held_out == [False, True, True, True]
+    motions = [len(world.motion) for world in worlds.values()]
+    assert motions == [1, 1, len(KINDS), len(KINDS)]
+    assert worlds["hard-"].yaw == "unknown"
+    assert worlds["hard-"].noise
