@@ -49,7 +49,11 @@ LOOK_UP = "look-up"
 CONSTANTS = ("uniform", "the truth, projected", LOOK_UP)
 LOOKED_UP = 10_000  # training instances
 LOOKED_UP_AT_ONCE = 500
-LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
+# taught on silhouettes that the environment draws; see pose_network.py
+POSING = "pose network"
+POSING_STEPS = 800_000
+POSING_ENVIRONMENTS = 256
+LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO", POSING)
 # CMA-ES, started from the best of PPO's proposals
 STARTED = "PPO, then cma"
 STARTED_BUDGET = 200
@@ -65,9 +69,11 @@ NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layer
 # steps of cloning before PPO continues, and the narrower deviation with which it does
 CLONING_STEPS = 30_720
 CLONED_LOG_DEVIATION = -2.3
+LEARNING = {"cloning": CLONING_STEPS, POSING: POSING_STEPS}
 WHITE = (255, 255, 255)
 
-Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
+# of small pictures (n, 12, 16, 2 views), and the costs (n,) of the last proposals
+Policy = Callable[[Any, Array], Array]
 
 
 class Training(NamedTuple):
@@ -112,11 +118,11 @@ def made(training: Training, count: int, **arguments: Any) -> Any:
 def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array, Array]:
     """Return actions (k, n, d) and costs (k, n) of an episode on each test instance."""
     env = made(training, INSTANCES, split="test", max_evaluations=proposals)
-    pictures, _ = env.reset(seed=0, options={"instance": TESTED})
+    pictures, infos = env.reset(seed=0, options={"instance": TESTED})
     actions = []
     costs = []
     for _ in range(proposals):
-        actions.append(np.clip(policy(pictures), -1.0, 1.0))
+        actions.append(np.clip(policy(pictures, infos["cost"]), -1.0, 1.0))
         pictures, _, _, _, infos = env.step(actions[-1])
         costs.append(infos["cost"])
     return np.array(actions), np.array(costs)
@@ -156,10 +162,10 @@ def constant(training: Training) -> Policy:
     rng = np.random.default_rng(training.seed)
     env = made(training, INSTANCES, split="test")
     if training.agent == "uniform":
-        return lambda _: rng.uniform(-1.0, 1.0, env.action_space.shape)
+        return lambda *_: rng.uniform(-1.0, 1.0, env.action_space.shape)
     env.reset(options={"instance": TESTED})
     truths = np.array([problem.truth for problem in env.unwrapped.problems])
-    return lambda _: truths
+    return lambda *_: truths
 
 
 def looked_up(training: Training) -> Policy:
@@ -176,7 +182,7 @@ def looked_up(training: Training) -> Policy:
     answers = np.concatenate(truths)
     asked = 0
 
-    def policy(pictures: Any) -> Array:
+    def policy(pictures: Any, _: Array) -> Array:
         nonlocal asked
         seen = observed(pictures)
         squares = (seen**2).sum(axis=1)[:, None] - 2.0 * seen @ known.T
@@ -258,6 +264,14 @@ def ppo(vector: Any, seed: int) -> Any:
 
 def trained(training: Training) -> Policy:
     """Return the policy of a learner, the mean of its distribution."""
+    if training.agent == POSING:
+        from pose_network import PoseNetwork
+
+        endless: dict[str, Any] = {"max_evaluations": 10**9}
+        env = made(training, POSING_ENVIRONMENTS, **endless)
+        network = PoseNetwork(env, training.seed)
+        network.learn(training.budget)
+        return network.policy()
     model = ppo(
         to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed
     )
@@ -268,7 +282,7 @@ def trained(training: Training) -> Policy:
         learning -= CLONING_STEPS
     if learning:
         model.learn(learning)
-    return lambda pictures: np.asarray(
+    return lambda pictures, _: np.asarray(
         model.predict(pictures, deterministic=True)[0], dtype=np.float64
     )
 
@@ -432,7 +446,7 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     "--picture",
     "drawn",
     metavar="FILE",
-    help="PNG to write: eight proposals of the first PPO.",
+    help="PNG to write: eight proposals of the first pose network.",
 )
 @WORKERS
 def main(
@@ -444,8 +458,8 @@ def main(
     workers: int | None,
 ) -> None:
     check_learners()
-    if drawn is not None and "PPO" not in (agents or LEARNERS):
-        raise InputError("--picture must come with the agent PPO")
+    if drawn is not None and POSING not in (agents or LEARNERS):
+        raise InputError(f"--picture must come with the agent {POSING}")
     turns = []
     for level in names or ("default",):
         turns += [Training(level, agent, 0, 0) for agent in CONSTANTS]
@@ -455,7 +469,7 @@ def main(
             for budget in BUDGETS
         ]
         turns += [
-            Training(level, name, CLONING_STEPS if name == "cloning" else STEPS, seed)
+            Training(level, name, LEARNING.get(name, STEPS), seed)
             for seed in range(seeds)
             for name in agents or LEARNERS
         ]
@@ -471,7 +485,7 @@ def main(
         for line in table([row for turn, row in done.items() if turn.level == level]):
             click.echo(line)
     if drawn is not None:
-        picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)
+        picture(next(done[turn] for turn in turns if turn.agent == POSING), drawn)
 
 
 if __name__ == "__main__":
