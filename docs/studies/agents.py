@@ -51,7 +51,7 @@ LOOKED_UP = 10_000  # training instances
 LOOKED_UP_AT_ONCE = 500
 # taught on silhouettes that the environment draws; see pose_network.py
 POSING = "pose network"
-POSING_STEPS = 800_000
+POSING_STEPS = 240_000
 POSING_ENVIRONMENTS = 256
 LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO", POSING)
 # CMA-ES, started from the best of PPO's proposals

@@ -37,7 +37,7 @@ from table import WORKERS, bar, drawn_means, markdown, quantiles
 
 NAME = "posefit_envs:posefit/Track-v1"
 # the people of the test are those of training, as when its page was measured
-PEOPLE = {"held_out_people": False}
+PEOPLE: dict[str, Any] = {"held_out_people": False}
 STACKED = 4  # number of latest pictures that the agent sees
 BUDGETS = (8, 40, 100, 200)  # evaluations per frame of blind searches
 SEEDS = 2

@@ -1,22 +1,18 @@
 """A pose network for FitImage, taught on silhouettes that the environment draws itself.
 
 The network sees a silhouette, where it differs from that of the best proposal so far,
-and this proposal. It gives a correction, and for the beginning a few first guesses. It
-is taught by supervision: the environment draws any proposal, so that a proposal near a
-training person's pose is a silhouette of which the answer is known. `agents.py`
-measures it.
+and this proposal. It gives a correction. It is taught by supervision: the environment
+draws any proposal, so that a proposal near a training person's pose is a silhouette of
+which the answer is known. `agents.py` measures it.
 """
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import torch
 
 from posefit.arrays import Array
 
-GUESSES = 3  # first guesses, of which the nearest to the answer learns most
-LEARNED_MOST = 0.95
 CORRECTIONS = 2  # per silhouette of training
 SILHOUETTES = 6  # for each instance, before others are drawn
 POOLS = {1: 2048, 9: 6144}  # training instances, by the number of motions
@@ -47,6 +43,8 @@ class PoseNetwork:
     """
 
     def __init__(self, env: Any, seed: int) -> None:
+        import torch
+
         torch.set_num_threads(1)
         torch.manual_seed(seed)
         self.rng = np.random.default_rng(seed)
@@ -55,13 +53,12 @@ class PoseNetwork:
         self.dimensions = env.single_action_space.shape[0]
         pixels = int(np.prod(env.single_observation_space.shape))
         first, second = HIDDEN
-        outputs = self.dimensions * (1 + GUESSES)
         self.network = torch.nn.Sequential(
             torch.nn.Linear(pixels + self.dimensions + 1, first),
             torch.nn.ReLU(),
             torch.nn.Linear(first, second),
             torch.nn.ReLU(),
-            torch.nn.Linear(second, outputs),
+            torch.nn.Linear(second, self.dimensions),
         )
         self.optimiser = torch.optim.Adam(self.network.parameters(), LEARNING_RATE)
 
@@ -74,16 +71,18 @@ class PoseNetwork:
 
     def inputs(self, observed: Array, drawn: Array, best: Array, begins: bool) -> Any:
         """Return what the network sees (n, inputs)."""
+        import torch
+
         start = np.full((len(observed), 1), float(begins))
         seen = np.concatenate([observed, observed - drawn, best, start], axis=1)
         return torch.as_tensor(seen, dtype=torch.float32)
 
-    def outputs(self, inputs: Any) -> Array:
-        """Return corrections and first guesses (n, 1 + guesses, d)."""
+    def corrections(self, inputs: Any) -> Array:
+        """Return the corrections (n, d) of proposals."""
+        import torch
+
         with torch.no_grad():
-            return np.asarray(self.network(inputs), dtype=np.float64).reshape(
-                len(inputs), 1 + GUESSES, self.dimensions
-            )
+            return np.asarray(self.network(inputs), dtype=np.float64)
 
     def learn(self, steps: int) -> None:
         """Learn from so many steps of the environment."""
@@ -109,8 +108,8 @@ class PoseNetwork:
             left = max(1.0 - number * per_round / steps, 0.02)
             self.fit(self.lesson(observed, answers), LEARNING_RATE * left)
 
-    def lesson(self, observed: Array, answers: Array) -> tuple[Any, Any, Any]:
-        """Return inputs, targets, and which rows ask for a first guess."""
+    def lesson(self, observed: Array, answers: Array) -> tuple[Any, Any]:
+        """Return inputs, and the corrections that lead to the answers."""
         count = len(observed)
         proposal = np.zeros_like(answers)
         drawn = np.zeros_like(observed)
@@ -119,36 +118,30 @@ class PoseNetwork:
         for step in range(1 + CORRECTIONS):
             inputs.append(self.inputs(observed, drawn, proposal, step == 0))
             targets.append(answers - proposal)
-            outputs = self.outputs(inputs[-1])
-            # any first guess may turn out to be the best
-            chosen = 1 + self.rng.integers(GUESSES, size=count) if step == 0 else 0
             noise = NOISE * self.rng.random((count, 1))
             noise = noise * self.rng.standard_normal(answers.shape)
-            change = outputs[np.arange(count), chosen]
-            proposal = self.boxed(proposal + change + noise)
+            change = self.corrections(inputs[-1]) + noise
+            proposal = self.boxed(proposal + change)
             drawn = split(self.env.step(proposal)[0])[1]
-        begins = torch.arange(len(targets) * count) < count
-        wanted = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
-        return torch.cat(inputs), wanted, begins
+        import torch
 
-    def fit(self, lesson: tuple[Any, Any, Any], rate: float) -> None:
+        wanted = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
+        return torch.cat(inputs), wanted
+
+    def fit(self, lesson: tuple[Any, Any], rate: float) -> None:
         """Take a few passes of Adam over a lesson."""
-        inputs, targets, begins = lesson
+        import torch
+
+        inputs, targets = lesson
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         for _ in range(PASSES):
             for rows in torch.split(torch.randperm(len(inputs)), BATCH):
-                outputs = self.network(inputs[rows])
-                off = outputs.reshape(len(rows), -1, self.dimensions)
-                off = off - targets[rows][:, None]
+                off = self.network(inputs[rows]) - targets[rows]
                 if self.world.yaw == "unknown":
-                    turn = torch.remainder(off[..., :1] + 1.0, 2.0) - 1.0
-                    off = torch.cat([turn, off[..., 1:]], dim=-1)
-                squares = off.square().sum(dim=2)
-                guesses = squares[:, 1:]
-                guessed = LEARNED_MOST * guesses.min(dim=1).values
-                guessed = guessed + (1.0 - LEARNED_MOST) * guesses.mean(dim=1)
-                loss = torch.where(begins[rows], guessed, squares[:, 0]).mean()
+                    turn = torch.remainder(off[:, :1] + 1.0, 2.0) - 1.0
+                    off = torch.cat([turn, off[:, 1:]], dim=1)
+                loss = off.square().sum(dim=1).mean()
                 self.optimiser.zero_grad()
                 loss.backward()
                 self.optimiser.step()
@@ -156,41 +149,32 @@ class PoseNetwork:
     def policy(self) -> Policy:
         """Return the policy of one episode, of small pictures and last costs.
 
-        It begins with the first guesses, and then corrects the best proposal so far. A
-        correction that made it worse is halved.
+        It corrects the best proposal so far. A correction that made it worse is halved.
         """
-        step = 0
-        best: Array = np.empty(0)
+        best: Array | None = None
         best_costs: Array = np.empty(0)
         best_drawn: Array = np.empty(0)
         halvings: Array = np.empty(0)
         proposal: Array = np.empty(0)
-        guesses: Array = np.empty(0)
 
         def act(pictures: Any, costs: Array) -> Array:
-            nonlocal step, best, best_costs, best_drawn, halvings, proposal, guesses
+            nonlocal best, best_costs, best_drawn, halvings, proposal
             observed, drawn = split(pictures)
-            if step == 0:
+            begins = best is None
+            if best is None:
                 best = np.zeros((len(observed), self.dimensions))
                 best_costs = costs.copy()
                 best_drawn = np.zeros_like(observed)
                 halvings = np.zeros(len(observed))
-                shown = self.inputs(observed, best_drawn, best, True)
-                guesses = self.outputs(shown)[:, 1:]
             else:
                 better = costs < best_costs
                 best[better] = proposal[better]
                 best_costs[better] = costs[better]
                 best_drawn[better] = drawn[better]
-                corrects = step > GUESSES
-                halvings = np.where(better | (not corrects), 0.0, halvings + 1.0)
-            if step < GUESSES:
-                proposal = self.boxed(guesses[:, step])
-            else:
-                shown = self.inputs(observed, best_drawn, best, False)
-                change = self.outputs(shown)[:, 0] * 0.5 ** halvings[:, None]
-                proposal = self.boxed(best + change)
-            step += 1
+                halvings = np.where(better, 0.0, halvings + 1.0)
+            shown = self.inputs(observed, best_drawn, best, begins)
+            change = self.corrections(shown) * 0.5 ** halvings[:, None]
+            proposal = self.boxed(best + change)
             return proposal
 
         return act

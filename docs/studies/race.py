@@ -24,7 +24,7 @@ from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
 NAME = "posefit/Race-v1"
 # the people of the test are those of training, as when its page was measured
-PEOPLE = {"held_out_people": False}
+PEOPLE: dict[str, Any] = {"held_out_people": False}
 INSTANCES = 192
 SEEDS = 2
 # settings of the learners' trainings
