@@ -19,7 +19,7 @@ from posefit.fitting.tracker import SynthesisTracker as SynthesisTracker
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
 from posefit.footage.device import moved_to as moved_to
-from posefit.footage.segmentation import Extraction as Extraction
+from posefit.footage.extraction import Extraction as Extraction
 from posefit.geometry.body import Body as Body
 from posefit.geometry.camera import Camera as Camera
 from posefit.geometry.skeleton import JOINTS as JOINTS

@@ -1,6 +1,6 @@
 """Arrays of .npz and .npy files, whose sizes are checked before they are unpacked.
 
-`numpy.load` unpacks whatever a file asks for, which a hostile file may abuse. Here the
+`numpy.load` unpacks any amount of data, which a hostile file may abuse. Here the
 archive's directory and the header of each array are read first. An array is not
 unpacked if its size differs from what they say, or exceeds what the caller allows.
 """
@@ -125,11 +125,10 @@ def archived(
             archive = stack.enter_context(zipfile.ZipFile(file))
             file.longest = packed
             members = set(archive.namelist())
-            arrays = {
-                name: _stored(path, what, archive, name)
-                for name in names
-                if f"{name}.npy" in members
-            }
+            arrays = {}
+            for name in names:
+                if f"{name}.npy" in members:
+                    arrays[name] = _stored(path, what, archive, name)
             if (
                 single
                 and len(members) == 1
@@ -161,11 +160,11 @@ class _ArchiveFile(io.FileIO):
 def _as_input_error(expected: str) -> Iterator[None]:
     """Turn any error of a damaged archive or array into an InputError.
 
-    Its message begins with what was expected.
+    Its message begins with `expected`.
     """
     try:
         yield
-    # whatever zipfile and NumPy stumble over, the file is the cause
+    # zipfile and NumPy raise many types of errors for a damaged file
     except Exception as error:
         text = " ".join(str(error).split()) or type(error).__name__
         came = f"a damaged one: {cut(text)}"

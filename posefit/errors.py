@@ -17,16 +17,18 @@ def printable(text: str) -> str:
     text = _LONG.sub(lambda word: f"{word[0][:38]}...{word[0][-39:]}", text)
     if text.isprintable():
         return text
-    return "".join(
-        sign if sign.isprintable() else sign.encode("unicode_escape").decode()
-        for sign in text
-    )
+    signs = []
+    for sign in text:
+        if not sign.isprintable():
+            sign = sign.encode("unicode_escape").decode()
+        signs.append(sign)
+    return "".join(signs)
 
 
 class InputError(ValueError):
     """An argument, a setting or a file is invalid.
 
-    The message says what was expected and what came. The command line shows it as one
+    The message has the expected and the actual value. The command line shows it as one
     line; any other ValueError is a fault of the program and shows its traceback. The
     message may contain names from outside, and so it is made `printable`.
     """

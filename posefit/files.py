@@ -2,7 +2,7 @@
 
 Files are first written in the same folder, under a random name that begins with a dot.
 They are created exclusively, so that nothing is written through another file or link.
-A call removes only what it has made, or what carries the mark of an earlier call that
+A call removes only its own files, or files with the mark of an earlier call that
 has ended.
 """
 
@@ -61,9 +61,7 @@ def opencv_name(path: str | Path) -> str:
     try:
         name.encode()
     except UnicodeEncodeError:
-        raise InputError(
-            f"{path}: expected a name in UTF-8, got one that is not"
-        ) from None
+        raise InputError(f"{path}: expected a name in UTF-8, got other bytes") from None
     return name
 
 
@@ -144,7 +142,7 @@ def _built(
 
 
 def replaceable(path: str | Path, mark: bytes) -> bool:
-    """Return whether a name is free, or is that of a file that begins with `mark`.
+    """Return whether a name is free, or names a file that begins with `mark`.
 
     A link is never replaceable.
     """
@@ -274,7 +272,7 @@ class Unfinished:
 
 def made_folders(folder: Path) -> list[Path]:
     """Create a folder and its parents, and return the new ones, the deepest first."""
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing
 
@@ -289,11 +287,11 @@ def remove_empty(folders: Iterable[Path]) -> None:
 def other_entries(folder: Path, names: Iterable[str]) -> list[str]:
     """Return the entries of a folder that are not plain files with these names."""
     known = {*names, MARK}
-    return sorted(
-        entry.name
-        for entry in folder.iterdir()
-        if entry.name not in known or entry.is_symlink() or not entry.is_file()
-    )
+    others = []
+    for entry in folder.iterdir():
+        if entry.name not in known or entry.is_symlink() or not entry.is_file():
+            others.append(entry.name)
+    return sorted(others)
 
 
 def emptied(folder: Path, names: Iterable[str]) -> None:
@@ -327,7 +325,10 @@ def _undone(path: Path) -> Iterator[None]:
         yield
     except BaseException:
         with suppress(OSError):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
         raise
 
 

@@ -27,7 +27,7 @@ def resolved(function: Callable[..., Any], hint: Any) -> Any:
     """Return a hint as a type, even if it is written as text.
 
     In a module with postponed annotations all hints are texts. A text that cannot be
-    evaluated is returned as it is.
+    evaluated is returned unchanged.
 
     Args:
         function: the function or class that the hint belongs to.
@@ -46,7 +46,7 @@ def resolved(function: Callable[..., Any], hint: Any) -> Any:
 def _namespaces(function: Any) -> list[Mapping[str, Any]]:
     """Return the namespaces of a function's hints.
 
-    They are the globals of what it wraps, and those of its module.
+    They are the globals of the wrapped function and of its module.
     """
     while isinstance(function, partial):
         function = function.func
@@ -109,7 +109,7 @@ def fitted(hint: Any, value: Any) -> Any:
 
 
 def read(hint: Any, text: str) -> Any:
-    """Return what a text means to a hint.
+    """Return the value of a text by a hint.
 
     For a tuple `3,4.5` is two numbers, for a str it is a text.
 
@@ -180,10 +180,11 @@ def _fitted_members(
             raise UnfitError
     else:
         members = members * len(values)
-    kind = list if (get_origin(hint) or hint) is list else tuple
-    return kind(
-        fit(member, value) for member, value in zip(members, values, strict=True)
-    )
+    fitted = []
+    for member, value in zip(members, values, strict=True):
+        fitted.append(fit(member, value))
+    is_list = (get_origin(hint) or hint) is list
+    return fitted if is_list else tuple(fitted)
 
 
 def _members(hint: Any) -> tuple[Any, ...]:
@@ -247,8 +248,8 @@ def shown(hint: Any, default: Any = None) -> str:
     if hint in (None, type(None)):
         return "none"
     if origin in _SEQUENCES:
-        inside = [
-            "..." if member is Ellipsis else shown(member) for member in get_args(hint)
-        ]
+        inside = []
+        for member in get_args(hint):
+            inside.append("..." if member is Ellipsis else shown(member))
         return f"{origin.__name__}[{', '.join(inside)}]"
     return hint.__name__ if isinstance(hint, type) else str(hint)

@@ -37,7 +37,16 @@ Needs = tuple[str, str]
 
 
 class RegisterOptimiser(Protocol):
-    """Registers an optimiser."""
+    """Registers an optimiser.
+
+    Example:
+        >>> from posefit.plugin import RegisterOptimiser, hookimpl
+        >>> class Mine:
+        ...     ...
+        >>> @hookimpl
+        ... def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+        ...     register("mine", Mine)
+    """
 
     def __call__(
         self,
@@ -58,7 +67,16 @@ class RegisterOptimiser(Protocol):
 
 
 class RegisterTracker(Protocol):
-    """Registers a tracker."""
+    """Registers a tracker.
+
+    Example:
+        >>> from posefit.plugin import RegisterTracker, hookimpl
+        >>> class Mine:
+        ...     ...
+        >>> @hookimpl
+        ... def posefit_register_trackers(register: RegisterTracker) -> None:
+        ...     register("mine", Mine)
+    """
 
     def __call__(
         self,
@@ -80,7 +98,16 @@ class RegisterTracker(Protocol):
 
 
 class RegisterPrior(Protocol):
-    """Registers a prior."""
+    """Registers a prior.
+
+    Example:
+        >>> from posefit.plugin import RegisterPrior, hookimpl
+        >>> class Mine:
+        ...     ...
+        >>> @hookimpl
+        ... def posefit_register_priors(register: RegisterPrior) -> None:
+        ...     register("mine", Mine)
+    """
 
     def __call__(
         self, name: str, factory: "PriorFactory", *, needs: Needs | None = None
@@ -95,7 +122,16 @@ class RegisterPrior(Protocol):
 
 
 class RegisterStart(Protocol):
-    """Registers a start, which guesses first poses."""
+    """Registers a start, which guesses first poses.
+
+    Example:
+        >>> from posefit.plugin import RegisterStart, hookimpl
+        >>> class Mine:
+        ...     ...
+        >>> @hookimpl
+        ... def posefit_register_starts(register: RegisterStart) -> None:
+        ...     register("mine", Mine)
+    """
 
     def __call__(
         self, name: str, factory: "InitialiserFactory", *, needs: Needs | None = None
@@ -110,7 +146,16 @@ class RegisterStart(Protocol):
 
 
 class RegisterSegmenter(Protocol):
-    """Registers a segmenter."""
+    """Registers a segmenter.
+
+    Example:
+        >>> from posefit.plugin import RegisterSegmenter, hookimpl
+        >>> class Mine:
+        ...     ...
+        >>> @hookimpl
+        ... def posefit_register_segmenters(register: RegisterSegmenter) -> None:
+        ...     register("mine", Mine)
+    """
 
     def __call__(
         self,
@@ -132,7 +177,16 @@ class RegisterSegmenter(Protocol):
 
 
 class RegisterDevice(Protocol):
-    """Registers a device, which draws poses."""
+    """Registers a device, which draws poses.
+
+    Example:
+        >>> from posefit.plugin import RegisterDevice, hookimpl
+        >>> class Mine:
+        ...     ...
+        >>> @hookimpl
+        ... def posefit_register_devices(register: RegisterDevice) -> None:
+        ...     register("mine", Mine)
+    """
 
     def __call__(
         self,

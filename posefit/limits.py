@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -26,7 +26,7 @@ SOON = 1e-6
 EARLY = 1e-3
 # environment variable that `check_decoded` reads, and its default
 DECODED = "POSEFIT_DECODED_GIGABYTES"
-DECODED_GIGABYTES = 4.0
+DECODED_GIGABYTES = 20.0
 # files of Linux with a container's memory limit, by version 2 and 1 of control groups
 _CONTAINER = (
     Path("/sys/fs/cgroup/memory.max"),
@@ -101,12 +101,19 @@ class timed:  # noqa: N801, named like the context managers of contextlib
             raise TimeoutError from error  # the cause's traceback says where it was
 
 
-def end_with_parent(parent: int) -> None:
-    """End this process soon after its parent process has ended in any way."""
+def end_with_parent(parent: int, clean_up: Callable[[], None] | None = None) -> None:
+    """End this process soon after its parent process has ended in any way.
+
+    Args:
+        parent: the parent's process id.
+        clean_up: is called before.
+    """
 
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(PARENT_POLL_SECONDS)
+        if clean_up is not None:
+            clean_up()
         # also end what this process has started, if it leads a process group
         if hasattr(os, "getpgrp") and os.getpgrp() == os.getpid():
             os.killpg(0, signal.SIGKILL)
@@ -161,17 +168,16 @@ def check_decoded(name: str, size: int) -> None:
 def allowed_bytes() -> int:
     """Return the memory in bytes that this process may use.
 
-    It is the least of what the machine, its container and the process' limits allow.
+    It is the least of the limits of the machine, its container and the process.
     """
     limits = []
     with suppress(ImportError):
         import resource
 
-        soft = (
-            resource.getrlimit(kind)[0]
-            for kind in (resource.RLIMIT_DATA, resource.RLIMIT_AS)
-        )
-        limits = [limit for limit in soft if limit != resource.RLIM_INFINITY]
+        for kind in (resource.RLIMIT_DATA, resource.RLIMIT_AS):
+            soft = resource.getrlimit(kind)[0]
+            if soft != resource.RLIM_INFINITY:
+                limits.append(soft)
     return min([_machine_bytes(), *limits])
 
 

@@ -5,7 +5,7 @@
 An optimiser uses four members of its space: `dimensions`, `start`, `periodic` and
 `feasible`. Whatever else it does with a space is a function here.
 
-| what you write | what it is | its hook |
+| plugin | meaning | hook |
 |---|---|---|
 | optimiser | `Optimiser`, or `Filter`, of a `Space` | `posefit_register_optimisers` |
 | prior | `Prior` | `posefit_register_priors` |

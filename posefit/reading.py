@@ -147,7 +147,7 @@ def parsed_toml(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise InputError(
-            "expected values that are not nested so deeply, got too many brackets"
+            "expected less deeply nested values, got too many brackets"
         ) from None
 
 
@@ -162,5 +162,5 @@ def parsed_json(text: str | bytes) -> Any:
         return json.loads(text)
     except RecursionError:
         raise InputError(
-            "expected values that are not nested so deeply, got too many brackets"
+            "expected less deeply nested values, got too many brackets"
         ) from None

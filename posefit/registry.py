@@ -1,4 +1,4 @@
-"""Loads plugins, and finds what they offer by kind and name.
+"""Loads plugins, and finds their offers by kind and name.
 
 A plugin is left out if it cannot be imported, misspells a hook, fails inside a hook, or
 registers a name that is taken. A warning then names its distribution; the others work.
@@ -37,11 +37,11 @@ BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
 Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter", "device"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-# those that `posefit check` has rules for, and `posefit plugins new` a template
+# `posefit check` has rules for these kinds, `posefit plugins new` a template
 CHECKED_KINDS = tuple(kind for kind in KINDS if kind != "device")
 # distribution of an optimiser that no plugin but the program itself has registered
 OWN = "this process"
-COMMAND: Literal["command"] = "command"  # what a plugin may register besides KINDS
+COMMAND: Literal["command"] = "command"  # plugins may register commands besides KINDS
 Registrable: TypeAlias = Kind | Literal["command"]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 
@@ -80,7 +80,7 @@ class Offer:
 
     @property
     def origin(self) -> str:
-        """What its results depend on.
+        """The origin of its results.
 
         That is its distribution and version, a digest of its package's source, and its
         library. posefit's own plugins have the same version; their packages' names
@@ -124,7 +124,7 @@ class Offer:
 
 
 class Plugin(NamedTuple):
-    """One entry point, and what it offers.
+    """One entry point, and its offers.
 
     Attributes:
         name: of the entry point.
@@ -161,11 +161,11 @@ class Registry:
     @cached_property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
         """The offers of all loaded plugins."""
-        offers = [offer for plugin in self.plugins for offer in plugin.offers]
-        return {
-            kind: {offer.name: offer for offer in offers if offer.kind == kind}
-            for kind in KINDS
-        }
+        offers: dict[Kind, dict[str, Offer]] = {kind: {} for kind in KINDS}
+        for plugin in self.plugins:
+            for offer in plugin.offers:
+                offers[offer.kind][offer.name] = offer
+        return offers
 
     def optimiser(self, name: str) -> "OptimiserFactory":
         """Return the optimiser factory with a name.
@@ -290,7 +290,7 @@ def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
 def plugins_of(
     kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()
 ) -> tuple[Plugin, ...]:
-    """Return all installed plugins with what they offer of some kinds; see `load`.
+    """Return all installed plugins with their offers of some kinds; see `load`.
 
     A plugin in a group whose name only begins with posefit's is included as broken.
     """
@@ -312,6 +312,17 @@ def optimiser(name: str) -> "OptimiserFactory":
     Raises:
         InputError: there is none; the message lists the known names.
         ImportError: a library that it needs is not installed.
+
+    Args:
+        name: The optimiser's name, such as "sapso", or "nevergrad:DE".
+
+    Returns:
+        The factory, which takes a space, a generator and settings.
+
+    Example:
+        >>> import posefit
+        >>> posefit.optimiser("sapso").__name__
+        'SAPSO'
     """
     return registry().optimiser(name)
 
@@ -322,6 +333,19 @@ def prior(name: str) -> "PriorFactory":
     Raises:
         InputError: there is none; the message lists the known names.
         ImportError: a library that it needs is not installed.
+
+    Args:
+        name: The prior's name, such as "pca".
+
+    Returns:
+        The factory, which takes settings.
+
+    Example:
+        >>> import posefit
+        >>> poses = posefit.load_motion("walk-a").poses
+        >>> fitted = posefit.prior("pca")(components=3).fit(poses[:, 3:])
+        >>> fitted.low.shape
+        (3,)
     """
     return registry().prior(name)
 
@@ -371,7 +395,7 @@ def load(
                     offers=tuple(methods),
                     commands=tuple(commands),
                 )
-            # whatever a plugin does, the others must work
+            # the others must work even if a plugin fails
             except (Exception, SystemExit) as error:
                 trace = "".join(traceback.format_exception(error))
                 plugin = plugin._replace(
@@ -398,7 +422,7 @@ def _offers(
     release: str,
     owners: Mapping[str, str],
 ) -> "dict[str, Offer | click.Command]":
-    """Return what a plugin offers, by its name in errors. Let all errors through."""
+    """Return a plugin's offers, by its name in errors. Let all errors through."""
     if point.group != PROJECT:
         raise InputError(
             f"its entry point must be in the group {PROJECT!r}, got {point.group!r}"
@@ -411,12 +435,13 @@ def _offers(
         manager.check_pending()
     except pluggy.PluginValidationError as error:
         known = [name for name in vars(hooks) if name.startswith("posefit_register_")]
-        unknown = [
-            name
-            for name in vars(module)
-            if name.startswith("posefit_") and name not in known
-        ]
-        near = suggestion(unknown[0], known) if unknown else ""
+        unknown = []
+        for name in vars(module):
+            if name.startswith("posefit_") and name not in known:
+                unknown.append(name)
+        near = ""
+        if unknown:
+            near = suggestion(unknown[0], known)
         raise InputError(f"{error}{near}") from None
     offers: dict[str, Offer | click.Command] = {}
 

@@ -79,10 +79,12 @@ def settings_in(text: str) -> dict[str, tuple[str, str]]:
     the source's letter, and is "" if it is missing. Without a list the result is empty.
     """
     listed = _LIST.search(text)
-    entries = _ENTRY.findall(textwrap.dedent(listed[2])) if listed else []
-    return {
-        name: (symbol, " ".join(meaning.split())) for name, symbol, meaning in entries
-    }
+    if not listed:
+        return {}
+    meanings = {}
+    for name, symbol, meaning in _ENTRY.findall(textwrap.dedent(listed[2])):
+        meanings[name] = (symbol, " ".join(meaning.split()))
+    return meanings
 
 
 def without_settings(text: str) -> str:
@@ -126,7 +128,7 @@ def check(
 def planned(
     factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int
 ) -> dict[str, Any]:
-    """Return an optimiser's settings with those that follow from a search's budget.
+    """Return an optimiser's settings, with settings that a search's budget decides.
 
     These are `evaluations` itself, and `iterations`, the populations after the first,
     if the optimiser has these settings. Given values are kept.

@@ -78,5 +78,5 @@ def _files_of(package: object) -> Iterator[tuple[str, Path]]:
 
 
 def _counts(name: str) -> bool:
-    """Return whether a file or folder of a package can affect what it does."""
+    """Return whether a file or folder of a package can affect its results."""
     return not name.startswith(".") and name != COMPILED and not name.endswith(".pyc")

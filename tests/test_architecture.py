@@ -43,7 +43,7 @@ def test_nothing_in_posefit_names_a_plugin() -> None:
     ] == []
 
 
-def test_the_version_stands_in_one_place() -> None:
+def test_the_version_is_in_one_place() -> None:
     assert "version" in PROJECT["project"]["dynamic"]
     assert PROJECT["tool"]["hatch"]["version"] == {"path": "posefit/version.py"}
     literal = f'"{posefit.__version__}"'

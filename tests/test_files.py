@@ -109,7 +109,7 @@ def test_of_two_writers_at_once_the_first_to_end_has_the_name(
     assert list(tmp_path.iterdir()) == [tmp_path / "out"]
 
 
-def test_a_failure_leaves_an_earlier_file_as_it_was(tmp_path):
+def test_a_failure_leaves_an_earlier_file_unchanged(tmp_path):
     path = tmp_path / "out.html"
     path.write_bytes(MARK + b"one")
     with pytest.raises(ValueError, match="No space left on device"):

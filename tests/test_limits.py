@@ -30,7 +30,7 @@ def test_what_takes_too_long_is_ended(endless: Callable[[], None]) -> None:
         endless()
 
 
-def test_a_limit_within_a_limit_leaves_the_outer_one_as_it_was() -> None:
+def test_an_inner_limit_leaves_the_outer_one_unchanged() -> None:
     def nested() -> None:
         with timed(20.0):
             pass

@@ -14,7 +14,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
 
 
-def test_its_commands_are_those_of_ci() -> None:
+def test_ci_runs_its_commands() -> None:
     first, second = blocks("sh")
     assert first.startswith(
         "python -m pip install -e . && posefit track walk --out walk && posefit sweep default "

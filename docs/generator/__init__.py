@@ -1,10 +1,10 @@
 """The parts of the handbook that are made from the code.
 
-They are settings, figures, equations, commands, environments and modules. `python
-docs/generator` writes them, and so does docs/conf.py before every build. Parts of pages
-in the repository are between `<!-- from the code: NAME -->` and `<!-- end -->`;
-tests/docs compares them with the code. Whole pages go to docs/generated, which is not
-in the repository.
+They are settings, figures, equations, commands, environments, messages and modules.
+`python docs/generator` writes them, and so does docs/conf.py before every build. Parts
+of pages in the repository are between `<!-- from the code: NAME -->` and
+`<!-- end -->`; tests/docs compares them with the code. Whole pages go to
+docs/generated, which is not in the repository.
 """
 
 import re
@@ -18,6 +18,7 @@ from generator import (
     equations,
     figures,
     joints,
+    messages,
     python,
     settings,
 )
@@ -47,6 +48,7 @@ def write() -> None:
         **pages(),
         "generated/commands.md": commands.page(),
         "generated/figures.md": figures.page(),
+        "generated/messages.md": messages.page(),
         "generated/settings.md": settings.page(),
         **{
             f"generated/python/{name}.rst": text

@@ -4,11 +4,14 @@
     python docs/studies/ablate.py --constants --ledger ablated.jsonl
 
 A mechanism is switched off; a constant is halved and doubled. Recorded people who are
-left out of the library are tracked as in people.py, by one camera and by two, with
-several seeds. A line is a change of the tracker: the mean difference of the error from
-the tracker as it is, over the same clips and seeds, with its 95 % interval, and the
-ratio of CPU times. If a change makes no difference in any column, its mechanism can go.
-Finished tracks are kept in a file, where the same command continues.
+left out of the library are tracked: by one camera, by two, and by one in bad conditions
+(the root and the first yaw are unknown, the body is 5 % off, silhouettes are damaged).
+Each track is of another clip and has another seed, and every change has the same
+tracks. A line of the table is a change: how much larger the errors are than those of
+the tracker as it is, as a geometric mean, with the 95 % interval for other clips and
+seeds; and the median ratio of CPU times. A change that makes no difference in any
+column shows that its mechanism can go. Finished tracks are kept in a file, where the
+same command continues.
 """
 
 import importlib
@@ -16,108 +19,160 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from itertools import product
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import click
 import numpy as np
 
-from clips import GROUPS, PAIRS, SIDES, cell_fields, track_of
+from clips import (
+    CHANGES,
+    EVALUATIONS,
+    GROUPS,
+    PAIRS,
+    SIDES,
+    Clip,
+    Views,
+    cell_fields,
+    learn_library,
+    track_of,
+)
 from posefit.arrays import Array
 from posefit.cli.output import Command
-from posefit.statistics.means import run_means
+from posefit.footage.scene import Scene
+from posefit.statistics.means import mean_interval
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
-from table import WORKERS, keyed, markdown, measured
+from table import WORKERS, Row, earlier, keyed, markdown, measured
 
 PACKAGE = "posefit_exemplars"
 MODULES = (
     "beam",
-    "calibration",
+    "cost_model",
     "exemplars",
+    "fits",
     "frame_costs",
-    "hypotheses",
     "kernels",
     "lookup",
-    "lost_model",
     "markov",
+    "proposals",
+    "path",
     "smoothing",
     "tracker",
 )
+CELL = "cell"  # a change of `cell.FIELD` is one of the cell's fields
 AS_IT_IS = "as it is"
+# Constants that are no choice of their own: they follow from others, fix the layout of
+# arrays, or are in arrays that are learned once and kept on disk.
+FIXED = (
+    "COARSE_GROUPS",
+    "CONTINUED_EVALUATIONS",
+    "DIMENSIONS",
+    "DISTANCE",
+    "ELEVATION",
+    "FIELD_OF_VIEW",
+    "FIRST_DIMENSIONS",
+    "FRESH_EVALUATIONS",
+    "GROUPS",
+    "LANES",
+    "LIMB_EVALUATIONS",
+    "MIN_EVALUATIONS",
+    "MIN_FIT_EVALUATIONS",
+    "MIN_FRAME_DISTANCE",
+    "MIN_SMALL_SIDE",
+    "PICTURE",
+    "POSES",
+    "RNG_STREAM_TABLE",
+    "SIDE",
+    "STEP_EVALUATIONS",
+    "TOTAL_BINS",
+    "YAWS",
+    "YAW_STEP",
+)
 OFF = 1e9  # of a spread or a cost: so large that what depends on it says nothing
 TINY = 1e-9  # of a share or a cost
-FRAMES = 60  # of a clip, at most
-VIEWS = (SIDES[1], PAIRS[1])  # by one camera and by two
-FROM_EACH_GROUP = 1  # clips
+FRAMES = 24  # of a clip, at most
 
 Change = Mapping[str, Any]  # the constants that differ, by `module.NAME`
 # A mechanism is switched off by the constant that gives it its weight.
 MECHANISMS: Mapping[str, Change] = {
     AS_IT_IS: {},
-    "no reflected hypotheses": {"hypotheses.REFLECTED_SHARE": 0.0},
-    "no fresh hypotheses but two": {"hypotheses.FRESH_SHARE": TINY},
-    "all hypotheses fresh but one": {"hypotheses.FRESH_SHARE": 0.9},
-    "poses of clips pull no hypothesis": {"hypotheses.LIBRARY_TURN": OFF},
-    "distance from clips costs nothing": {"hypotheses.LIBRARY_COST": 0.0},
+    "no reflected hypotheses": {"proposals.REFLECTED_SHARE": 0.0},
+    "no fresh hypotheses but two": {"proposals.FRESH_SHARE": TINY},
+    "all hypotheses fresh but one": {"proposals.FRESH_SHARE": 0.9},
+    "poses of clips pull no hypothesis": {"fits.LIBRARY_TURN": OFF},
+    "distance from clips costs nothing": {"cost_model.LIBRARY_COST": 0.0},
     "no diverse states": {"beam.BEAM_SHARES": 1},
-    "no shares of yaws": {"beam.YAW_SHARES": 1},
-    "parts continue at their speed alone": {"hypotheses.SPEED_COSTS": {1.0: 0.0}},
-    "clips are followed at their speed alone": {
-        "beam.CLIP_SPEEDS": (1.0,),
-        "beam.RECORDED_SPEED": 0,
+    "no shares of yaws": {"proposals.YAW_SHARES": 1},
+    "parts continue at their speed alone": {"cost_model.SPEED_COSTS": {1.0: 0.0}},
+    "no limit to the cost of a part's step": {"cost_model.MAX_PART_COST": OFF},
+    "noise raises no limit": {"cost_model.MAX_JUMP_FACTOR": 1.0},
+    "masks are never taken for noisy": {"cost_model.CLEAN_COST": OFF},
+    "no candidates that turn away": {"proposals.CANDIDATE_TURN": TINY},
+    "roots may be anywhere": {
+        "cost_model.ROOT_SPREAD": OFF,
+        "cost_model.DEPTH_SPREAD": OFF,
     },
-    "no limit to the cost of a part's step": {"hypotheses.MAX_PART_COST": OFF},
-    "noise raises no limit": {"hypotheses.MAX_JUMP_FACTOR": 1.0},
-    "masks are never taken for noisy": {"hypotheses.CLEAN_COST": OFF},
-    "no candidates that turn away": {"beam.CANDIDATE_TURN": TINY},
-    "roots may be anywhere": {"beam.ROOT_SPREAD": OFF, "beam.DEPTH_SPREAD": OFF},
-    "a known root says nothing of clips": {"beam.KNOWN_ROOT_SPREAD": OFF},
-    "no search everywhere after the first frame": {"tracker.SEARCHES_PER_SECOND": TINY},
-    "fast turns cost nothing": {"beam.FAST_TURN_COST": 0.0},
-    "no jumps": {"beam.JUMP_COST": 1e4},
-    "near hypotheses are not one": {"hypotheses.SAME_DISTANCE": 1e-4},
+    "a known root says nothing of clips": {"cost_model.KNOWN_ROOT_SPREAD": OFF},
+    "no search everywhere after the first frame": {"path.SEARCHES_PER_SECOND": TINY},
+    "no jumps": {"cost_model.JUMP_COST": 1e4},
+    "near hypotheses are not one": {"proposals.SAME_DISTANCE": 1e-4},
     "the beam has all evaluations but a fit": {"tracker.FIT_SHARE": 0.3},
-    "the path's costs count as much": {"hypotheses.SHARPNESS": 1.0},
+    "the path's costs count as much": {"cost_model.SHARPNESS": 1.0},
+    "no smoothing over time": {"smoothing.FILTER_REACH": 0.0},
+    "similar states are not averaged": {
+        "path.SIMILAR_DISTANCE": 1e-6,
+        "path.SIMILAR_YAW": 1e-6,
+    },
+    "half as many states": {"proposals.BEAM_STATES": 200},
+    "a yaw bin has a sixteenth of the candidates": {"proposals.YAW_SHARES": 16},
+    "half as many searches everywhere": {"path.SEARCHES_PER_SECOND": 5.0},
+    "only the nearest group is searched": {"exemplars.NEAR_GROUPS": 1},
+    "half of the evaluations": {f"{CELL}.evaluations": EVALUATIONS // 2},
+}
+
+
+class Situation(NamedTuple):
+    """The conditions of some of the tracks."""
+
+    views: Views
+    every: int  # one of so many tracks has them
+    fields: Mapping[str, Any]  # of the cell
+
+
+SITUATIONS: Mapping[str, Situation] = {
+    "one camera": Situation(SIDES[1], 1, {}),
+    "two cameras": Situation(PAIRS[1], 2, {}),
+    "one camera, all worse": Situation(SIDES[1], 2, CHANGES["all of these"]),
 }
 
 
 class Run(NamedTuple):
-    """A track: a change of the tracker, a clip by some cameras, and a seed."""
+    """A track: a change of the tracker, the conditions, and the number of the track."""
 
     change: str
-    clip: str
-    views: int
-    seed: int
+    situation: str
+    number: int  # of the clip, and the seed
 
 
 def constants() -> dict[str, Change]:
     """Return each numeric constant of the tracker halved, and doubled."""
-    changes: dict[str, Change] = {}
+    owners: dict[str, tuple[str, float]] = {}
     for module in MODULES:
         for name, value in vars(importlib.import_module(f"{PACKAGE}.{module}")).items():
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not name.isupper() or not is_number or value == 0:
-                continue
-            place = f"{module}.{name}"
-            # one imported from another module is changed with that one
-            if any(
-                place.endswith(f".{known.split('.')[1]}") for known in _seen(changes)
-            ):
-                continue
-            for factor in (0.5, 2.0):
-                changed = (
-                    type(value)(round(value * factor))
-                    if isinstance(value, int)
-                    else value * factor
-                )
-                if changed != value and changed != 0:
-                    changes[f"{place} = {changed:.3g}"] = {place: changed}
+            if name.isupper() and is_number and value != 0 and name not in FIXED:
+                # one imported from another module is changed with that one
+                owners.setdefault(name, (module, value))
+    changes: dict[str, Change] = {}
+    for name, (module, value) in owners.items():
+        for factor in (0.5, 2.0):
+            changed: float = value * factor
+            if isinstance(value, int):
+                changed = round(changed)
+            if changed not in (value, 0):
+                changes[f"{name} = {changed:.3g}"] = {f"{module}.{name}": changed}
     return changes
-
-
-def _seen(changes: Mapping[str, Change]) -> set[str]:
-    return {place for change in changes.values() for place in change}
 
 
 @contextmanager
@@ -128,6 +183,8 @@ def changed(change: Change) -> Iterator[None]:
     try:
         for place, value in change.items():
             owner, _, name = place.partition(".")
+            if owner == CELL:
+                continue
             usual = getattr(importlib.import_module(f"{PACKAGE}.{owner}"), name)
             for module in modules:
                 if getattr(module, name, None) is usual:
@@ -139,91 +196,139 @@ def changed(change: Change) -> Iterator[None]:
             setattr(module, name, usual)
 
 
-def tracked(run: Run, change: Change, fields: Mapping[str, Any]) -> dict[str, Any]:
+def tracked(run: Run, change: Change) -> dict[str, Any]:
     """Return the error of a run's track and its CPU time a frame."""
-    cell = cell_of({**fields, "seed": run.seed})
+    situation = SITUATIONS[run.situation]
+    clip = clip_of(run.number // situation.every)
+    # no track's CPU time contains the learning of its library
+    learn_library(clip, situation.views)
+    fields = cell_fields(
+        clip, situation.views, FRAMES, seed=run.number, **situation.fields
+    )
+    for place, value in change.items():
+        owner, _, name = place.partition(".")
+        if owner == CELL:
+            fields[name] = value
+    cell = cell_of(fields)
     scene = cell_scene(cell)
-    with changed(change):
+    # finding the closest training pose would take a third of the time
+    closest = patch("posefit.evaluation.errors.nearest", true_pose)
+    with changed(change), closest:
         began = time.process_time()
         track = track_of(cell, scene)
         seconds = time.process_time() - began
     return {
         **run._asdict(),
+        "clip": clip.name,
         "mpjpe_mm": track.measures.mpjpe_mm,
         "lost": track.measures.lost_rate,
         "cpu_ms": 1e3 * seconds / cell.frames,
     }
 
 
+def true_pose(scene: Scene, _training: Array, frame: int, *_: Any) -> Array:
+    """Return the true pose (66,) of a frame in place of the closest training pose."""
+    assert scene.truth is not None
+    pose: Array = scene.truth.poses[frame]
+    return pose
+
+
+def clip_of(number: int) -> Clip:
+    """Return a clip: of each group in turn, and of each group another every time."""
+    groups = list(GROUPS.values())
+    group = groups[number % len(groups)]
+    return group[number // len(groups) % len(group)]
+
+
 def jobs_of(
-    changes: Mapping[str, Change], seeds: int
+    changes: Mapping[str, Change], tracks: int
 ) -> dict[Run, Callable[[], dict[str, Any]]]:
     """Return the tracks that are compared, by what they are of."""
-    clips = [clip for group in GROUPS.values() for clip in group[:FROM_EACH_GROUP]]
     jobs: dict[Run, Callable[[], dict[str, Any]]] = {}
-    for seed, clip, views, change in product(range(seeds), clips, VIEWS, changes):
-        run = Run(change, clip.name, len(views), seed)
-        fields = cell_fields(clip, views, FRAMES)
-        jobs[run] = partial(tracked, run, changes[change], fields)
+    for number in range(tracks):
+        for name, situation in SITUATIONS.items():
+            if number % situation.every:
+                continue
+            for change in changes:
+                run = Run(change, name, number)
+                jobs[run] = partial(tracked, run, changes[change])
     return jobs
 
 
-def lines(
-    results: Mapping[Run, Mapping[str, Any]], changes: Sequence[str]
-) -> Iterator[str]:
-    """Yield a table with a line for each change."""
+def finished(path: str | None) -> dict[Run, Row]:
+    """Return the tracks in a file, all of which are finished."""
+    return earlier(path, keyed(Run))
 
-    def of(change: str, views: int, figure: str) -> Array:
-        """Return a figure (clips, seeds)."""
-        rows: dict[str, list[float]] = {}
-        for run, row in results.items():
-            if run.change == change and run.views == views:
-                rows.setdefault(run.clip, []).append(row[figure])
-        return np.array(list(rows.values()))
 
-    counts = sorted({run.views for run in results})
+def lines(results: Mapping[Run, Row], changes: Sequence[str]) -> Iterator[str]:
+    """Yield a table with a line for each change.
+
+    An unfinished track is left out, as are the tracks that would be compared with it.
+    """
     heads = ["change"]
-    for count in counts:
-        camera = "camera" if count == 1 else "cameras"
-        heads += [f"mm more, {count} {camera}", "95 % interval"]
-    cells = []
+    for name in SITUATIONS:
+        heads += [f"{name}: % more", "95 % interval", "tracks"]
+    heads.append("CPU")
+    table = []
     for change in changes:
-        row = [change]
-        cpu = []
-        for views in counts:
-            usual = of(AS_IT_IS, views, "mpjpe_mm")
-            cpu.append(
-                of(change, views, "cpu_ms").sum() / of(AS_IT_IS, views, "cpu_ms").sum()
-            )
-            if change == AS_IT_IS:
-                row += [f"{usual.mean():.1f} in all", ""]
-                continue
-            more = run_means((of(change, views, "mpjpe_mm") - usual)[None])
-            row += [
-                f"{more.values[0]:+.1f}",
-                f"{more.low[0]:+.1f} to {more.high[0]:+.1f}",
+        line = [change]
+        cpu = list[float]()
+        for name in SITUATIONS:
+            pairs = [
+                (row, results[run._replace(change=AS_IT_IS)])
+                for run, row in results.items()
+                if run.change == change
+                and run.situation == name
+                and run._replace(change=AS_IT_IS) in results
             ]
-        cells.append([*row, f"{float(np.mean(cpu)):.2f}"])
-    yield from markdown([*heads, "CPU"], cells)
+            if not pairs:
+                line += ["-", "", "0"]
+                continue
+            errors = np.array(
+                [[row["mpjpe_mm"] for row in pair] for pair in pairs]
+            )  # (tracks, 2)
+            cpu += [row["cpu_ms"] / usual["cpu_ms"] for row, usual in pairs]
+            if change == AS_IT_IS:
+                middle = float(np.exp(np.log(errors[:, 1]).mean()))
+                line += [f"{middle:.1f} mm", "", str(len(pairs))]
+                continue
+            line += [*_more(np.log(errors[:, 0] / errors[:, 1])), str(len(pairs))]
+        table.append([*line, f"{np.median(cpu):.2f}" if cpu else "-"])
+    yield from markdown(heads, table)
+
+
+def _more(logs: Array) -> list[str]:
+    """Return how much larger errors are, in percent, from logarithms of ratios (n,)."""
+    count = len(logs)
+    if count < 2:
+        return [f"{_percent(float(logs.mean()))}", ""]
+    mean = mean_interval(logs, np.zeros(count), np.arange(count))
+    return [_percent(mean.value), f"{_percent(mean.low)} to {_percent(mean.high)}"]
+
+
+def _percent(log: float) -> str:
+    return f"{100.0 * np.expm1(log):+.1f}"
 
 
 @click.command(cls=Command, help=__doc__)
 @click.option(
     "--constants", "of_constants", is_flag=True, help="Halve and double constants."
 )
-@click.option("--seeds", type=click.IntRange(2), default=10, show_default=True)
+@click.option("--tracks", type=click.IntRange(2), default=24, show_default=True)
 @click.option(
     "--only", multiple=True, metavar="TEXT", help="Changes whose name holds this."
 )
 @click.option(
     "--ledger", metavar="FILE", help="Finished tracks: the same command continues."
 )
+@click.option("--print", "only_print", is_flag=True, help="Run nothing further.")
 @WORKERS
 def main(
     of_constants: bool,
-    seeds: int,
+    tracks: int,
     only: tuple[str, ...],
     ledger: str | None,
+    only_print: bool,
     workers: int | None,
 ) -> None:
     chosen = {AS_IT_IS: {}, **constants()} if of_constants else MECHANISMS
@@ -232,8 +337,10 @@ def main(
         for name, change in chosen.items()
         if name == AS_IT_IS or not only or any(text in name for text in only)
     }
-    jobs = jobs_of(changes, seeds)
-    results = measured(jobs, ledger, keyed(Run), workers)
+    if only_print:
+        results = finished(ledger)
+    else:
+        results = measured(jobs_of(changes, tracks), ledger, keyed(Run), workers)
     for line in lines(results, list(changes)):
         click.echo(line)
 

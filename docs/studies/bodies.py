@@ -2,6 +2,7 @@
 
     python docs/studies/bodies.py films
     python docs/studies/bodies.py films --report
+    python docs/studies/bodies.py films --legs
 
 The motions are those of the library's people, who are each left out of it. Their bodies
 get other proportions, drawn with the spreads and correlations of adults, other girths,
@@ -12,7 +13,8 @@ films are tracked with five seeds.
 
 Each track is stored in the folder, and the same command continues there. The report
 says what intervals lack, learned from all bodies; each body is judged by what the
-others teach.
+others teach. With `--legs`, thighs and shanks have the girths and lengths of a
+published survey, and their flesh is behind the bones, as it is; others stand upright.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,6 +45,8 @@ from composites_scene import (
     on_ground,
     walked_on,
 )
+from flesh import LENGTHS as PUBLISHED
+from flesh import Legs, legs_of, painted
 from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.fitting import metrics
@@ -104,6 +108,7 @@ RIM = 0.5
 ROUGH = 0.7
 DAMAGE = {"holes": 0.1, "blobs": 0.1}
 SHADOW = 0.15
+SMALL = (480, 270)  # pixels of films whose people have published legs
 LANDMARK_OFF = 0.02  # metres, constant in a film, and again in each frame
 # shares of the frames in which a film's landmarks exchange legs, or arms
 EXCHANGED = (0.03, 0.15, 0.4)
@@ -143,6 +148,9 @@ WRONG_MM = 75.0
 # turn of one thigh; share by which a cycle runs faster and slower
 LIMP_DEGREES = 7.0
 LIMP_WARP = 0.15
+# Of people who stand upright, at most. The library's, whose joints are those of a
+# skeleton fitted to markers, stand with knees bent by 8 degrees or more.
+STRAIGHT_DEGREES = 5.0
 
 
 class Act(NamedTuple):
@@ -177,6 +185,28 @@ ACTS: Mapping[str, Sequence[Act]] = {
         Act("17_03", 80.0),
     ],
 }
+# people who stand upright, all library clips with nearly straight knees for 40 frames
+UPRIGHT = [
+    Act("02_05", 0.0, start=424),
+    Act("02_10", 10.0, start=380),
+    Act("29_04", -10.0, start=437),
+    Act("29_08", 0.0, start=498),
+    Act("29_24", 15.0, start=548),
+    Act("49_09", 0.0, start=100),
+    Act("49_12", -15.0),
+    Act("49_17", 10.0),
+]
+# films of people with legs of published shapes: body 0 has the first, and so on
+WITH_LEGS = (
+    ("through", 0),
+    ("through", 3),
+    ("aslant", 0),
+    ("through", 1),
+    ("squats", 0),
+    ("through", 6),
+    ("towards", 0),
+    ("aslant", 2),
+)
 LIMPS = [
     Act(clip, 90.0, True) for clip in ("02_01", "05_01", "16_16", "16_22", "49_01")
 ]
@@ -191,13 +221,33 @@ class Shot(NamedTuple):
     body: int
     landmarks: bool = False
     seed: int = 0  # of the track
+    legs: bool = False  # whether the legs have published shapes
 
     @property
     def name(self) -> str:
         """The name of its row and its file."""
         marks = "-landmarks" if self.landmarks else ""
+        marks += "-legs" if self.legs else ""
         again = f"-seed-{self.seed}" if self.seed else ""
         return f"{self.situation}-{self.number}-{self.views}-{self.body}{marks}{again}"
+
+
+def shots_with_legs() -> list[Shot]:
+    """Return the films of people with legs of published shapes.
+
+    Those who stand upright are filmed by one camera, with landmarks, which show whether
+    they face it; the others are filmed by one, two and four.
+    """
+    several = [
+        Shot(situation, number, views, body, legs=True)
+        for views in PLACES
+        for body, (situation, number) in enumerate(WITH_LEGS)
+    ]
+    upright = [
+        Shot("upright", body, 1, body, landmarks=True, legs=True)
+        for body in range(len(UPRIGHT))
+    ]
+    return [*several, *upright]
 
 
 def shots() -> list[Shot]:
@@ -240,6 +290,7 @@ class Person:
     body: Body
     flesh: Body = field(repr=False)
     root_off: Array  # (3,) of the flesh's root, in the pelvis's frame
+    legs: Legs | None = None  # of published shapes, or None for the flesh's cones
 
     @property
     def flesh_joints(self) -> Array:
@@ -253,17 +304,26 @@ class Person:
             self.motion.translations[k]
             + rotation_from_root_angles(pose[:3]) @ self.root_off
         )
+        if self.legs is not None:
+            return painted(self.flesh, self.legs, camera, pose, place)
         return project(self.flesh, camera, pose, place)
 
 
-def body_of(number: int) -> tuple[Body, Body, Array]:
-    """Return a body, its flesh as a separate body, and the flesh's root offset (3,)."""
+def body_of(number: int, legs: bool = False) -> tuple[Body, Body, Array]:
+    """Return a body, its flesh as a separate body, and the flesh's root offset (3,).
+
+    With `legs`, thighs and shanks vary about the published lengths, not the tracker's.
+    """
     rng = np.random.default_rng([62, number])
     average = Body.of(built_in.average_skeleton())
     logs = np.zeros(len(NAMES))
+    if legs:
+        for part, bone in (("thighs", "femur"), ("shanks", "tibia")):
+            share = average.skeleton.lengths[BONES.index(f"l{bone}")] / average.stature
+            logs[NAMES.index(f"{part} length")] = np.log(PUBLISHED[bone] / share)
     lengths = slice(1, 1 + len(LENGTHS))
     logs[0] = STATURE * rng.standard_normal()
-    logs[lengths] = rng.multivariate_normal(
+    logs[lengths] += rng.multivariate_normal(
         np.zeros(len(LENGTHS)), COVARIANCE[lengths, lengths]
     )
     girths = 1.0 + rng.uniform(-GIRTH, GIRTH, len(BONES))
@@ -298,13 +358,16 @@ def body_of(number: int) -> tuple[Body, Body, Array]:
 
 def person(shot: Shot) -> Person:
     """Return the filmed person."""
-    act = (LIMPS if shot.situation == "limp" else ACTS[shot.situation])[shot.number]
-    body, flesh, root_off = body_of(shot.body)
+    situations = {**ACTS, "limp": LIMPS, "upright": UPRIGHT}
+    act = situations[shot.situation][shot.number]
+    body, flesh, root_off = body_of(shot.body, shot.legs)
     motion = frames_of(act.clip, act.start, None if act.walks else act.start + LONGEST)
     if act.walks:
         motion = walked_on(motion, WALK_METRES + 2.2 * (shot.situation == "limp"))
     if shot.situation == "limp":
         motion = limping(motion, shot.body)
+    if shot.situation == "upright":
+        motion = straightened(motion)
     leg = [BONES.index(name) for name in ("lfemur", "ltibia")]
     scale = body.skeleton.lengths[leg].sum() / motion.skeleton.lengths[leg].sum()
     motion = replace(motion.about_axes_of(body.skeleton), skeleton=body.skeleton)
@@ -315,7 +378,8 @@ def person(shot: Shot) -> Person:
     motion = on_ground(
         facing_elsewhere(motion.frames(0, min(len(motion), 3 * LONGEST)), turn), body
     )
-    return Person(moved(motion, -middle_of(motion)), body, flesh, root_off)
+    legs = legs_of(shot.body, body.stature) if shot.legs else None
+    return Person(moved(motion, -middle_of(motion)), body, flesh, root_off, legs)
 
 
 def limping(motion: Motion, number: int) -> Motion:
@@ -329,13 +393,7 @@ def limping(motion: Motion, number: int) -> Motion:
         for step in gait_of(motion).steps
         if step.foot == short
     ]
-    joint = JOINTS.index(f"{short[0]}femur")
-    poses = motion.poses.copy()
-    axes = motion.skeleton.axes[joint - 1]
-    start = angle_index(joint)
-    back = cv2.Rodrigues(np.radians([LIMP_DEGREES, 0.0, 0.0]))[0]
-    turned = axes.T @ back @ motion.skeleton.turns(poses)[joint] @ axes
-    poses[:, start : start + 3] = joint_angles_from_rotation(turned)
+    poses = turned_back(motion, f"{short[0]}femur", np.full(len(motion), LIMP_DEGREES))
     turns = 2.0 * np.pi / float(np.diff(strikes).mean())
     times = np.arange(len(motion))
     uneven = np.clip(
@@ -349,14 +407,43 @@ def limping(motion: Motion, number: int) -> Motion:
     )
 
 
+def turned_back(motion: Motion, bone: str, degrees: Array) -> Array:
+    """Return the poses (T, 66) of a motion with a bone turned back by angles (T,)."""
+    joint = JOINTS.index(bone)
+    poses = motion.poses.copy()
+    axes = motion.skeleton.axes[joint - 1]
+    start = angle_index(joint)
+    back = np.array(
+        [cv2.Rodrigues(np.array([x, 0.0, 0.0]))[0] for x in np.radians(degrees)]
+    )
+    turned = axes.T @ back @ motion.skeleton.turns(poses)[joint] @ axes
+    poses[:, start : start + 3] = joint_angles_from_rotation(turned)
+    return poses
+
+
+def straightened(motion: Motion) -> Motion:
+    """Return a motion whose knees are never bent by more than `STRAIGHT_DEGREES`.
+
+    Hips and ankles turn by half, so that the feet stay under the hips, and flat.
+    """
+    angles = clinical_angles(motion.skeleton, motion.poses)
+    for side in SIDES:
+        less = np.minimum(STRAIGHT_DEGREES - angles[f"{side}_knee_flexion"], 0.0)
+        for bone, share in (("femur", -0.5), ("tibia", 1.0), ("foot", -0.5)):
+            poses = turned_back(motion, f"{side[0]}{bone}", share * less)
+            motion = replace(motion, poses=poses)
+    return motion
+
+
 def cameras_of(
     shot: Shot, rng: np.random.Generator
 ) -> tuple[list[Camera], list[Camera]]:
     """Return the cameras, and their calibrations."""
     target = np.array([0.0, HEIGHT, 0.0])
+    size = SMALL if shot.legs else SIZE
     turned = rng.uniform(-15.0, 15.0)
     true = [
-        Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS)
+        Camera.around(target, np.radians(degrees + turned), DISTANCE, size, ACROSS)
         for degrees in PLACES[shot.views]
     ]
     rotation_off, place_off, focal_off = CALIBRATION_OFF
@@ -487,6 +574,7 @@ def figures(result: Track, who: Person) -> dict[str, Any]:
         },
         "build": result.log.build,
         "degrees": angle_errors(who.motion, angles, np.ones(len(true), dtype=bool)),
+        "bent": bent_beyond(who.motion, angles),
         "trust": {
             name: value
             for name, value in vars(result.trust).items()
@@ -494,6 +582,17 @@ def figures(result: Track, who: Person) -> dict[str, Any]:
         },
         "gait": [steps_of(gait_of(who.motion)), steps_of(result.gait)],
     }
+
+
+def bent_beyond(true: Motion, angles: Mapping[str, Array]) -> list[float]:
+    """Return median and 90th percentile, in degrees, of knee flexion beyond the truth.
+
+    Of each frame, the mean of both knees counts.
+    """
+    known = clinical_angles(true.skeleton, true.poses)
+    knees = [f"{side}_knee_flexion" for side in SIDES]
+    beyond = np.mean([angles[knee] - known[knee] for knee in knees], axis=0)
+    return np.quantile(beyond, (0.5, 0.9)).tolist()
 
 
 def legs_exchanged(true: Array, joints: Array) -> Array:
@@ -759,25 +858,72 @@ def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     yield from markdown(heads, cells, 2)
 
 
+def legs_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield errors of the legs, of walks and others and of people who stand upright.
+
+    Beside the mean errors of lengths are those without sign. Of knees bent beyond the
+    truth there are the median and the 90th percentile of a film's frames, the medians
+    of the films, and those of the worst film in ten.
+    """
+    heads = ["films", "cameras", "number", "MPJPE mm", "thigh, shank, ratio %"]
+    heads += ["without sign %", "knees beyond the truth, degrees", "of the worst"]
+    cells = []
+    for upright, views in [*product((False,), PLACES), (True, 1)]:
+        some = [
+            row
+            for row in rows
+            if (row["situation"] == "upright", row["views"]) == (upright, views)
+        ]
+        if not some:
+            continue
+        off = 100.0 * np.log1p(
+            [[row["lengths"][name] for name in ("thigh", "shank")] for row in some]
+        )
+        off = np.column_stack([off, off[:, 0] - off[:, 1]])
+        bent = np.array([row["bent"] for row in some])
+        middle, worst = np.quantile(bent, (0.5, 0.9), axis=0)
+        cells.append(
+            [
+                "upright" if upright else "others",
+                str(views),
+                str(len(some)),
+                f"{np.median([row['mpjpe_mm'] for row in some]):.0f}",
+                ", ".join(f"{x:.1f}" for x in off.mean(axis=0)),
+                ", ".join(f"{x:.1f}" for x in np.abs(off).mean(axis=0)),
+                ", ".join(f"{x:.0f}" for x in middle),
+                ", ".join(f"{x:.0f}" for x in worst),
+            ]
+        )
+    yield from markdown(heads, cells, 2)
+
+
 @click.command(help=__doc__)
 @click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--legs", is_flag=True, help="Film people with legs of published shapes instead."
+)
 @click.option(
     "--report", is_flag=True, help="Print the report of the folder; track nothing."
 )
 @WORKERS
-def main(folder: Path, report: bool, workers: int | None) -> None:
+def main(folder: Path, legs: bool, report: bool, workers: int | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    rows = folder / "rows.jsonl"
+    rows = folder / ("legs.jsonl" if legs else "rows.jsonl")
+    wanted = shots_with_legs() if legs else shots()
     done = earlier(str(rows), lambda row: row["name"])
     if not report:
         jobs = {
             shot.name: partial(measured, folder, shot)
-            for shot in shots()
+            for shot in wanted
             if shot.name not in done
         }
         done |= each(jobs, workers, partial(kept, str(rows))) if jobs else {}
     tracked = [row for row in done.values() if "refused" not in row]
     films = [row for row in tracked if not row["seed"]]
+    if legs:
+        for line in legs_lines(films):
+            click.echo(line)
+        return
     click.echo(
         f"{len(films)} of {len(shots()) - SEVERAL * (SEEDS - 1)} films were tracked"
     )

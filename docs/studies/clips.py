@@ -1,12 +1,14 @@
 """Recorded clips of people outside the library, and their tracks, for all studies."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from posefit.footage.scene import Scene
 from posefit.motion.clips import training_clips, training_motions
 from posefit.settings import settings_text
-from posefit.sweep.cell import ALL_AROUND, TrackCell
+from posefit.sweep.cell import ALL_AROUND, TrackCell, cell_scene
+from posefit.sweep.check import cell_of
 from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
@@ -174,3 +176,10 @@ def track_of(cell: TrackCell, scene: Scene, **changes: Any) -> Track:
     }
     chosen = TrackOptions(settings=settings_text(cell.settings), **(options | changes))
     return track_scene(scene, training, completed(chosen, scene.truth))
+
+
+@lru_cache(maxsize=4)
+def learn_library(clip: Clip, views: Views) -> None:
+    """Track two frames of a clip, so that its library is learned in this process."""
+    cell = cell_of(cell_fields(clip, views, 2))
+    track_of(cell, cell_scene(cell))

@@ -27,8 +27,8 @@ from posefit.cli.output import Command
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
 from posefit.fitting.metrics import LOST_MM
+from posefit.footage.extraction import Extraction
 from posefit.footage.scene import Scene
-from posefit.footage.segmentation import Extraction
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET

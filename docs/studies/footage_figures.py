@@ -32,9 +32,10 @@ from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
+from posefit.footage.extraction import Extraction
+from posefit.footage.options import SourceOptions
 from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
-from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.footage.views import Range, span
@@ -176,10 +177,9 @@ def filmed_scene(
     camera = () if recording.calibration is None else (recording.calibration,)
     scene = scene_of(
         [recording.film],
-        camera=camera,
-        frames=(start, stop),
-        asf=recording.skeleton,
-        **view,
+        SourceOptions(
+            camera=camera, frames=(start, stop), asf=recording.skeleton, **view
+        ),
     )
     return replace(scene, name=recording.name), start
 

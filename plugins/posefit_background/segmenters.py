@@ -1,5 +1,7 @@
 """Segmenters that compare each frame with a still background."""
 
+from itertools import islice
+
 from posefit.fitting.check import at_least, positive
 from posefit.footage.views import span
 from posefit.silhouette.foreground import (
@@ -43,12 +45,7 @@ def learned_median(film: Film, *, samples: int = SAMPLES) -> Still:
     """
     at_least("samples", samples, 1)
     step = max(1, len(film) // samples)
-    return median_background(
-        [
-            image
-            for image, _ in zip(film.frames(step=step), range(samples), strict=False)
-        ]
-    )
+    return median_background(list(islice(film.frames(step=step), samples)))
 
 
 def given_mean(film: Film, *, background: str) -> Still:

@@ -185,7 +185,7 @@ class GlobalRandom:
         self._own = np.random.RandomState(seed).get_state()
 
     def __enter__(self) -> None:
-        # the user's state, which must stay as it is
+        # the user's state, which must not change
         self._outer = np.random.get_state()  # noqa: NPY002
         np.random.set_state(self._own)  # noqa: NPY002
 

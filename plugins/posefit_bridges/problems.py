@@ -1,15 +1,15 @@
 """Problems of posefit's suites, as problems of other benchmarking tools.
 
-| tool | function | what it returns |
+| tool | function | result |
 |---|---|---|
 | IOHexperimenter | ioh_problem | a problem for its loggers |
 | OptunaHub | optunahub_problem | a benchmark for studies of Optuna |
 | pymoo | pymoo_problem | a problem, evaluated a population at a time |
 | Nevergrad | nevergrad_function | a function of its benchmarks |
 
-An infeasible proposal costs what the problem's `infeasible` says. Each result has an
-attribute `problem`, the suite's problem with its trace. Let the tool hold the budget: a
-problem's budget ends the tool's loop with an error.
+The problem's `infeasible` decides the cost of an infeasible proposal. Each result has
+an attribute `problem`, the suite's problem with its trace. Let the tool hold the
+budget: a problem's budget ends the tool's loop with an error.
 
 >>> import posefit
 >>> from posefit_bridges.problems import pymoo_problem

@@ -1,7 +1,7 @@
 """The device `cuda`: draws and counts poses on an NVIDIA GPU. Not yet run on a GPU.
 
 It follows posefit's rasteriser, with one block of threads per pose. It is only tested
-in numba's simulator, where its areas equal those of a CPU; its speed on a GPU is
+in numba's simulator, where its areas equal the CPU's; its speed on a GPU is
 unknown. The handbook's page "How do I draw poses on a GPU?" describes the installation.
 
 | looking for | file |

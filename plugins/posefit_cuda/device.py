@@ -42,7 +42,7 @@ def _missing() -> str | None:
     try:
         from numba import cuda
     except ImportError as error:
-        return f"numba-cuda without what it needs: {error}"
+        return f"numba-cuda cannot be imported: {error}"
     if cuda.is_available():
         return None
     return "no driver of NVIDIA's that answers, or no GPU"

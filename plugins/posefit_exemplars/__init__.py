@@ -10,17 +10,24 @@ Several hypotheses per frame start from that path. A fit moves every joint until
 contours of the body match the masks. The tracker reports the likeliest sequence of
 fitted hypotheses, some frames later.
 
-- `exemplars`: the poses, how each clip continues, and codes that compare poses.
-- `beam`: the states that a frame may be in, and the costs of steps between them.
-- `frame_costs`: the costs of poses in a frame.
+To change what makes a track likely, change `cost_model`; to change what is tried,
+`proposals`. docs/measured/tracker-parts.md tells what each part is worth.
+
+- `tracker`: the settings.
+- `path`: both cheapest paths, through states of clips and through fitted hypotheses.
+- `cost_model`: what a pose costs in a frame, and what a step between frames costs.
+- `frame_costs`: how poses compare with the silhouettes and landmarks of a frame.
+- `proposals`: the states that a frame may be in, and where hypotheses begin.
+- `fits`: fits of hypotheses to contours.
 - `markov`: the likeliest path in the lag window, state weights, and sampled paths.
-- `hypotheses`: the fitted hypotheses of each frame, and their likeliest sequence.
+- `exemplars`: the poses, how each clip continues, and codes that compare poses.
+- `beam`: states of a frame, and the best and most diverse of them.
+- `hypotheses`: hypotheses of a frame, and their motion.
 - `smoothing`: the filter of the estimates over time.
 - `calibration`: the reported frame and its calibrated posterior.
 - `lost_model`: the probability that a frame is lost.
 - `lookup`: the poses whose silhouettes resemble an observed one, for any method.
 - `kernels`: the compiled loops.
-- `tracker`: the settings, and the processing of one frame after the other.
 
 >>> import posefit
 >>> track = posefit.track(

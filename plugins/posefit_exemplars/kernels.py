@@ -5,14 +5,21 @@ The functions take plain arrays and rely on the callers for their shapes. The co
 registers. `tiles` are `exemplars.Tiles`.
 """
 
-import numpy as np
+from typing import NamedTuple
 
-from posefit.arrays import inlined, jit
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array, inlined, jit
 
 DIMENSIONS = 24  # dimensions of a code; the remainder of the joints is below 5 mm
 # Dimensions that are compared first. They rule out most tiles.
 FIRST_DIMENSIONS = 6
 LANES = 32
+TOTAL_BINS = 256  # bins of the histogram of totals
+
+Codes = NDArray[np.float32]
+Rows = NDArray[np.int64]
 
 
 @inlined
@@ -100,56 +107,140 @@ def nearest_codes(codes, groups, tiles, count):
     return states, squares
 
 
+class Sources(NamedTuple):
+    """The states of a beam, and where their clips continue."""
+
+    totals: Array  # (n,) the total of each state
+    codes: Codes  # (n, D) where its clip continues
+    costs: Array  # (n,) of continuing there
+    groups: Rows  # (n, g) the groups of poses that it can step to
+
+
+class Room(NamedTuple):
+    """Buffers with an entry for each place in the tiles."""
+
+    totals: Array  # infinite before and after a call
+    parents: Rows
+    reached: Rows
+
+
+class Bounds(NamedTuple):
+    """Which steps are wanted."""
+
+    scale: float  # cost of a unit of squared distance
+    least: float  # no step has a lower total
+    limit: float  # steps with totals at or above it are left out
+    count: int  # how many states of least totals are wanted
+
+
+@inlined
+def bin_of(total, least, width):
+    """Return the bin of a total in a histogram from `least` in bins of a `width`."""
+    return min(int((total - least) / width), TOTAL_BINS - 1)
+
+
+@inlined
+def bound_of(bins, least, width, count, bound):
+    """Return a total that at least `count` states do not exceed, or else `bound`.
+
+    `bins` is the histogram of the totals so far, from `least` in bins of a `width`.
+    """
+    below = 0
+    for number in range(len(bins)):
+        below += bins[number]
+        if below >= count:
+            return min(bound, least + width * (number + 1))
+    return bound
+
+
 @jit
-def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, room, scale, limit):
+def cheapest_steps(sources, rows, tiles, room, bounds):
     """Return the states that rows of a beam can step to, each with its cheapest step.
 
+    A histogram of the totals so far shows which total the wanted states do not exceed.
+    Codes that are too far away for it are not compared. The bound falls fastest if rows
+    with low totals come first.
+
     Args:
-        codes: (speeds, n, D) where the states of the beam continue.
-        start_costs: (speeds, n) costs of these continuations.
-        totals: (n,) the total of each state.
+        sources: The `Sources`.
         rows: The states that take a step.
-        groups: (n, g) the groups that each state can step to.
         tiles: The codes of all states.
-        room: Three buffers with an entry for each place in the tiles. The first one is
-            infinite before and after the call.
-        scale: Cost of a unit of squared distance. The cheapest speed counts.
-        limit: Steps with totals at or above the limit are left out.
+        room: The `Room`.
+        bounds: The `Bounds`.
 
     Returns:
-        The states, the row from which each is reached at least cost, and that total.
+        The states, the row from which each is reached at least cost, and that total:
+        the wanted states, and a few that cost a little more.
 
     """
     best, parents, reached = room
     distances = np.empty(LANES, np.float32)
     partial = np.empty(LANES, np.float32)
+    bins = np.zeros(TOTAL_BINS, np.int64)
+    width = (bounds.limit - bounds.least) / TOTAL_BINS
+    bound = bounds.limit
     count = 0
     for row in rows:
-        if totals[row] >= limit:
+        total_before = sources.totals[row]
+        if total_before >= bound:
             continue
-        farthest = np.float32((limit - totals[row]) / scale)
-        for group in groups[row]:
+        farthest = np.float32((bound - total_before) / bounds.scale)
+        start = np.float32(sources.costs[row] / bounds.scale)
+        for group in sources.groups[row]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
                 distances[:] = farthest
-                near = False
-                for speed in range(len(codes)):
-                    start = np.float32(start_costs[speed, row] / scale)
-                    near |= lower_distances(
-                        distances, start, codes[speed, row], tiles.codes[t], partial
-                    )
-                if not near:
+                if not lower_distances(
+                    distances, start, sources.codes[row], tiles.codes[t], partial
+                ):
                     continue
                 for lane in range(LANES):
-                    if distances[lane] < farthest:
-                        total = totals[row] + scale * distances[lane]
-                        place = LANES * t + lane
-                        if total < best[place]:
-                            if best[place] == np.inf:
-                                reached[count] = place
-                                count += 1
-                            best[place] = total
-                            parents[place] = row
-    places = reached[:count].copy()
-    steps = tiles.states[places], parents[places], best[places]
+                    if distances[lane] >= farthest:
+                        continue
+                    total = total_before + bounds.scale * distances[lane]
+                    place = LANES * t + lane
+                    if total >= best[place]:
+                        continue
+                    if best[place] == np.inf:
+                        reached[count] = place
+                        count += 1
+                    else:
+                        bins[bin_of(best[place], bounds.least, width)] -= 1
+                    bins[bin_of(total, bounds.least, width)] += 1
+                    best[place] = total
+                    parents[place] = row
+        bound = bound_of(bins, bounds.least, width, bounds.count, bound)
+    places = reached[:count]
+    wanted = places[best[places] <= bound]
+    steps = tiles.states[wanted], parents[wanted], best[wanted]
     best[places] = np.inf
     return steps
+
+
+@jit
+def first_distinct(order, keys, kinds, share, count):
+    """Return the first rows of an order, none with the key of one before it.
+
+    Args:
+        order: (n,) rows.
+        keys: (n,) the key of each row, from 0. Rows with equal keys count as one.
+        kinds: (n,) the kind of each row, from 0.
+        share: How many rows of a kind are returned, at most.
+        count: How many rows are returned, at most.
+
+    """
+    seen = np.zeros(keys.max() + 1, np.bool_)
+    counts = np.zeros(kinds.max() + 1, np.int64)
+    rows = np.empty(min(count, len(order)), np.int64)
+    found = 0
+    for row in order:
+        if found == len(rows):
+            break
+        if seen[keys[row]]:
+            continue
+        seen[keys[row]] = True
+        if counts[kinds[row]] == share:
+            continue
+        counts[kinds[row]] += 1
+        rows[found] = row
+        found += 1
+    return rows[:found]

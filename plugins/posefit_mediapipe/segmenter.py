@@ -31,11 +31,9 @@ _LEFT_POINTS = {
     "tibia": 27,
     "toes": 31,
 }
-POINTS = {
-    f"{side}{bone}": number + k
-    for k, side in enumerate("lr")
-    for bone, number in _LEFT_POINTS.items()
-}
+POINTS = {f"l{bone}": number for bone, number in _LEFT_POINTS.items()}
+# MediaPipe numbers the right side's points one higher
+POINTS |= {f"r{bone}": number + 1 for bone, number in _LEFT_POINTS.items()}
 
 
 class MediaPipe:
@@ -81,10 +79,11 @@ def _facing(landmarks: Any) -> float:
     if landmarks is None:
         return math.nan
     points = [landmarks.landmark[k] for k in (*LEFT, *RIGHT)]
-    across, away = (
-        sum(getattr(p, axis) * sign for p, sign in zip(points, SIDES, strict=True))
-        for axis in "xz"
-    )
+    across = 0.0
+    away = 0.0
+    for point, sign in zip(points, SIDES, strict=True):
+        across += point.x * sign
+        away += point.z * sign
     return math.atan2(away, across)
 
 

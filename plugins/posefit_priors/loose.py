@@ -1,5 +1,6 @@
 """Principal components with extra freedom at arms and legs."""
 
+from itertools import chain
 from typing import Self
 
 import numpy as np
@@ -69,7 +70,7 @@ class Loose:
         chosen = []
         reach = []
         for bones, bones_reach in zip((ARMS, LEGS), self._reach, strict=True):
-            for name in (name for bone in bones for name in both(bone)):
+            for name in chain.from_iterable(map(both, bones)):
                 first = angle_index(JOINTS.index(name)) - 3
                 moving = [i for i in range(first, first + 3) if most[i] > least[i]]
                 chosen += moving
@@ -97,7 +98,7 @@ class Loose:
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, d) of joint angles (n, 63).
 
-        They are the components, then what is left over of the loose angles.
+        The components come first, then the remainders of the loose angles.
         """
         latents = self._pca.transform(angles)
         residual = np.asarray(angles) - self._pca.inverse_transform(latents)  # (n, 63)

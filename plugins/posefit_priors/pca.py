@@ -5,9 +5,12 @@ from functools import lru_cache
 from typing import Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, jit, writeable
+from posefit.arrays.compiling import state_of
+from posefit.arrays.stored import Arrays, stored
 from posefit.errors import InputError
 from posefit.fitting.check import at_least
 from posefit.fitting.prior import Components
@@ -138,12 +141,23 @@ def clusters_of(latents: Array, clusters: int, quantile: float) -> tuple[Array, 
 def _centres_of(latents_bytes: bytes, m: int, clusters: int) -> Array:
     """Return the centres (K, m) among latents (n, m), given as their bytes.
 
-    They are kept, as pictures that are fitted one by one learn from the same motions.
+    They are kept, as pictures that are fitted one by one learn from the same motions,
+    and stored for the next process.
     """
+    source = f"{state_of(__name__)} scipy {scipy.__version__} {m} {clusters}"
+
+    def made() -> Arrays:
+        latents = np.frombuffer(latents_bytes).reshape(-1, m)
+        return {"centres": _k_means(latents, clusters)}
+
+    return np.asarray(stored("pca", source.encode() + latents_bytes, made)["centres"])
+
+
+def _k_means(latents: Array, clusters: int) -> Array:
+    """Return the centres (K, m) of the best of several runs of K-means."""
     # gives the same as scikit-learn, whose import takes two seconds
     from scipy.cluster.vq import kmeans2
 
-    latents = np.frombuffer(latents_bytes).reshape(-1, m)
     count = min(clusters, len(np.unique(latents, axis=0)))
     rng = np.random.default_rng(CLUSTERING_SEED)
     with warnings.catch_warnings():
@@ -160,8 +174,8 @@ def _centres_of(latents_bytes: bytes, m: int, clusters: int) -> Array:
 def principal(centred: Array, components: float) -> tuple[Array, Array]:
     """Return principal directions (m, 63), and the share of variance of each (m,).
 
-    They are those of centred joint angles (T, 63). Signs are chosen such that the
-    number of largest magnitude in each direction is positive.
+    The joint angles (T, 63) are centred. Signs are chosen such that the number of
+    largest magnitude in each direction is positive.
     """
     if components > centred.shape[1]:
         raise InputError(

@@ -139,10 +139,9 @@ def _built(variant: str, components: int, options: str) -> Any:
             f"options of {variant} must be among {', '.join(sorted(known))}, "
             f"got {', '.join(unknown)}"
         )
-    parameters = {
-        **{name: value for name, value in defaults.items() if name in known},
-        **parameters,
-    }
+    for name, value in defaults.items():
+        if name in known:
+            parameters.setdefault(name, value)
     return kind(**parameters)
 
 

@@ -19,7 +19,8 @@ They run on posefit's masks and budget.
 
 The searches share `stages`, the trackers share `frames`, and the models learn from
 poses of `training`. None of these publications was available in full.
-docs/ways/related.md lists what was; docstrings name everything else as interpretations.
+docs/ways/related.md lists the available parts; docstrings name everything else as
+interpretations.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="psopf", frames=(0, 3))

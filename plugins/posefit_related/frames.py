@@ -69,17 +69,15 @@ def place_of(
 ) -> tuple[Array, int]:
     """Return the place (3,) of the root, and the number of poses drawn to estimate it.
 
-    A known place is returned as it is. Otherwise the first view that shows something
-    compares its mask with that of the pose at `place`. The ratio of their heights gives
-    the depth, and the offset of their centres the direction.
+    A known place is returned unchanged. Otherwise the mask of the first view that shows
+    something is compared with the drawn pose at `place`. The ratio of their heights
+    gives the depth, and the offset of their centres the direction.
     """
     if observation.translation is not None:
         return np.array(observation.translation, dtype=np.float64), 0
     for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True):
-        mask, drawn = (
-            _box(mask)
-            for mask in (silhouette.mask, project(task.body, camera, pose, place))
-        )
+        mask = _box(silhouette.mask)
+        drawn = _box(project(task.body, camera, pose, place))
         if mask is not None and drawn is not None:
             at = camera.rotation @ place + camera.translation
             depth = at[2] * (drawn[1] / mask[1])[1]

@@ -64,22 +64,23 @@ class Gradient:
             if observation.translation is not None:
                 place = np.array(observation.translation, dtype=np.float64)
             if observation.usable:
-                deviations = (
-                    self.turn,
-                    SHIFT if observation.translation is None else KNOWN_SHIFT,
-                )
+                shift = KNOWN_SHIFT
+                if observation.translation is None:
+                    shift = SHIFT
                 pose, moved, effort = contour_fit(
                     self.task,
                     observation,
                     (pose, place),
-                    deviations,
+                    (self.turn, shift),
                     self.task.evaluations - used - 1,
                 )
-                place = moved if observation.translation is None else place
+                if observation.translation is None:
+                    place = moved
                 used = used + effort
             elif latest:
                 pose = latest[-1][0]
-                place = latest[-1][1] if observation.translation is None else place
+                if observation.translation is None:
+                    place = latest[-1][1]
             latest = [*latest, (pose, place)][-2:]
             yield frame_of(self.task, observation, pose, place, used)
 
@@ -104,7 +105,7 @@ class Gradient:
 def predicted(latest: list[tuple[Array, Array]], damping: float) -> tuple[Array, Array]:
     """Return the pose and place predicted from the last two at constant velocity.
 
-    A single one is returned as it is.
+    A single pose and place are returned unchanged.
     """
     pose, place = latest[-1]
     before, place_before = latest[0]

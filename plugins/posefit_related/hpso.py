@@ -8,7 +8,7 @@ are fixed.
 
 Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut
 a limb. Over the components of a prior, stages go from coarse to fine. Without a
-prediction, the search starts from the best of some random poses. The inertia is that of
+prediction, the search starts from the best of some random poses. The inertia follows
 the SAPSO paper. A particle that leaves the box or becomes infeasible moves towards the
 best of the previous stage.
 """
@@ -132,10 +132,8 @@ class HPSO:
             -self._generation / self._generations
         )
         phi1, phi2 = self._acceleration * self._rng.random((2, self._size, len(run)))
-        to_pbest, to_gbest = (
-            displacement(self._space, self._x, best)[:, run]
-            for best in (self._pbest, gbest)
-        )
+        to_pbest = displacement(self._space, self._x, self._pbest)[:, run]
+        to_gbest = displacement(self._space, self._x, gbest)[:, run]
         v = omega * self._v[:, run] + phi1 * to_pbest + phi2 * to_gbest
         self._v[:, run] = np.clip(v, -self._alpha, self._alpha)
         self._x = repair(self._space, self._x + self._v, self._estimate)

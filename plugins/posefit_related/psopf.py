@@ -96,9 +96,8 @@ class PSOPF:
             return
         gbest = self._pbest[self._pbest_cost.argmin()]
         pulls = PHI * self._rng.random((2, *self._x.shape))
-        to_pbest, to_gbest = (
-            displacement(self._space, self._x, best) for best in (self._pbest, gbest)
-        )
+        to_pbest = displacement(self._space, self._x, self._pbest)
+        to_gbest = displacement(self._space, self._x, gbest)
         # KRZESZOWSKI2010 (shift)
         v = CHI * (self._v + pulls[0] * to_pbest + pulls[1] * to_gbest)
         self._v = np.clip(v, -self._alpha, self._alpha)

@@ -104,22 +104,27 @@ class Regression:
         poses = poses[rng.integers(len(poses), size=samples)]
         reach = np.pi if task.yaw is None else YAW_REACH
         poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * reach + (task.yaw or 0.0)
-        shapes = [
-            [contexts(project(task.body, view, pose, task.anchor)) for pose in poses]
-            for view in task.cameras
-        ]
-        some = np.concatenate(
-            [shape for view in shapes for shape in view[:: max(samples // 200, 1)]]
-        )
+        shapes = []  # for each view the points of each pose's outline
+        sample = []  # some of the outlines, from which the words are learned
+        for view in task.cameras:
+            shapes_of_view = []
+            for pose in poses:
+                mask = project(task.body, view, pose, task.anchor)
+                shapes_of_view.append(contexts(mask))
+            shapes.append(shapes_of_view)
+            sample += shapes_of_view[:: max(samples // 200, 1)]
+        some = np.concatenate(sample)
         self.words = (
             MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0)
             .fit(some)
             .cluster_centers_
         )
-        self.histograms = np.concatenate(
-            [[histogram(shape, self.words) for shape in view] for view in shapes],
-            axis=1,
-        )
+        histograms = []
+        for shapes_of_view in shapes:
+            histograms.append(
+                [histogram(shape, self.words) for shape in shapes_of_view]
+            )
+        self.histograms = np.concatenate(histograms, axis=1)
         self.spread = float(
             ((self.histograms - self.histograms.mean(axis=0)) ** 2).sum(axis=1).mean()
         )

@@ -6,7 +6,7 @@ its three smoothed inferences, particle-filtered backwards smoothing. A filter r
 forwards; then particles are weighted again from the last frame to the first. According
 to its abstract, smoothing hardly improves the filtered estimate.
 
-Interpretations: the backward weights are those of Doucet, Godsill and Andrieu (2000).
+Interpretations: the backward weights follow Doucet, Godsill and Andrieu (2000).
 The publication's motion model is replaced by a random walk of the pose's principal
 components, as wide as training poses change from frame to frame. Only a frame's
 heaviest particles are smoothed. A frame's pose is the weighted mean, with the filter's

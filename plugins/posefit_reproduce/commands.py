@@ -63,7 +63,7 @@ CLIPS = click.option(
 @OUT
 @WORKERS
 def vsmm_command(films: int, out: str | None, workers: int) -> None:
-    """Stepping, waving, jumping jacks and squats, by default and to the letter.
+    """Stepping, waving, jumping jacks and squats, by default and literally.
 
     The experiment of CN101894278.
     """

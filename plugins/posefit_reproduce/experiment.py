@@ -63,11 +63,10 @@ class Results:
 
     def of(self, name: str, kind: str, subject: str, method: str) -> Array:
         """Return a named array of all runs of a method: (views, seeds, ...)."""
-        rows = {
-            run[3:]: arrays[name]
-            for run, arrays in self.runs.items()
-            if run[:3] == (kind, subject, method)
-        }
+        rows = {}
+        for run, arrays in self.runs.items():
+            if (run.kind, run.subject, run.method) == (kind, subject, method):
+                rows[run.view, run.seed] = arrays[name]
         views = sorted({view for view, _ in rows})
         seeds = sorted({seed for _, seed in rows})
         return np.array([[rows[view, seed] for seed in seeds] for view in views])
@@ -219,11 +218,10 @@ def reproduce(
         folder = Path(place)
         _make_runs_folder(folder)
         files = {run: folder / "runs" / f"{run.file}.npz" for run in experiment.runs}
-        jobs = {
-            run: partial(_store, experiment.perform, run, file)
-            for run, file in files.items()
-            if not file.exists()
-        }
+        jobs = {}
+        for run, file in files.items():
+            if not file.exists():
+                jobs[run] = partial(_store, experiment.perform, run, file)
         _check_record(folder, experiment.shared, bool(jobs))
         if jobs:
             each(jobs, workers, progress)
@@ -266,10 +264,8 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
     the record differs.
     """
     file = folder / RECORD
-    now = {
-        name: digest_of(value)
-        for name, value in {**shared, "build": posefit_build()}.items()
-    }
+    conditions = {**shared, "build": posefit_build()}
+    now = {name: digest_of(value) for name, value in conditions.items()}
     if not file.exists():
         if any((folder / "runs").iterdir()):
             say(
@@ -283,17 +279,16 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
         before = parsed_json(read_text(file, MAX_RECORD_BYTES))
     except ValueError:
         before = None
-    if not isinstance(before, dict) or not all(
-        isinstance(value, dict) for value in before.values()
-    ):
+    is_record = isinstance(before, dict)
+    if is_record:
+        is_record = all(isinstance(value, dict) for value in before.values())
+    if not is_record:
         raise InputError(
             f"{file}: not a record of the conditions of runs: choose another folder"
         )
     if not adding:
-        before, now = (
-            {name: value[name] for name in value if name != "build"}
-            for value in (before, now)
-        )
+        before.pop("build", None)
+        now.pop("build")
     if changed := difference(before, now):
         raise InputError(f"{folder}: {changed}")
 

@@ -6,9 +6,9 @@ arms held out, jumping jacks, jumps, squats. The modules, by the steps of the pa
 
 - 1: `preprocess`, the outline and the skeleton line of a mask.
 - 2: `joints`, detects 17 points of the body and predicts hidden ones.
-- 3: `motion`, predicts the next state; `state` defines what a state is.
+- 3: `motion`, predicts the next state; `state` defines states.
 - 4, 5: `groups`, the groups of models, and which group is the most probable.
-- 6: `measurement`, what the cameras measure of a state (6.1), and `imm`, the filter.
+- 6: `measurement`, the cameras' measurements of a state (6.1), and `imm`, the filter.
 - 7 to 9: `switching`, when a group is activated and when it ends.
 
 `tracker` has the settings, and runs these steps on each frame.

@@ -35,8 +35,11 @@ class Topology(NamedTuple):
 
     def union(self, names: Collection[str]) -> tuple[str, ...]:
         """Return the models of some groups, each once, in the order of the groups."""
-        chosen = (models for name, models in self.groups.items() if name in names)
-        return tuple(dict.fromkeys(model for models in chosen for model in models))
+        chosen: dict[str, None] = {}  # an ordered set
+        for name, models in self.groups.items():
+            if name in names:
+                chosen |= dict.fromkeys(models)
+        return tuple(chosen)
 
 
 def most_probable(

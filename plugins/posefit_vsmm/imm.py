@@ -6,7 +6,7 @@ the measurement. The equations are from H. Blom, Y. Bar-Shalom, The interacting 
 model algorithm for systems with Markovian switching coefficients, IEEE Trans. Automatic
 Control 33(8), 1988; CN101894278 uses them in its step 6. The filter works for any
 models and states; each model is one row of every array. Likelihoods are logarithms, so
-that probabilities sum to 1 whatever the size of the residuals (Interpretation V13).
+that probabilities sum to 1 for residuals of any size (Interpretation V13).
 """
 
 from collections.abc import Callable

@@ -27,12 +27,8 @@ BODY = (
     "right hip",
 )
 _TORSO = np.array([AT[name] for name in BODY])
-_TIPS = np.array(
-    [
-        AT[name]
-        for name in ("head", "left hand", "right hand", "left foot", "right foot")
-    ]
-)
+_TIP_NAMES = ("head", "left hand", "right hand", "left foot", "right foot")
+_TIPS = np.array([AT[name] for name in _TIP_NAMES])
 _RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
 # pixels: points of the skeleton line closer than this are one crossing
 ONE_CROSSING = 2.0
@@ -68,10 +64,9 @@ def default_rules() -> Rules:
     stored = json.loads(
         (files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8")
     )
-    bias, deviation = (
-        np.array([stored["points"][name][key] for name in POINTS])
-        for key in ("bias", "deviation")
-    )
+    points = [stored["points"][name] for name in POINTS]
+    bias = np.array([point["bias"] for point in points])
+    deviation = np.array([point["deviation"] for point in points])
     return Rules(bias, deviation, optimal_pairs, nearest_crossings, GATE, 16.0, 0.05)
 
 

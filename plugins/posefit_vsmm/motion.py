@@ -60,11 +60,15 @@ class MotionModels:
     def of(self, names: Sequence[str]) -> "MotionModels":
         """Return some of the models."""
         rows = [self.names.index(name) for name in names]
-        chosen = {
-            name: getattr(self, name)[rows]
-            for name in ("matrices", "offsets", "noises", "poses", "captured")
-        }
-        return replace(self, names=tuple(names), **chosen)
+        return replace(
+            self,
+            names=tuple(names),
+            matrices=self.matrices[rows],
+            offsets=self.offsets[rows],
+            noises=self.noises[rows],
+            poses=self.poses[rows],
+            captured=self.captured[rows],
+        )
 
     def fitted_to(
         self, skeleton: Skeleton, fps: float, process_noise: float = 1.0
@@ -192,13 +196,11 @@ def library(shrunk_to: Literal["identity", "zero"] = "identity") -> Library:
     stored = json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8"))
     models: dict[str, Any] = stored["models"]
     fits = [model[shrunk_to] for model in models.values()]
-    matrices, offsets, noises = (
-        np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise")
-    )
-    poses, captured = (
-        np.array([model[key] for model in models.values()])
-        for key in ("poses", "captured")
-    )
+    matrices = np.array([fit["matrix"] for fit in fits])
+    offsets = np.array([fit["offset"] for fit in fits])
+    noises = np.array([fit["noise"] for fit in fits])
+    poses = np.array([model["poses"] for model in models.values()])
+    captured = np.array([model["captured"] for model in models.values()])
     turns = captured.reshape(*captured.shape[:2], TURNS, 4)
     captured = (turns / lengths(turns)).reshape(captured.shape)
     dependent = DependentJoints(

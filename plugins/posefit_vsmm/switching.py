@@ -133,7 +133,7 @@ class DefaultForm:
     def covariances(self, states: Array, covariance: Array) -> Array:
         """Return the filter's covariances of states (r, 43).
 
-        `covariance` (33, 33) is that of each state's error.
+        `covariance` (33, 33) is the covariance of each state's error.
         """
         return np.tile(covariance, (len(states), 1, 1))
 
@@ -363,7 +363,7 @@ class Switching:
         return after
 
     def keep_only(self, group: str, belief: Belief) -> Belief:
-        """End the other groups, and return the belief over the one that is kept."""
+        """End the other groups, and return the belief over the remaining group."""
         old = self.active
         self.active = self.groups[group]
         self.group = group

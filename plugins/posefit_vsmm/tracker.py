@@ -132,7 +132,7 @@ class TrackFilter:
         lost = bad or self._blind_frames > MAX_BLIND_FRAMES
         if self._recovers and lost:
             self._belief = None
-        # nothing to start from: repeat the latest pose, or stand upright
+        # without a start: repeat the latest pose, or an upright one
         if self._belief is None and blind:
             pose = np.append(self._task.yaw or 0.0, np.zeros(65))
             place = self._task.anchor

@@ -72,7 +72,7 @@ def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
     Args:
         name: the name of the numbers, which begins messages.
         values: the numbers.
-        shape: the shape that they must have; a word in it stands for any length.
+        shape: the shape that they must have; a word in it means any length.
 
     Returns:
         The copy.

@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numba
@@ -43,16 +44,24 @@ _folders: dict[str, Path | None] = {}
 _choosing_folder = threading.Lock()
 
 
-class _Announcement(event.Listener):  # type: ignore[misc]
-    """Logs once that posefit's functions are compiled.
+class _Compilation(event.Listener):  # type: ignore[misc]
+    """Logs once that posefit's functions are compiled, and times all compilations.
 
     A process started by another one logs nothing.
     """
 
-    announced = False
+    def __init__(self) -> None:
+        self.announced = False
+        self.seconds = 0.0  # of all compilations so far
+        # by thread: when its outermost compilation began, and how many are within it
+        self._thread = threading.local()
 
     def on_start(self, event: Any) -> None:
         """Log a warning, which goes to stderr unless logging is configured."""
+        depth = getattr(self._thread, "depth", 0)
+        if not depth:
+            self._thread.began = perf_counter()
+        self._thread.depth = depth + 1
         if self.announced or multiprocessing.parent_process() is not None:
             return
         if event.data["dispatcher"].py_func.__module__.startswith("posefit"):
@@ -62,8 +71,11 @@ class _Announcement(event.Listener):  # type: ignore[misc]
                 "this takes ten seconds or more ..."
             )
 
-    def on_end(self, event: Any) -> None:
-        """Log nothing."""
+    def on_end(self, event: Any) -> None:  # noqa: ARG002
+        """Add the time, unless this function was compiled for another one."""
+        self._thread.depth -= 1
+        if not self._thread.depth:
+            self.seconds += perf_counter() - self._thread.began
 
 
 class _Saving(event.Listener):  # type: ignore[misc]
@@ -95,9 +107,15 @@ class _Saving(event.Listener):  # type: ignore[misc]
 
 
 _saving = _Saving()
-event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
+_compilation = _Compilation()
+event.register("numba:compile", _compilation)  # type: ignore[no-untyped-call]
 event.register("numba:compile", _saving)  # type: ignore[no-untyped-call]
 event.register("numba:compiler_lock", _saving)  # type: ignore[no-untyped-call]
+
+
+def compiling_seconds() -> float:
+    """Return how long this process has compiled functions so far."""
+    return _compilation.seconds
 
 
 @lru_cache

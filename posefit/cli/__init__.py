@@ -2,7 +2,7 @@
 
 Messages and progress go to stderr, results to stdout. A user's mistake is one line and
 exit status 2. The commands are in `tracking`, `sweeping`, `motions`, `suite` and
-`plugins`; plugins add others, see `posefit.hooks`. A command imports what it needs only
+`plugins`; plugins add others, see `posefit.hooks`. A command imports its modules only
 when it runs.
 """
 
@@ -23,7 +23,7 @@ from posefit.reading import cut
 from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
 
-THREAD_SECONDS = 1.0  # how long threads may go on after a command
+THREAD_SECONDS = 1.0  # how long threads may continue after a command
 GROUPS: dict[str, tuple[click.Command, ...]] = {
     "Follow a person": (tracking.track, tracking.fit, tracking.extract),
     "Compare methods": (sweeping.sweep, sweeping.report, sweeping.rerun, suite.suite),
@@ -35,7 +35,7 @@ class _Commands(Command, Group):
     """The commands of posefit and of plugins."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
-        """Return the names of all commands, those of plugins last."""
+        """Return the names of all commands, plugins' commands last."""
         return [*self.commands, *_added()]
 
     def format_commands(
@@ -75,7 +75,7 @@ def main(debug: bool) -> None:
 
     \b
     posefit track walk --out walk           a first track: open walk/track.html
-    posefit track video.mp4 --out walker    a person before a still background
+    posefit track video.mp4 --out walker    a person against a still background
     posefit sweep default --out results     compare eight methods
     """  # noqa: D301
 
@@ -91,6 +91,7 @@ def run() -> None:
     try:
         main()
     except OSError as error:
+        # only a standard stream on a full disk raises this error without a file name
         if error.errno != errno.ENOSPC or error.filename is not None:
             raise
         drop(1)
@@ -100,6 +101,8 @@ def run() -> None:
         )
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
+        # Python waits for every thread that is no daemon, so a thread that a plugin
+        # left running could keep the process alive for ever
         running = []
         for thread in threading.enumerate():
             own = thread.name.startswith(f"{POOL}_")
@@ -110,8 +113,9 @@ def run() -> None:
         alive = {thread.name for thread in running if thread.is_alive()}
         if alive:
             names = cut(", ".join(sorted(alive)))
-            say(f"posefit: not waiting for what a plugin left running: {names}")
+            say(f"posefit: not waiting for threads that a plugin left running: {names}")
             sys.stdout.flush()
+            # an ordinary exit would wait for the threads
             if isinstance(end.code, int):
                 os._exit(end.code)
             os._exit(0 if end.code is None else 1)

@@ -11,9 +11,10 @@ from posefit.registry import KINDS
 
 
 class Group(click.Group):
-    """A group that suggests the nearest of all posefit commands for an unknown name.
+    """A group that suggests the nearest of its commands for an unknown name.
 
-    For a kind of plugin, such as `optimisers`, it suggests the command that lists them.
+    A command of exactly that name in another group is suggested, too. For a kind of
+    plugin, such as `optimisers`, `posefit` suggests the command that lists them.
     """
 
     def resolve_command(self, context: click.Context, args: list[str]) -> Any:
@@ -24,14 +25,27 @@ class Group(click.Group):
         """
         if args[0][:1].isalnum() and self.get_command(context, args[0]) is None:
             root = context.find_root()
-            listed = dict.fromkeys(
-                (f"{kind}s" for kind in (*KINDS, "method")), "posefit plugins"
-            )
-            known = listed | dict(_paths(root.command, root, "posefit"))
+            every = dict(_paths(root.command, root, "posefit"))
+            known = dict(_paths(self, context, _path_of(context)))
+            if context is root:
+                kinds = (f"{kind}s" for kind in (*KINDS, "method"))
+                known = dict.fromkeys(kinds, "posefit plugins") | known
+            elif args[0] in every:
+                known[args[0]] = every[args[0]]
             near = get_close_matches(cut(args[0]), known, 1)
             hint = f"; did you mean {known[near[0]]!r}?" if near else ""
             raise click.UsageError(f"No such command {quoted(args[0])}{hint}")
         return super().resolve_command(context, args)
+
+
+def _path_of(context: click.Context) -> str:
+    """Return the full path of a group: `posefit`, or `posefit suite`."""
+    names = list[str]()
+    outer = context
+    while outer.parent is not None:
+        names.insert(0, str(outer.info_name))
+        outer = outer.parent
+    return " ".join(["posefit", *names])
 
 
 def _paths(

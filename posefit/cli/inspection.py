@@ -1,4 +1,4 @@
-"""Texts of `posefit plugins`: what is installed, and what is wrong with it."""
+"""Texts of `posefit plugins`: the installed plugins, and their faults."""
 
 import os
 import shutil
@@ -16,14 +16,14 @@ from posefit.settings import Setting, settings_in, without_settings
 
 def described(offer: Offer) -> dict[str, Any]:
     """Return an offer in the form of `posefit plugins --json`."""
-    settings = [
-        {
-            "name": setting.name,
-            "type": setting.type,
-            "default": None if setting.default is Parameter.empty else setting.default,
-        }
-        for setting in offer.settings
-    ]
+    settings = []
+    for setting in offer.settings:
+        default = setting.default
+        if default is Parameter.empty:
+            default = None
+        settings.append(
+            {"name": setting.name, "type": setting.type, "default": default}
+        )
     more = {"next_frame": offer.next_frame} if offer.kind == "optimiser" else {}
     return {
         "kind": offer.kind,
@@ -54,7 +54,9 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
     Raises:
         InputError: there is none; the message lists the known names.
     """
-    offers = [offer for kind in KINDS for offer in registry.offers[kind].values()]
+    offers: list[Offer] = []
+    for kind in KINDS:
+        offers += registry.offers[kind].values()
     named = [offer for offer in offers if offer.name == name]
     if not named:
         known = sorted({offer.name for offer in offers})
@@ -66,9 +68,8 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
         text = getdoc(offer.factory) or ""
         listed = settings_in(text)
         yield _head(offer)
-        yield from (
-            f"    {line}".rstrip() for line in without_settings(text).splitlines()
-        )
+        for line in without_settings(text).splitlines():
+            yield f"    {line}".rstrip()
         if not offer.settings:
             yield "    It has no settings."
         for setting in offer.settings:
@@ -106,7 +107,9 @@ def diagnosis(
         plugins: the plugins.
         verbose: whether to add the traceback of a broken plugin.
     """
-    lines = [f"{BLOCK}={os.environ[BLOCK]!r}"] if BLOCK in os.environ else []
+    lines = []
+    if BLOCK in os.environ:
+        lines.append(f"{BLOCK}={os.environ[BLOCK]!r}")
     states = set[str]()
     for plugin in plugins:
         offered = [f"{offer.kind} {offer.name}" for offer in plugin.offers]
@@ -124,9 +127,9 @@ def diagnosis(
             )
         release = f"{plugin.distribution} {plugin.version}"
         lines.append(f"{state:8}  {plugin.name} ({release}): {cause}")
-        lines += [
-            f"          {traced}" for traced in plugin.traceback.splitlines() if verbose
-        ]
+        if verbose:
+            for traced in plugin.traceback.splitlines():
+                lines.append(f"          {traced}")
         for offer in plugin.offers:
             if offer.missing:
                 lines.append(

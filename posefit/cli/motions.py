@@ -12,15 +12,15 @@ def motions(as_json: bool) -> None:
     from posefit.motion import built_in, recorded
 
     clips = recorded.clips()
-    people = [
-        {
+    people = []
+    for clip in clips:
+        person = {
             "name": clip.name,
             "subject": clip.subject,
             "seconds": round(clip.seconds, 3),
             "poses": len(clip),
         }
-        for clip in clips
-    ]
+        people.append(person)
     lines = [
         "built in, made by a model; the letters are different people",
         "",

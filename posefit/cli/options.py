@@ -1,4 +1,4 @@
-"""Options that commands share. Those of a track are built from `TrackOptions`."""
+"""Options that commands share. Options of a track are built from `TrackOptions`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -9,8 +9,10 @@ import click
 from click.shell_completion import CompletionItem
 
 from posefit.errors import InputError
+from posefit.footage.options import text_range
+from posefit.options import declared
 from posefit.reading import quoted
-from posefit.tracking.options import TrackOptions, declared, text_range
+from posefit.tracking.options import TrackOptions
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -56,9 +58,10 @@ def sources_from(
     """Return the motions with a given beginning, and have the shell add files."""
     from posefit.motion import built_in
 
-    names = [
-        CompletionItem(name) for name in built_in.names() if name.startswith(begun)
-    ]
+    names = []
+    for name in built_in.names():
+        if name.startswith(begun):
+            names.append(CompletionItem(name))
     return [*names, CompletionItem(begun, type="file")]
 
 
@@ -67,7 +70,7 @@ COMPLETED = {"method": methods_from, "train": sources_from}
 
 
 def number_by(parse: Callable[[str], float]) -> Callable[[str], float]:
-    """Return a function that parses a number and says what it expected.
+    """Return a function that parses a number, with `expected` in its message.
 
     With `int` for `parse` the number must be whole.
     """

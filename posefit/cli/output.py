@@ -24,7 +24,7 @@ def open_streams() -> None:
 
 
 def drop(stream: int) -> None:
-    """Discard what a standard stream holds and still gets, because its disk is full."""
+    """Discard a standard stream's output, because its disk is full."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
 
@@ -102,11 +102,12 @@ def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[
 
 @contextmanager
 def results_alone() -> Iterator[None]:
-    """Send to stderr whatever the body prints, because stdout is for results.
+    """Send the body's prints to stderr, because stdout is for results.
 
     That includes compiled code and other processes.
     """
     sys.stdout.flush()
+    # compiled code and other processes write to the descriptor, not to `sys.stdout`
     with redirect_stdout(sys.stderr):
         stdout_copy = os.dup(1)
         os.dup2(2, 1)

@@ -14,7 +14,7 @@ from posefit.cli.output import print_result, results_alone
 def plugins(context: click.Context, as_json: bool) -> None:
     """List the installed optimisers, priors, trackers, starts, segmenters and devices.
 
-    The list has their settings; `show NAME` explains the settings of one.
+    The list includes their settings; `show NAME` explains one plugin's settings.
     """
     if context.invoked_subcommand is not None:
         return
@@ -23,11 +23,10 @@ def plugins(context: click.Context, as_json: bool) -> None:
 
     with results_alone():
         offers = registry().offers
-    print_result(
-        listing(registry()),
-        [described(offer) for kind in KINDS for offer in offers[kind].values()],
-        as_json,
-    )
+    descriptions: list[dict[str, Any]] = []
+    for kind in KINDS:
+        descriptions += map(described, offers[kind].values())
+    print_result(listing(registry()), descriptions, as_json)
 
 
 @plugins.command()
@@ -112,10 +111,10 @@ def check(
     only: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Check that an installed plugin keeps the rules of its kind.
+    """Check an installed plugin against the rules of its kind.
 
     KIND is optimiser, prior, tracker, start or segmenter.
-    The rules are checked in a separate process; what the plugin prints goes to stderr.
+    The rules are checked in a separate process; the plugin's prints go to stderr.
     Once two rules fail for the same cause, the others are not checked.
     The exit status is 1 if a rule is broken.
     """
@@ -127,15 +126,15 @@ def check(
         from posefit.testing.process import check_in_process
 
         report = check_in_process(kind, name, settings, only)
-    results = [
-        {
+    results = []
+    for result in report.results:
+        row = {
             "check": result.name,
             "outcome": result.outcome,
             "detail": result.detail,
             "traceback": result.traceback,
         }
-        for result in report.results
-    ]
+        results.append(row)
     value = {"plugin": report.plugin, "summary": report.summary, "results": results}
     print_result(str(report).split("\n"), value, as_json)
     context.exit(0 if report else 1)

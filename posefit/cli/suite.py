@@ -10,7 +10,7 @@ from posefit.cli.group import Group
 from posefit.cli.options import parsed_by
 from posefit.cli.output import print_result, progress, results_alone, say
 from posefit.errors import InputError
-from posefit.tracking.options import text_range
+from posefit.footage.options import text_range
 
 if TYPE_CHECKING:
     from posefit.suites.running import SuiteScore
@@ -39,10 +39,10 @@ def suite(context: click.Context, as_json: bool) -> None:
         f"instances {training}, {held_out}",
         "",
     ]
-    lines += [
-        f"  {f.number}  {f.name:20} d = {listed(f.dimensions):14} {f.summary}"
-        for f in FUNCTIONS
-    ]
+    for function in FUNCTIONS:
+        dimensions = f"d = {listed(function.dimensions):14}"
+        name = f"{function.number}  {function.name:20}"
+        lines.append(f"  {name} {dimensions} {function.summary}")
     print_result(lines, suite_registry(), as_json)
 
 
@@ -186,10 +186,9 @@ def _score_lines(scores: "Sequence[SuiteScore]") -> list[str]:
         function = score.name
         if score.function != ALL:
             function = f"{score.function} {score.name}"
-        times = [
-            "-" if time is None else f"{time:.0f}"
-            for time in score.running_times.values()
-        ]
+        times = []
+        for time in score.running_times.values():
+            times.append("-" if time is None else f"{time:.0f}")
         line = f"{score.dimension:>3} {function:22} {score.method:24}"
         line = f"{line} {score.runs:>5} {score.above:>7.2f} {score.reached:>8.1%}"
         lines.append((line + _cells(times)).rstrip())

@@ -15,7 +15,7 @@ from posefit.cli.output import print_result, results_alone, say
 @click.option(
     "--out",
     metavar="DIR",
-    help="The ledger's folder: a new one, or that of a sweep to continue.",
+    help="Folder of the ledger: new, or of a sweep to continue.",
 )
 @click.option(
     "--shard",
@@ -58,11 +58,12 @@ def sweep(
 
     seconds = places.pop("cell_seconds")
     gigabytes = places.pop("cell_gigabytes")
-    start = command.engine(Limits(seconds, gigabytes), **places)
+    limits = Limits(seconds, gigabytes)
+    start = command.engine(limits, **places)
     if dry_run:
         # a plugin may print, too
         with results_alone() if as_json else nullcontext():
-            preview = previewing.preview(plan, out, shard)
+            preview = previewing.preview(plan, out, shard, limits)
         line = previewing.time_line(preview.seconds, places["workers"] or cores())
         value = {"cells": preview.cells, "seconds": preview.seconds}
         return print_result([*preview.lines, line], value, as_json)
@@ -93,6 +94,11 @@ def sweep(
 )
 @click.option("--latex", metavar="FILE", help="Write the leaderboard as a LaTeX table.")
 @click.option(
+    "--coco",
+    metavar="DIR",
+    help="Write single searches to this new folder as files that COCO's cocopp reads.",
+)
+@click.option(
     "--methods",
     metavar="NAMES",
     multiple=True,
@@ -101,7 +107,7 @@ def sweep(
 @click.option(
     "--latest",
     is_flag=True,
-    help="Of methods that differ only in version, compare only the latest.",
+    help="If methods differ only in version, compare only the latest.",
 )
 @JSON
 def report(
@@ -131,8 +137,12 @@ def _names(texts: tuple[str, ...]) -> list[str]:
 
     Commas separate them, except in brackets.
     """
-    parts = [part for text in texts for part in re.split(r",(?![^(]*\))", text)]
-    return [part.strip() for part in parts if part.strip()]
+    names = []
+    for text in texts:
+        for part in re.split(r",(?![^(]*\))", text):
+            if part.strip():
+                names.append(part.strip())
+    return names
 
 
 @click.command()
@@ -141,7 +151,7 @@ def _names(texts: tuple[str, ...]) -> list[str]:
 @click.option("--out", metavar="DIR", help="A folder for the ledger of the new row.")
 @JSON
 def rerun(ledger: str, key: str, out: str | None, as_json: bool) -> None:
-    """Run one row of the results in DIR again, and print which figures differ.
+    """Run one row of the results in DIR again, and print the figures that differ.
 
     KEY is the row's key in the report, or enough of its first digits.
     The exit status is 1 if a figure other than a time differs.

@@ -43,14 +43,13 @@ def write_plugin(
         )
     if name in (known := _taken(kind, commands)):
         raise InputError(
-            f"name must be a new one, got {name!r}, "
-            f"which {known[name]} registers already"
+            f"name must be new, got {name!r}, which {known[name]} registers already"
         )
     module = name.replace("-", "_")
     if (there := find_spec(f"{PROJECT}_{module}")) is not None:
         raise InputError(
-            f"name must make a new module, got {name!r}: "
-            f"its module {there.name} would hide the one of that name in "
+            f"name must give a new module, got {name!r}: "
+            f"its module {there.name} would hide the module of that name in "
             f"{there.origin or 'sys.path'}"
         )
     class_name = "".join(part.capitalize() for part in module.split("_"))
@@ -91,14 +90,13 @@ def write_plugin(
 
 def _taken(kind: Registrable, commands: Sequence[str]) -> dict[str, str]:
     """Return the names that are taken, each with its distribution."""
+    taken: dict[str, str] = {}
     if kind != COMMAND:
-        return {
-            offer.name: offer.distribution for offer in registry().offers[kind].values()
-        }
-    plugins = plugins_of((COMMAND,), tuple(commands))
-    others = {
-        str(command.name): plugin.distribution
-        for plugin in plugins
-        for command in plugin.commands
-    }
-    return dict.fromkeys(commands, PROJECT) | others
+        for offer in registry().offers[kind].values():
+            taken[offer.name] = offer.distribution
+        return taken
+    taken = dict.fromkeys(commands, PROJECT)
+    for plugin in plugins_of((COMMAND,), tuple(commands)):
+        for command in plugin.commands:
+            taken[str(command.name)] = plugin.distribution
+    return taken

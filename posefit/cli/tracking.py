@@ -25,7 +25,7 @@ from posefit.errors import InputError
 from posefit.progress import Progress
 
 if TYPE_CHECKING:
-    from posefit.footage.source import Medium
+    from posefit.footage.kinds import Medium
     from posefit.output.content import Content
 
 _OF_FILES = ("source", "out", "force", "resume", "write")
@@ -68,11 +68,22 @@ def track(
     if live is not None:
         return _track_live(live, as_json, options, shown)
 
+    # plugins may print, and stdout must hold nothing but the JSON object
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
-    phases = [f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()]
-    shown.log(f"took {', '.join(phases)}")
+    shown.log(f"took {_times(shown)}")
     _print(result.content, as_json, {}, options, verbose, HINTS)
+
+
+def _times(shown: Progress) -> str:
+    """Return how long each phase took, and how much of that was compiling."""
+    from posefit.arrays.compiling import compiling_seconds
+
+    phases = [f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()]
+    compiling = compiling_seconds()
+    if compiling:
+        phases.append(f"of which compiling, once on this machine, {compiling:.1f} s")
+    return ", ".join(phases)
 
 
 @click.command(cls=TrackCommand)
@@ -200,8 +211,8 @@ def extract(
     at the same time.
     """
     from posefit.footage.extract import extract as run
-    from posefit.footage.segmentation import Extraction
-    from posefit.footage.source import resolve
+    from posefit.footage.extraction import Extraction
+    from posefit.footage.kinds import resolve
 
     resolved = resolve(source)
     how = extraction_of(options, resolved.medium, settings) or Extraction()
@@ -235,7 +246,7 @@ def _arguments(
 
     `medium` is given for a stream; otherwise the source is resolved.
     """
-    from posefit.footage.source import resolve
+    from posefit.footage.kinds import resolve
     from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
 
@@ -273,8 +284,8 @@ def extraction_of(
         InputError: The options are given for a source that is not segmented.
 
     """
-    from posefit.footage.segmentation import Extraction, segmenter_name
-    from posefit.footage.source import useless_for
+    from posefit.footage.extraction import Extraction, segmenter_name
+    from posefit.footage.uses import useless_for
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
@@ -291,9 +302,16 @@ def extraction_of(
         values["method"] = values.pop("extraction")
     name = segmenter_name(values.get("method"), values.get("background"))
     if settings is None and "settings" in options:
-        texts = options["settings"]
-        settings = [text for text in texts if text.partition(".")[0] == name]
-        options["settings"] = tuple(text for text in texts if text not in settings)
+        # `--set` has the settings of all plugins, and the tracker refuses unknown ones
+        own = []
+        others = []
+        for text in options["settings"]:
+            if text.partition(".")[0] == name:
+                own.append(text)
+            else:
+                others.append(text)
+        settings = own
+        options["settings"] = tuple(others)
     if settings:
         factory = registry().offer("segmenter", name).factory
         values["settings"] = parse_texts(name, factory, settings)

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,72 +35,68 @@ MAX_SMALL_FACTOR = 4
 LOST = 0.5  # frames with at least this probability are called lost
 MAX_TRACE_POINTS = 64
 
-FRAME = {
-    measure.name: measure
-    for measure in (
-        Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
-        Measure(
-            "seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"
-        ),
-        MEASURES["cost"],
-        MEASURES["iou"],
-        Measure(
-            "usable",
-            "usable",
-            "",
-            0,
-            "1 where the frame was searched, 0 where the pose was held",
-        ),
-        MEASURES["error_degrees"],
-        MEASURES["geodesic_degrees"],
-        MEASURES["mpjpe_mm"],
-        MEASURES["pa_mpjpe_mm"],
-        Measure(
-            "swapped",
-            "swapped",
-            "",
-            0,
-            "1 where the frame is nearer to the truth when mirrored",
-        ),
-        Measure(
-            "unknown_sides",
-            "sides unknown",
-            "",
-            0,
-            "1 where left and right are unknown; blank where not estimated",
-        ),
-        Measure(
-            "lost",
-            "lost",
-            "",
-            2,
-            "probability that the frame is lost; blank where not estimated",
-        ),
-        Measure(
-            "interval_mm",
-            "80 % interval",
-            "mm",
-            0,
-            "its radius, the mean over joints; blank where not estimated",
-        ),
-        MEASURES["evaluations"],
-        Measure(
-            "wall_seconds",
-            "time",
-            "ms",
-            1,
-            "wall time of the estimate, from the end of the previous frame's",
-            1e3,
-        ),
-        Measure(
-            "activity",
-            "activity",
-            "",
-            0,
-            "the person's activity in a word; blank where not estimated",
-        ),
-    )
-}
+_FRAME_MEASURES = (
+    Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
+    Measure("seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"),
+    MEASURES["cost"],
+    MEASURES["iou"],
+    Measure(
+        "usable",
+        "usable",
+        "",
+        0,
+        "1 where the frame was searched, 0 where the pose was held",
+    ),
+    MEASURES["error_degrees"],
+    MEASURES["geodesic_degrees"],
+    MEASURES["mpjpe_mm"],
+    MEASURES["pa_mpjpe_mm"],
+    Measure(
+        "swapped",
+        "swapped",
+        "",
+        0,
+        "1 where the frame is nearer to the truth when mirrored",
+    ),
+    Measure(
+        "unknown_sides",
+        "sides unknown",
+        "",
+        0,
+        "1 where left and right are unknown; blank where not estimated",
+    ),
+    Measure(
+        "lost",
+        "lost",
+        "",
+        2,
+        "probability that the frame is lost; blank where not estimated",
+    ),
+    Measure(
+        "interval_mm",
+        "80 % interval",
+        "mm",
+        0,
+        "its radius, the mean over joints; blank where not estimated",
+    ),
+    MEASURES["evaluations"],
+    Measure(
+        "wall_seconds",
+        "time",
+        "ms",
+        1,
+        "wall time of the estimate, from the end of the previous frame's",
+        1e3,
+    ),
+    Measure(
+        "activity",
+        "activity",
+        "",
+        0,
+        "the person's activity in a word; blank where not estimated",
+    ),
+)
+FRAME = {measure.name: measure for measure in _FRAME_MEASURES}
 # columns (T,) by the names of `FRAME`, NaN where a value is unknown
 Table = dict[str, Array]
 
@@ -112,6 +108,39 @@ def unseen(table: Table) -> set[int]:
     """
     is_unseen = (table["usable"] == 0.0) | (table["lost"] >= LOST)
     return set(table["frame"][is_unseen].tolist())
+
+
+class Flagged(NamedTuple):
+    """The frames that are called lost, or whose sides are called unknown."""
+
+    frames: NDArray[np.bool_]  # (T,)
+    count: int  # of the frames that it is known of
+
+
+def flagged(table: Table, name: str) -> Flagged | None:
+    """Return the frames that are called lost, or whose sides are called unknown.
+
+    Only frames that show enough of the person count: in the others the pose was held,
+    not searched. Counts and shares of both kinds are all taken from here.
+
+    Args:
+        table: The columns.
+        name: `lost` or `unknown_sides`.
+
+    Returns:
+        The frames, or None if it is known of no frame.
+    """
+    least = {"lost": LOST, "unknown_sides": 1.0}[name]
+    known = (table["usable"] == 1.0) & np.isfinite(table[name])
+    if not known.any():
+        return None
+    return Flagged(known & (table[name] >= least), int(known.sum()))
+
+
+def flagged_share(table: Table, name: str) -> float | None:
+    """Return the share of the frames that `flagged` returns, None if it is unknown."""
+    frames = flagged(table, name)
+    return None if frames is None else float(frames.frames.sum()) / frames.count
 
 
 def evaluated(
@@ -174,6 +203,8 @@ def evaluated(
     measures = Measures(
         **error_measures,
         **certainty_measures,
+        unknown_rate=flagged_share(table, "unknown_sides"),
+        lost_flagged_rate=flagged_share(table, "lost"),
         **_steadiness(scene, frames),
         iou=float(iou[usable].mean()),
         cost=float(cost[usable].mean()),
@@ -224,10 +255,9 @@ def _errors(
     def error_of(poses: Array) -> float:
         return float(metrics.pose_error_degrees(truth, poses).mean())
 
-    nearest_poses = [
-        nearest(scene, training, k, observation, beta)
-        for k, observation in enumerate(scene.observations)
-    ]
+    nearest_poses = []
+    for k, observation in enumerate(scene.observations):
+        nearest_poses.append(nearest(scene, training, k, observation, beta))
     trivial = {
         "mean_pose": with_root(training.mean(axis=0)),
         "persistence": np.tile(truth[0], (len(truth), 1)),
@@ -290,13 +320,10 @@ def _certainty(
             off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
             inside.append(np.linalg.norm(off, axis=1)[1:] <= radii)
     swapped_known = None if swapped is None else mean_known(swapped[sides == 0.0])
-    is_lost = lost[np.isfinite(lost)] >= LOST
     measures = {
         "coverage": _by_level(inside),
         "interval_mm": _by_level(radii_mm),
-        "unknown_rate": mean_known(sides),
         "swapped_known_rate": swapped_known,
-        "lost_flagged_rate": mean_known(is_lost.astype(np.float64)),
     }
     return {"unknown_sides": sides, "lost": lost, "interval_mm": radius_mm}, measures
 
@@ -318,7 +345,7 @@ def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
     fps = scene.fps
     mean = mean_known(acceleration(joints, fps))
     ratio = None
-    reference = joints  # the joints that decide when a foot stands
+    reference = joints  # the joints that decide whether a foot is on the ground
     if scene.truth is not None:
         reference = scene.truth.joints
         true_mean = mean_known(acceleration(reference, fps))
@@ -391,9 +418,7 @@ def _costs(
     silhouettes = observation.silhouettes
     if factor > 1:
         cameras = [coarser_camera(camera, factor) for camera in cameras]
-        silhouettes = [
-            coarser_silhouette(silhouette, factor) for silhouette in silhouettes
-        ]
+        silhouettes = [coarser_silhouette(each, factor) for each in silhouettes]
     return pose_costs(scene.body, cameras, silhouettes, poses, translations, beta)[0]
 
 
@@ -445,16 +470,13 @@ def mode_reliability(
         For each bin of the likeliest mode's probability: the number of frames, the mean
         probability, and the share of frames whose mode is right.
     """
-    weighed = [
-        (frame.modes, joints)
-        for frame, joints in zip(frames, truth, strict=True)
-        if frame.modes
-    ]
-    right = np.array(
-        [likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed]
-    )
-    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
-    return [
-        [count, round(mean, 6), round(share, 6)]
-        for count, mean, share in reliability(likely, right)
-    ]
+    probabilities = []
+    right = []
+    for frame, joints in zip(frames, truth, strict=True):
+        if frame.modes:
+            probabilities.append(max(mode.weight for mode in frame.modes))
+            right.append(likeliest_is_right(skeleton, frame.modes, joints))
+    rows = []
+    for count, mean, share in reliability(np.array(probabilities), np.array(right)):
+        rows.append([count, round(mean, 6), round(share, 6)])
+    return rows

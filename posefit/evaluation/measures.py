@@ -72,7 +72,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Effort:
-    """What a track took, from the first mask that was read."""
+    """The effort of a track, from reading the first mask."""
 
     seconds: float
     cpu_seconds: float

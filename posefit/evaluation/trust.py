@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evaluation.errors import LOST, Table, mean_known
+from posefit.evaluation.errors import Table, flagged_share, mean_known
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.quality import LAG, changed_pixels, moved_pixels
 from posefit.footage.scene import Scene
@@ -92,7 +92,7 @@ def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float
     return float(np.quantile(away, SCATTER_QUANTILE)) if away else None
 
 
-def held_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
+def hidden_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
     """Return the share of unusable frames between the first and the last usable one.
 
     Frames before the person comes and after they have left do not count. Neither does a
@@ -110,28 +110,28 @@ def held_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
     known = np.flatnonzero(usable)
     if not len(known):
         return 1.0
-    held = 0
+    hidden = 0
     for start, stop in runs(~usable):
         is_inner = known[0] < start < known[-1]
         if is_inner and not cut[[start - 1, start, stop - 1, stop]].any():
-            held += stop - start
-    return held / float(known[-1] + 1 - known[0])
+            hidden += stop - start
+    return hidden / float(known[-1] + 1 - known[0])
 
 
-def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
+def stance_spread(joints: Array, in_stance: NDArray[np.bool_]) -> float | None:
     """Return the spread of the heights at which feet stand, in metres.
 
     It is the standard deviation over stances of the height of the foot's ball.
 
     Args:
         joints: The joints (T, 27, 3) in metres; y is up.
-        stands: Whether each foot stands (T, 2).
+        in_stance: Whether each foot stands (T, 2).
 
     Returns:
         The spread, or None if there are fewer than two stances.
     """
     heights = []
-    for ball, flags in zip(BALLS, stands.T, strict=True):
+    for ball, flags in zip(BALLS, in_stance.T, strict=True):
         for start, stop in runs(flags):
             heights.append(joints[start:stop, ball, 1].mean())
     return float(np.std(heights)) if len(heights) > 1 else None
@@ -328,10 +328,11 @@ class Trust:
         "left and right are unknown in {unknown:.0%} of the frames",
         "sides unknown {unknown:.0%}",
     )
-    held: float = _sign(
+    hidden: float = _sign(
         (0.0, 0.25, 0.6),
-        "the person is mostly hidden in {held:.0%} of the frames",
-        "held {held:.0%}",
+        "the person is mostly hidden in {hidden:.0%} of the frames between the first "
+        "and the last that show them",
+        "hidden in between {hidden:.0%}",
     )
     cropped: float | None = _sign(
         (0.0, 0.25, 0.6),
@@ -475,7 +476,7 @@ def trust_of(
     fps = scene.fps
     joints = scene.motion(frames).joints
     camera = scene.cameras[0]
-    stands = standing(joints, fps) & usable[:, None]
+    in_stance = standing(joints, fps) & usable[:, None]
     in_place = few
     if not few:
         ground = joints[usable, 0][:, [0, 2]]  # (n, 2), the root's path
@@ -486,8 +487,6 @@ def trust_of(
     turns = np.array(
         [frame.pose[0] - facing(camera, frame.translation) for frame in frames]
     )
-    lost = table["lost"][usable]
-    unknown = table["unknown_sides"][usable]
     radii = table["interval_mm"][usable]
     # each of `SIGNS`, as its figure or as the reason why it is unknown
     signs: dict[str, float | str] = {
@@ -499,11 +498,11 @@ def trust_of(
         ),
         "foot_share": _figure(
             {TOO_FEW: few, IN_PLACE: in_place},
-            lambda: float(stands.any(axis=1)[usable].mean()),
+            lambda: float(in_stance.any(axis=1)[usable].mean()),
         ),
         "stance_spread_m": _figure(
             {TOO_FEW: few},
-            lambda: stance_spread(joints, stands),
+            lambda: stance_spread(joints, in_stance),
             "no foot stands twice",
         ),
         "explained": _figure(
@@ -517,13 +516,11 @@ def trust_of(
             lambda: _training_mm(scene, frames, usable, training),
             "no motion was learned from",
         ),
-        "lost": _figure(
-            {},
-            lambda: mean_known(np.where(np.isnan(lost), lost, lost >= LOST)),
-            NOT_REPORTED,
+        "lost": _figure({}, lambda: flagged_share(table, "lost"), NOT_REPORTED),
+        "unknown": _figure(
+            {}, lambda: flagged_share(table, "unknown_sides"), NOT_REPORTED
         ),
-        "unknown": _figure({}, lambda: mean_known(unknown), NOT_REPORTED),
-        "held": held_share(usable, cut),
+        "hidden": hidden_share(usable, cut),
         "cropped": _figure({TOO_FEW: few}, lambda: float(cropped[usable].mean())),
         "frontal": _figure(
             {SEVERAL: several},

@@ -83,7 +83,10 @@ def _joint_radii(radii: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ObservedFrames:
-    """The silhouettes of some frames (f), stacked for calls that draw all of them."""
+    """The silhouettes of some frames (f), stacked for calls that draw all of them.
+
+    All of them are drawn on the CPU, even if the silhouettes are on a device.
+    """
 
     observed: Sequence[Observed] = field(repr=False)  # one a camera
     borders: Array = field(repr=False)  # (f, views, 4) pixels, see `Silhouette.extent`

@@ -18,7 +18,24 @@ REPAIR_STEPS = 32  # ours: points that `repair` tries along its line
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The distribution of a first population, around a prediction. SAPSO (6), (7)."""
+    """The distribution of a first population, around a prediction. SAPSO (6), (7).
+
+    Attributes:
+        mean: The mean (d,).
+        spread: The standard deviations (d,).
+        velocity: The predicted velocity (d,).
+        weight: The likelihood relative to `others`.
+        others: Less likely starts. A population is drawn from all.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import Start, draw_population
+        >>> from posefit.testing.toy import Toy
+        >>> start = Start(np.full(2, 0.5), np.full(2, 1e-9), np.zeros(2))
+        >>> drawn = draw_population(Toy(2, start=start), np.random.default_rng(0), 8)
+        >>> bool(np.allclose(drawn, 0.5))
+        True
+    """
 
     mean: Array  # (d,) in the unit box
     spread: Array  # (d,) standard deviations
@@ -55,14 +72,47 @@ class Space(Protocol):
 
 
 def wrap(space: Space, proposals: Array) -> Array:
-    """Return proposals (..., d) with their periodic coordinates in [-1, 1)."""
+    """Return proposals (..., d) with their periodic coordinates in [-1, 1).
+
+    Args:
+        space: The space, for its periodic coordinates.
+        proposals: The proposals (..., d).
+
+    Returns:
+        The wrapped proposals (..., d).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import wrap
+        >>> from posefit.testing.toy import Toy
+        >>> wrap(Toy(2, wrapping=1), np.array([[1.5, 0.25]])).tolist()
+        [[-0.5, 0.25]]
+    """
     if not space.periodic.any():
         return proposals
     return np.where(space.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
 
 
 def displacement(space: Space, origin: Array, target: Array) -> Array:
-    """Return target - origin (..., d), the short way round in periodic coordinates."""
+    """Return target - origin (..., d), the short way round in periodic coordinates.
+
+    Args:
+        space: The space, for its periodic coordinates.
+        origin: The first points (..., d).
+        target: The second points (..., d).
+
+    Returns:
+        The differences (..., d).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import displacement
+        >>> from posefit.testing.toy import Toy
+        >>> start = np.array([[0.75, 0.0]])
+        >>> end = np.array([[-0.75, 0.5]])
+        >>> displacement(Toy(2, wrapping=1), start, end).tolist()
+        [[0.5, 0.5]]
+    """
     return wrap(space, target - origin)
 
 
@@ -71,6 +121,21 @@ def converted(space: Space, proposals: Array, origin: Space) -> Array:
 
     A `Filter` needs it in `advance`, where `origin` is the space of the frame before. A
     space without a method `moved` is the same box in every frame.
+
+    Args:
+        space: The space of the result.
+        proposals: The proposals (n, d) in `origin`.
+        origin: The other space.
+
+    Returns:
+        The proposals (n, d) in `space`.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import converted
+        >>> from posefit.testing.toy import Toy
+        >>> converted(Toy(2), np.array([[0.5, 0.0]]), Toy(2)).tolist()
+        [[0.5, 0.0]]
     """
     moved = getattr(space, "moved", None)
     if moved is None:
@@ -92,9 +157,23 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
 
     If nothing around the start is feasible, the population is drawn from anywhere.
 
+    Args:
+        space: The space.
+        rng: The generator.
+        count: The number of proposals.
+
+    Returns:
+        The proposals (count, d).
+
     Raises:
         InputError: Nothing is feasible, or the count is no whole number above 0.
 
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import draw_population
+        >>> from posefit.testing.toy import Toy
+        >>> draw_population(Toy(3), np.random.default_rng(0), 40).shape
+        (40, 3)
     """
     count = whole("count", count, 1)
     drawn = _drawn(space, space.start, rng, count)
@@ -160,6 +239,22 @@ def first_that_works(
     """Return each row's first of attempts (n, k, d) that works (n, k).
 
     A row without one gets `otherwise` (n, d).
+
+    Args:
+        attempts: The attempts (n, k, d).
+        works: Whether each attempt works (n, k).
+        otherwise: The value of rows without a working attempt, (n, d) or a number.
+
+    Returns:
+        The first working attempts (n, d).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import first_that_works
+        >>> attempts = np.array([[[0.9], [0.1]], [[0.8], [0.7]]])
+        >>> works = np.array([[False, True], [False, False]])
+        >>> first_that_works(attempts, works, 0.0).tolist()
+        [[0.1], [0.0]]
     """
     first = attempts[np.arange(len(works)), works.argmax(axis=1)]
     return np.where(np.asarray(works.any(axis=1))[:, None], first, otherwise)
@@ -205,6 +300,23 @@ def sample_normal(
     `spread` (d,) or (n, d) has the standard deviations. A coordinate outside the box is
     folded back into it, as at a mirror. An infeasible draw is redrawn at most 100
     times, and then stays at its mean.
+
+    Args:
+        space: The space.
+        rng: The generator.
+        means: Feasible means (n, d).
+        spread: The standard deviations (d,) or (n, d).
+
+    Returns:
+        The draws (n, d).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import sample_normal
+        >>> from posefit.testing.toy import Toy
+        >>> means = np.zeros((4, 2))
+        >>> sample_normal(Toy(2), np.random.default_rng(0), means, np.ones(2)).shape
+        (4, 2)
     """
     spread = np.broadcast_to(spread, means.shape)
 
@@ -221,6 +333,20 @@ def fold(space: Space, proposals: Array) -> Array:
     """Return proposals (n, d) folded into the box, periodic coordinates wrapped.
 
     Folding mirrors a coordinate at the sides of the box.
+
+    Args:
+        space: The space, for its periodic coordinates.
+        proposals: The proposals (n, d).
+
+    Returns:
+        The folded proposals (n, d).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import fold
+        >>> from posefit.testing.toy import Toy
+        >>> fold(Toy(2), np.array([[1.5, -0.25]])).tolist()
+        [[0.5, -0.25]]
     """
     folded = np.abs((proposals + 3.0) % 4.0 - 2.0) - 1.0
     if not space.periodic.any():
@@ -233,6 +359,22 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
 
     `home` is one point (d,) or one for each proposal (n, d). A moved proposal becomes
     the feasible point farthest from home, of 32 evenly spaced points on the line.
+
+    Args:
+        space: The space.
+        proposals: The proposals (n, d).
+        home: A feasible point (d,), or one for each proposal (n, d).
+
+    Returns:
+        The feasible proposals (n, d).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import repair
+        >>> from posefit.testing.toy import Toy
+        >>> proposals = np.array([[0.5, 0.5]])
+        >>> repair(Toy(2), proposals, np.zeros(2)).tolist()
+        [[0.5, 0.5]]
     """
     repaired = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
     repaired = np.where(np.isfinite(repaired), repaired, home)

@@ -13,7 +13,22 @@ MAX_BITS = 1_024  # bits of a whole number, so that it can be printed
 
 
 def at_least(name: str, value: float, least: float) -> None:
-    """Raise InputError if a number is less than `least` or not finite."""
+    """Raise InputError if a number is less than `least` or not finite.
+
+    Args:
+        name: The value's name in the message.
+        value: The value.
+        least: The least allowed value.
+
+    Raises:
+        InputError: The value is less, or not finite.
+
+    Example:
+        >>> from posefit.plugin import at_least
+        >>> at_least("population_size", 0, 1)
+        Traceback (most recent call last):
+        posefit.errors.InputError: population_size must be at least 1, got 0
+    """
     if not (math.isfinite(value) and value >= least):
         raise InputError(f"{name} must be at least {least:g}, got {value}")
 
@@ -21,7 +36,22 @@ def at_least(name: str, value: float, least: float) -> None:
 def between(
     name: str, value: float, low: float, high: float, *, ends: bool = True
 ) -> None:
-    """Raise InputError if a number is not in low to high, with or without the ends."""
+    """Raise InputError if a number is not in low to high, with or without the ends.
+
+    Args:
+        name: The value's name in the message.
+        value: The value.
+        low: The lower end.
+        high: The upper end.
+        ends: Whether the ends are allowed.
+
+    Raises:
+        InputError: The value is outside.
+
+    Example:
+        >>> from posefit.plugin import between
+        >>> between("quantile", 0.99, 0.0, 1.0)
+    """
     inside = low <= value <= high if ends else low < value < high
     if not inside:
         way = f"in {low:g} to {high:g}" if ends else f"between {low:g} and {high:g}"
@@ -29,7 +59,19 @@ def between(
 
 
 def positive(name: str, value: float) -> None:
-    """Raise InputError if a number is not finite or not above 0."""
+    """Raise InputError if a number is not finite or not above 0.
+
+    Args:
+        name: The value's name in the message.
+        value: The value.
+
+    Raises:
+        InputError: The value is not finite, or not above 0.
+
+    Example:
+        >>> from posefit.plugin import positive
+        >>> positive("shrink", 0.95)
+    """
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(f"{name} must be above 0, got {value}")
 
@@ -40,6 +82,19 @@ def whole(name: str, value: object, least: int) -> int:
     Raises:
         InputError: If the value is no whole number, or less than `least`.
 
+    Args:
+        name: The value's name in the message.
+        value: The value, of any whole-number type.
+        least: The least allowed value.
+
+    Returns:
+        The value.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import whole
+        >>> whole("iterations", np.int64(60), 1)
+        60
     """
     if (
         isinstance(value, bool)
@@ -83,7 +138,22 @@ def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
 
 
 def one_of(name: str, value: object, known: Iterable[object]) -> None:
-    """Raise InputError with the known choices if a value is not among them."""
+    """Raise InputError with the known choices if a value is not among them.
+
+    Args:
+        name: The value's name in the message.
+        value: The value.
+        known: The allowed values.
+
+    Raises:
+        InputError: The value is not among them.
+
+    Example:
+        >>> from posefit.plugin import one_of
+        >>> one_of("limits", "tight", ["wide", "narrow"])
+        Traceback (most recent call last):
+        posefit.errors.InputError: limits must be one of wide, narrow, got 'tight'
+    """
     known = tuple(known)
     if value not in known:
         hint = suggestion(value, map(str, known)) if isinstance(value, str) else ""
@@ -98,6 +168,15 @@ def choices(settings: Any, values: Mapping[str, object]) -> None:
         settings: A function or a class, with annotated parameters or attributes.
         values: The values by name. Names without a `Literal` are ignored.
 
+    Raises:
+        InputError: A value is not listed.
+
+    Example:
+        >>> from typing import Literal
+        >>> from posefit.plugin import choices
+        >>> def factory(space, rng, *, variant: Literal["a", "b"] = "a"):
+        ...     choices(factory, locals())
+        >>> factory(None, None, variant="b")
     """
     for name, annotation in settings.__annotations__.items():
         if listed := choices_of(resolved(settings, annotation)):

@@ -46,6 +46,30 @@ def align(
     (border - centre) (z + t_z)`. All borders of all views are solved together, by least
     squares, starting from anchors (n, 3). A border at the edge of the image is unknown
     and does not count.
+
+    Args:
+        body: The body.
+        cameras: One or several.
+        silhouettes: One for each camera.
+        poses: The poses (n, 66).
+        anchors: Positions (n, 3) of the root in metres, from which the solution starts.
+
+    Returns:
+        The translations (n, 3) in metres.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Body, Camera, Silhouette, load_motion, project
+        >>> from posefit.plugin import align
+        >>> walk = load_motion("walk")
+        >>> body = Body.of(walk.skeleton)
+        >>> place = walk.translations[0]
+        >>> camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(320, 240))
+        >>> observed = Silhouette.of(project(body, camera, walk.poses[0], place))
+        >>> start = place[None] + 0.1
+        >>> aligned = align(body, [camera], [observed], walk.poses[:1], start)
+        >>> bool(np.abs(aligned - place).max() < 0.05)
+        True
     """
     translations = writeable(anchors.copy())
     move_to_borders(
@@ -78,6 +102,22 @@ class SilhouetteCost:
         threads: number of threads. Does not change the costs.
         blank: whether all silhouettes may be empty, as in the middle of a track.
 
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> walk = posefit.load_motion("walk")
+        >>> body = posefit.Body.of(walk.skeleton)
+        >>> place = walk.translations[0]
+        >>> camera = posefit.Camera.around(place, 0.8, 3.5, (320, 240))
+        >>> mask = posefit.project(body, camera, walk.poses[0], place)
+        >>> prior = posefit.prior("pca")().fit(walk.poses[:, 3:])
+        >>> reach = np.radians([45, 15, 15])
+        >>> space = posefit.SearchSpace(prior, np.zeros(3), reach, place)
+        >>> cost = posefit.SilhouetteCost(
+        ...     body, [camera], [posefit.Silhouette.of(mask)], space
+        ... )
+        >>> cost(np.zeros((4, space.dimensions))).shape
+        (4,)
     """
 
     body: Body = field(repr=False)

@@ -14,7 +14,16 @@ WORST = 1e15  # few libraries work with nan, infinity or the square of 1e300
 
 
 class Optimiser(Protocol):
-    """Proposes populations and learns their costs; nothing to inherit."""
+    """Proposes populations and learns their costs; nothing to inherit.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> from posefit.testing.toy import Toy
+        >>> search = posefit.optimiser("random")(Toy(2), np.random.default_rng(0))
+        >>> proposals = search.ask()
+        >>> search.tell(proposals, (proposals**2).sum(axis=1))
+    """
 
     def ask(self) -> Array:
         """Return the next population (n, d) in [-1, 1]^d.
@@ -56,7 +65,20 @@ NextFrame = Literal["start", "carry", "forget"]
 
 
 def finite_costs(costs: Array) -> Array:
-    """Return costs (n,) limited to +-1e15, nan as the worst, for any library."""
+    """Return costs (n,) limited to +-1e15, nan as the worst, for any library.
+
+    Args:
+        costs: The costs (n,).
+
+    Returns:
+        The finite costs (n,).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import finite_costs
+        >>> finite_costs(np.array([1.0, np.nan, -np.inf])).tolist()
+        [1.0, 1000000000000000.0, -1000000000000000.0]
+    """
     return np.asarray(np.fmax(np.fmin(costs, WORST), -WORST))
 
 
@@ -69,6 +91,13 @@ def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
         proposals: The proposals that `tell` got.
         costs: The costs that `tell` got.
 
+    Raises:
+        InputError: The shapes do not match, or nothing waits for costs.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import check_tell
+        >>> check_tell(2, np.zeros((2, 9)), np.zeros(2))
     """
     if not waiting:
         raise InputError("tell must follow ask, got costs before proposals")
@@ -93,6 +122,19 @@ class Adapter(ABC):
         home: (d,) a feasible proposal. Infeasible ones are moved towards it until they
             are feasible.
 
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import Adapter
+        >>> from posefit.testing.toy import Toy
+        >>> class Same(Adapter):
+        ...     def propose(self):
+        ...         return np.zeros((3, 2))
+        ...     def learn(self, proposals, costs):
+        ...         self.best = costs.min()
+        >>> adapter = Same(Toy(2), np.zeros(2))
+        >>> adapter.tell(adapter.ask(), np.array([2.0, 1.0, 3.0]))
+        >>> float(adapter.best)
+        1.0
     """
 
     def __init__(self, space: Space, home: Array) -> None:

@@ -52,6 +52,13 @@ class Prior(Latents, Protocol):
 
     It is built as `factory(**settings)`, with keyword-only settings. `low`, `high` and
     all methods but `fit` may be used only after `fit`.
+
+    Example:
+        >>> import posefit
+        >>> angles = posefit.load_motion("walk").poses[:, 3:]
+        >>> prior = posefit.prior("pca")().fit(angles)
+        >>> prior.inverse_transform(prior.transform(angles)).shape == angles.shape
+        True
     """
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:

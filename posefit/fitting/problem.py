@@ -37,7 +37,16 @@ class BudgetError(InputError):
 
 
 class BudgetSpentError(Exception):
-    """A call goes beyond the evaluations of a problem's budget."""
+    """A call goes beyond the evaluations of a problem's budget.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> problem = posefit.suite("posefit-2026.3", 1, 0, 9, budget=2)
+        >>> problem(np.zeros((3, 9)))
+        Traceback (most recent call last):
+        posefit.fitting.problem.BudgetSpentError: ...
+    """
 
 
 def minimise(
@@ -127,7 +136,7 @@ class Problem:
     >>> import numpy as np
     >>> from posefit.testing.toy import Toy, sphere
     >>> problem = Problem(sphere, Toy(2), budget=3)
-    >>> problem(np.array([[0.3, 0.3], [1.0, 0.3]])).tolist()
+    >>> problem(np.array([[0.3, 0.3], [1.0, 0.3]])).round(6).tolist()
     [0.0, 12.25]
     >>> problem.best.tolist(), problem.best_cost, problem.evaluations
     ([0.3, 0.3], 0.0, 2)
@@ -351,6 +360,15 @@ class Problems:
 
     The owner evaluates their proposals together, in one compiled call, and then counts
     them here.
+
+    Args:
+        count: The number of problems.
+        dimension: The dimension of their proposals.
+
+    Example:
+        >>> from posefit import Problems
+        >>> Problems(3, 9).best.shape
+        (3, 9)
     """
 
     def __init__(self, count: int, dimension: int) -> None:

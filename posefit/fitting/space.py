@@ -33,6 +33,29 @@ class SearchSpace:
     the translation in metres, if it is searched; the latents of the prior. With a
     `tilt`, pitch and roll are added to their mean for the latents, and the box of both
     moves with the last pose.
+
+    Args:
+        prior: The fitted prior.
+        root_centre: The centre (3,) of the root's yaw, pitch and roll, in radians.
+        root_range: The range (3,) to either side of it, in radians.
+        anchor: The position (3,) of the root, known or guessed, in metres.
+        translation: Whether the position is "known", "searched" or "aligned".
+        translation_range: The range (3,) of a searched position in metres.
+        start: The distribution of a first population, or None for anywhere.
+        tilt: The learned pitch and roll, or None for a box around `root_centre`.
+        root_order: The order of the root's rotations.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> walk = posefit.load_motion("walk")
+        >>> prior = posefit.prior("pca")().fit(walk.poses[:, 3:])
+        >>> space = posefit.SearchSpace(
+        ...     prior, np.zeros(3), np.radians([45, 15, 15]), walk.translations[0]
+        ... )
+        >>> poses, places = space.decode(np.zeros((4, space.dimensions)))
+        >>> poses.shape, places.shape
+        ((4, 66), (4, 3))
     """
 
     prior: Latents = field(repr=False)

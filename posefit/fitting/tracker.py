@@ -52,7 +52,14 @@ MIN_GUESSED_EVALUATIONS = 100
 
 @dataclass(frozen=True)
 class Observation:
-    """The evidence of one frame: one silhouette per camera, and what else is known."""
+    """The evidence of one frame: one silhouette per camera, and what else is known.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Observation, Silhouette
+        >>> Observation([Silhouette.of(np.ones((4, 4), dtype=bool))]).usable
+        True
+    """
 
     silhouettes: Sequence[Silhouette] = field(repr=False)
     translation: Array | None = None  # (3,) metres, the root, or None if unknown
@@ -72,6 +79,14 @@ class Frame:
     """The estimate of a tracker in one frame.
 
     The loop that drives the tracker measures the time.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import Frame
+        >>> areas = np.zeros((1, 3), dtype=np.int64)  # of one view
+        >>> frame = Frame(np.zeros(66), np.zeros(3), 0.0, areas, evaluations=1)
+        >>> frame.modes
+        ()
     """
 
     pose: Array = field(repr=False)  # (66,)
@@ -105,7 +120,19 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """The knowledge of a tracker before the first frame."""
+    """The knowledge of a tracker before the first frame.
+
+    Example:
+        >>> from posefit import Body, Camera, Task, load_motion
+        >>> walk = load_motion("walk")
+        >>> place = walk.translations[0]
+        >>> camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(320, 240))
+        >>> task = Task(
+        ...     Body.of(walk.skeleton), [camera], 400, None, place, training=[walk]
+        ... )
+        >>> task.angles.shape[1]
+        63
+    """
 
     body: Body
     cameras: Sequence[Camera]

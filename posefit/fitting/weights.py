@@ -12,6 +12,19 @@ def weigh(costs: Array, sharpness: float) -> Array:
     """Return the weights (n,), exp(-sharpness cost), which sum to 1.
 
     A cost that is nan or infinite weighs nothing. If all are, all weigh the same.
+
+    Args:
+        costs: The costs (n,).
+        sharpness: The factor on the costs, 0 or more.
+
+    Returns:
+        The weights (n,).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import weigh
+        >>> weigh(np.array([2.0, 2.0, np.nan]), 1.0).tolist()
+        [0.5, 0.5, 0.0]
     """
     known = np.isfinite(costs)
     if not known.any():
@@ -28,6 +41,18 @@ def effective_sample_size(weights: Array) -> float:
     """Return the number of equal weights that are worth as much as these (n,).
 
     It is 1 over the sum of their squares, if they sum to 1.
+
+    Args:
+        weights: The weights (n,).
+
+    Returns:
+        The effective number of samples.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import effective_sample_size
+        >>> effective_sample_size(np.full(4, 0.25))
+        4.0
     """
     return float(weights.sum() ** 2 / (weights**2).sum())
 
@@ -37,6 +62,20 @@ def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
 
     A row is drawn as often as its weight times `count`, rounded up or down. `u` in
     [0, 1) is the offset of the evenly spaced points.
+
+    Args:
+        weights: The weights (n,), which sum to 1.
+        u: The offset of the points, 0 to 1.
+        count: The number of rows.
+
+    Returns:
+        The rows (count,), rising.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import systematic_rows
+        >>> systematic_rows(np.array([0.5, 0.0, 0.5]), 0.5, 4).tolist()
+        [0, 0, 2, 2]
     """
     rows = weights.cumsum().searchsorted((np.arange(count) + u) / count, side="right")
     return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))

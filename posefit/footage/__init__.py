@@ -1,30 +1,45 @@
 """Turn masks and videos into a `Scene`: the person, cameras and observations.
 
+    from posefit.footage.options import SourceOptions
     from posefit.footage.source import scene_of
 
     # two cameras see a built-in motion
-    scene = scene_of(["walk"], view_degrees=[0.0, 90.0])
+    scene = scene_of(["walk"], SourceOptions(view_degrees=[0.0, 90.0]))
     print(scene.count, scene.observations[0].silhouettes[1].mask.shape)
 
 Each row is one step, in one file:
 
 | from | to | file |
 |---|---|---|
-| what a user names | its kind, and its scene by the steps below | source.py |
+| what a user names | one source per camera | named.py |
+| a source | its kind, its files and its reader | kinds.py |
+| options of a source | the same, checked for its kind | options.py, uses.py |
+| a source and its options | its scene, by the steps below | source.py |
+| names of images | the frames that they are | numbering.py |
 | a picture | the values by which it marks a person | images.py |
+| values of all masks | the ones that are the person | values.py |
 | images, an .npz or .npy file | a `views.View`: one bit per pixel | readers.py |
 | masks from other tools | one person's masks, not inverted, no holes | cleaning.py |
 | a video file, or one picture per frame | frames at even times | video.py |
-| frames | a `View` of the person in them | segmentation.py |
-| a `View` | the files of `posefit extract` | extract.py |
+| frames | the same at the size of masks, kept if needed again | scaled.py |
+| one frame | the people in it | segmenter.py, extraction.py |
+| frames in their order | people, their masks and quality | scanner.py |
 | blobs of successive frames | people, and which one is followed | people.py |
+| a network's person in each frame | the same person in all frames | identities.py |
+| pictures | whether the camera moves | camera_motion.py |
+| a network's facings | which way the person faces | facing.py |
+| a video | a `View` of the person in it | segmentation.py |
 | masks of segmented frames | a verdict: can they be a person? | quality.py |
+| a `View` | the files of `posefit extract` | extract.py |
 | a stream | a `View` of each frame | live.py |
-| views and calibrations | the `Scene`, straightened, in metres, +y up | cameras.py |
+| calibrations and sources | which camera took which source | pairing.py |
+| calibrations | the axes and the unit of their world | world.py |
+| a `View` and its calibration | the same without distortion | straightening.py |
+| views and calibrations | the `Scene`, in metres, +y up | cameras.py |
 | a known motion | the `Scene` of its rasterised masks | scene.py |
 | a `Scene` | the same on a device, such as a GPU | device.py |
 
-To add a kind of source, write a reader and add a line to `source.KINDS`. Decoded masks
+To add a kind of source, write a reader and add a line to `kinds.KINDS`. Decoded masks
 are stored as bits at once, and a `View` never changes. What a source does not state is
 guessed in one of these files and listed in `Scene.guesses`. The next steps from a mask
 to its cost are `silhouette/mask.py`, `fitting/tracker.py`, `fitting/cost.py`,

@@ -1,18 +1,16 @@
 """Combine the views of real cameras with their calibrations into a `Scene`."""
 
-import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError, NoPersonError
-from posefit.footage.images import IMAGES
+from posefit.fitting.tracker import Observation
+from posefit.footage.facing import yaws_of
+from posefit.footage.options import SourceOptions
 from posefit.footage.people import Persons, part_at, paste
 from posefit.footage.quality import (
     apparent_size,
@@ -21,50 +19,25 @@ from posefit.footage.quality import (
     extent_of,
     meeting,
 )
-from posefit.footage.readers import ARRAYS
 from posefit.footage.scene import Scene
-from posefit.footage.views import Observations, View, undistorted
+from posefit.footage.straightening import fitting, straightening
+from posefit.footage.views import Observations, View
+from posefit.footage.world import unit_by_height, world_of
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import (
-    Calibration,
-    Up,
-    guessed_up,
-    read_calibrations,
-    upright,
-)
+from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
-from posefit.geometry.units import METRES, UNIT_NAMES, Unit
 from posefit.motion.clips import FPS
-from posefit.reading import cut, quoted
-from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
-AROUND = 0.5  # seconds before and after a frame over which facings are averaged
-# least length of the mean of unit vectors: shorter means that facings contradict
-AGREEMENT = 0.6
-GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
-# distance of a camera from its world's origin, in the calibration's unit. Above FAR the
-# unit cannot be metres, and above FARTHER not even centimetres
-FAR = 100.0
-FARTHER = 1000.0
-# metres: a camera lower than this is probably a mistake, because the world's origin is
-# usually on the floor or in the first camera
-BELOW = 1.0
-SAME_SHAPE = 0.01  # share by which aspect ratios of masks and calibration may differ
-Pairing = tuple[int, ...]  # for each source, the index of its camera
 # a height of 0 or less, of a person behind a camera, would have no logarithm
 LEAST_HEIGHT = 1e-9
 
 
 def combined(
     views: Sequence[View],
-    name: str,
     body: Body,
     known: Sequence[Camera | Calibration],
-    view_degrees: float | None,
-    up: Up | None,
-    fps: float | None = None,
-    unit: Unit | None = None,
+    options: SourceOptions,
 ) -> Scene:
     """Return the scene of what cameras saw at the same times.
 
@@ -73,21 +46,19 @@ def combined(
 
     Args:
         views: What each camera saw.
-        name: Name of the scene.
         body: The person's body.
         known: The cameras of `calibrated`. Empty for one view without a camera, which
             gets a guess: level, 40 degrees across.
-        view_degrees: Which way the person faces at first, relative to the first camera.
-        up: Which axis of the calibrations points up; None to guess it.
-        fps: Frames per second; None for what the views state.
-        unit: Unit of the calibrations; None to guess it.
+        options: `up` and `unit` of the calibrations, `fps`, and `view_degrees`: which
+            way the person faces at first, relative to the first camera.
 
     Raises:
         InputError: Views and cameras do not fit each other.
         NoPersonError: Several cameras cannot all see one person of this size.
 
     """
-    rate, stated = _rate(views, fps)
+    name = Path(views[0].name).stem
+    rate, stated = _rate(views, options.fps)
     guesses = [guess for view in views for guess in view.guesses]
     if not stated and len(views[0]) > 1:
         guesses.append(f"{rate:g} frames a second")
@@ -95,42 +66,23 @@ def combined(
         guesses.append(
             "a level camera, 40 degrees across: distances and sizes are as good as that"
         )
-    world, metres, of_cameras = world_of(known, up, unit)
-    if known:
-        cameras = []
-        straight = []
-        for camera, view in zip(known, views, strict=True):
-            without_distortion = _straight(world, metres, camera, view)
-            cameras.append(without_distortion.camera)
-            straight.append(without_distortion.view)
-            guesses += without_distortion.said
-        views = straight
-    else:
-        cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)]
+    world, metres, of_cameras = world_of(known, options.up, options.unit)
+    cameras, views, said = _straightened(views, known, world, metres)
     # several cameras distinguish front and back themselves
     facings = views[0].facings if len(views) == 1 else None
     yaws = yaws_of(() if facings is None else facings, cameras[0], rate)
     observations = Observations(views, yaws)
-    apparent = apparent_sizes(observations, cameras) if len(views) > 1 else None
-    if apparent is not None:
-        miss, tall = apparent
-        if unit is None:
-            factor, guess = _by_height(miss, tall, known, metres, body.stature)
-            if guess:
-                of_cameras["unit"] = guess
-            cameras = [
-                replace(camera, translation=factor * camera.translation)
-                for camera in cameras
-            ]
-            miss = factor * miss
-            tall = factor * tall
-        if wrong := disagreement(miss, tall, body.stature):
-            raise NoPersonError(f"{name}: {wrong}")
+    if len(views) > 1:
+        unit = metres, options.unit is None
+        try:
+            cameras, guess = _of_one_size(
+                observations, cameras, known, unit, body.stature
+            )
+        except NoPersonError as error:
+            raise NoPersonError(f"{name}: {error}") from None
+        if guess:
+            of_cameras["unit"] = guess
     first = observations[observations.first]
-    yaw = first.yaw
-    if view_degrees is not None:
-        to_camera = -cameras[0].rotation[2]
-        yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
     warnings = [warning for view in views for warning in view.warnings]
     return Scene(
         name=name,
@@ -138,162 +90,98 @@ def combined(
         cameras=cameras,
         fps=rate,
         count=len(observations),
-        yaw=yaw,
+        yaw=_first_yaw(options.degrees, cameras[0], first),
         anchor=place_of(first.silhouettes, cameras, body.stature),
         truth=None,
         observations=observations,
         placing="given" if known else "guessed",
         warnings=[*warnings, *_unequal(views)],
-        guesses=[*guesses, *of_cameras.values()],
+        guesses=[*guesses, *said, *of_cameras.values()],
         pictures=views[0].pictures,
         first=int(views[0].numbers[0]),
         camera_moves=views[0].moves,
     )
 
 
-class _Fitted(NamedTuple):
-    """The unit of calibrations that fits the person's height."""
-
-    factor: float  # to multiply lengths with
-    guess: str  # what to say about it; "" if the unit guessed before fits
-
-
-def _by_height(
-    miss: float,
-    tall: Array,
+def _straightened(
+    views: Sequence[View],
     known: Sequence[Camera | Calibration],
+    world: Array,
     metres: float,
+) -> tuple[list[Camera], list[View], list[str]]:
+    """Return cameras without distortion, what they saw, and sentences for the user.
+
+    A camera that is not known is level, 40 degrees across. `world` and `metres` are the
+    axes and the unit of the calibrations, see `world_of`.
+    """
+    if not known:
+        guessed = Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)
+        return [guessed], [*views], []
+    cameras = list[Camera]()
+    straight = list[View]()
+    said = list[str]()
+    for each, view in zip(known, views, strict=True):
+        camera, how, words = straightening(each, view.size, view.filmed, world, metres)
+        cameras.append(camera)
+        straight.append(view if how is None else how.of(view))
+        said += words
+    return cameras, straight, said
+
+
+def _of_one_size(
+    observations: Observations,
+    cameras: Sequence[Camera],
+    known: Sequence[Camera | Calibration],
+    unit: tuple[float, bool],
     stature: float,
-) -> _Fitted:
-    """Return the unit in which the person's height is about right.
+) -> tuple[list[Camera], str]:
+    """Return cameras in which the person is about as tall as they are.
 
     Args:
-        miss: By how much rays miss each other, see `apparent_sizes`.
-        tall: The person's height in each view, in the unit guessed before.
-        known: The cameras. A calibration may state that it is in metres, or that its
-            unit may be any length if no usual one fits.
-        metres: The unit guessed before, in metres.
+        observations: What the cameras saw.
+        cameras: The cameras without distortion.
+        known: The same cameras as the user gave them.
+        unit: The unit of the calibrations in metres, and whether it is a guess.
         stature: The person's height in metres.
 
-    """
-    scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
-    height = float(np.median(tall))
-    # a person behind the cameras says nothing about the unit
-    unit_is_open = bool(scales - {"metres"})
-    if not (unit_is_open and height > 0.0):
-        return _Fitted(1.0, "")
-    unit = unit_of_heights(height / metres / stature)
-    factor = METRES[unit] / metres
-    if "free" in scales and disagreement(factor * miss, factor * tall, stature):
-        factor = stature / height
-        length = f"{factor * metres:.4g} m"
-        guess = f"the calibration's unit is {length}, by the person's height"
-        return _Fitted(factor, guess)
-    if METRES[unit] == metres:
-        return _Fitted(factor, "")
-    return _Fitted(factor, f"the calibration is in {UNIT_NAMES[unit]}")
-
-
-@dataclass(frozen=True, eq=False)
-class Straightening:
-    """Turns a camera's views into those of a camera without distortion.
-
-    That camera has square pixels, which the rasteriser needs.
-    """
-
-    camera: Camera  # the camera without distortion
-    lens: Calibration  # the real camera
-    maps: tuple[Any, Any]  # OpenCV's maps from the one to the other
-
-    def of(self, view: View) -> View:
-        """Return what the camera without distortion would have seen."""
-        pictures = view.pictures and partial(self._pictures, view.pictures)
-        straight = undistorted(view, self.lens, self.maps, self.camera)
-        return replace(straight, pictures=pictures)
-
-    def _pictures(self, pictures: Callable[[], Iterator[Image]]) -> Iterator[Image]:
-        for image in pictures():
-            straight = cv2.remap(image, *self.maps, cv2.INTER_LINEAR)
-            yield np.asarray(straight, dtype=np.uint8)
-
-
-def straightening(
-    known: Camera | Calibration,
-    size: tuple[int, int],
-    filmed: tuple[int, int] | None = None,
-    world: Array | None = None,
-    metres: float = 1.0,
-) -> tuple[Camera, Straightening | None, list[str]]:
-    """Return a camera without distortion, and how to turn masks into what it sees.
-
-    This is the only place that removes distortion and makes pixels square.
-
-    Args:
-        known: The camera, or its calibration.
-        size: Width and height of the masks.
-        filmed: Width and height of the video that they were segmented from.
-        world: Rotation (3, 3) that turns the calibration's world so that +y is up.
-        metres: The calibration's unit in metres.
-
     Returns:
-        The camera without distortion, with square pixels; the straightening, or None if
-        the masks fit this camera already; sentences for the user.
+        The cameras, in another unit if that one was a wrong guess, and what to say
+        about it; "" if it was not.
 
     Raises:
-        InputError: The masks are not from this camera.
+        NoPersonError: The cameras cannot all see one person of this size.
 
     """
-    said = list[str]()
-    lens = Calibration.of(known, "") if isinstance(known, Camera) else known
-    if isinstance(known, Camera) and (known.width, known.height) == size:
-        camera = known
-    else:
-        stated = lens.size
-        lens = _fitting(lens, filmed or size, scaled=filmed is None)
-        # the world of a `Camera` is upright already
-        if world is None or isinstance(known, Camera):
-            world = np.eye(3)
-        camera = lens.in_metres(metres).camera(size, world)
-        if stated not in (None, filmed or size):
-            said.append(_resized(known, filmed or size))
-    square = camera.squared()
-    if square is not camera:
-        ratio = camera.focal[0] / camera.focal[1]
-        said.append(
-            f"pixels are not square, fx is {ratio:.3g} fy: {size[0]}x{size[1]} becomes "
-            f"{square.width}x{square.height}"
-        )
-    if square is camera and not lens.distorted:
-        return camera, None, said
-    return square, Straightening(square, lens, lens.maps(size, square)), said
+    apparent = apparent_sizes(observations, cameras)
+    if apparent is None:
+        return [*cameras], ""
+    miss, tall = apparent
+    metres, is_guess = unit
+    factor = 1.0
+    guess = ""
+    if is_guess:
+        factor, guess = unit_by_height(miss, tall, known, metres, stature)
+    if wrong := disagreement(factor * miss, factor * tall, stature):
+        raise NoPersonError(wrong)
+    scaled = [
+        replace(camera, translation=factor * camera.translation) for camera in cameras
+    ]
+    return scaled, guess
 
 
-def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:
-    """Return the sentence about pictures that differ in size from their calibration."""
-    calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
-    width, height = calibration.size or size
-    came = f"{size[0]}x{size[1]}"
-    change = f"is scaled to {came}"
-    if calibration.padded(size) is not None:
-        change = f"holds for {came}, with rows or columns more or less at the end"
-    name = f" {quoted(calibration.name)}" if calibration.name else ""
-    return f"the calibration{name} of {width}x{height} {change}"
+def _first_yaw(
+    view_degrees: Sequence[float], camera: Camera, first: Observation
+) -> float | None:
+    """Return which way the person faces at first, in radians about the vertical.
 
-
-class _Straight(NamedTuple):
-    """A camera without distortion, and what it saw."""
-
-    camera: Camera
-    view: View
-    said: list[str]  # sentences for the user
-
-
-def _straight(
-    world: Array, metres: float, known: Camera | Calibration, view: View
-) -> _Straight:
-    """Return a view without distortion, and its camera, see `straightening`."""
-    camera, how, said = straightening(known, view.size, view.filmed, world, metres)
-    return _Straight(camera, view if how is None else how.of(view), said)
+    This is what the user gave relative to the camera, or else what the segmenter
+    reported, which may be None.
+    """
+    if not view_degrees:
+        return first.yaw
+    to_camera = -camera.rotation[2]
+    towards = np.arctan2(to_camera[0], to_camera[2])
+    return float(towards - np.radians(view_degrees[0]))
 
 
 def same_person(
@@ -322,7 +210,7 @@ def same_person(
     films = zip(known, (first.size, size), (first.filmed, filmed), strict=True)
     for camera, pixels, film in films:
         if isinstance(camera, Calibration):
-            camera = _fitting(camera, film or pixels, scaled=film is None)
+            camera = fitting(camera, film or pixels, scaled=film is None)
             cameras.append(camera.camera(pixels, np.eye(3)))
         else:
             cameras.append(camera)
@@ -366,108 +254,6 @@ def _extent(known: Camera | Calibration, silhouette: Silhouette) -> tuple[Array,
     if not isinstance(known, Camera):
         middle = known.straightened(np.array([*middle, 0.0]), (width, height))[:2]
     return middle, tall
-
-
-def world_of(
-    known: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
-) -> tuple[Array, float, dict[str, str]]:
-    """Return the axes and the unit of the cameras' world.
-
-    Args:
-        known: The cameras. A `Camera` is upright and in metres already.
-        up: Which axis of the calibrations points up; None to guess it.
-        unit: The calibrations' unit; None to guess it from their distances.
-
-    Returns:
-        The rotation (3, 3) that turns calibrations upright, their unit in metres, and
-        the guesses by what they are about.
-
-    Raises:
-        InputError: A unit is given for a file that states another one.
-
-    """
-    calibrations = [camera for camera in known if isinstance(camera, Calibration)]
-    guesses = dict[str, str]()
-    if up is None and (guess := guessed_up(calibrations)):
-        guesses["up"] = guess
-    distances = list[float]()
-    for calibration in calibrations:
-        if calibration.scale == "metres":
-            if unit not in (None, "m"):
-                raise InputError(
-                    f"unit must be left out for {quoted(calibration.name)}, whose file "
-                    f"states it, got {quoted(unit)}"
-                )
-        elif calibration.translation is not None:
-            distances.append(float(np.linalg.norm(calibration.translation)))
-    if unit is None and distances:
-        unit = _unit_of_distances(distances)
-        guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
-    for calibration in calibrations:
-        if calibration.rotation is None:
-            guesses["place"] = (
-                "the camera stands level, which its calibration does not state"
-            )
-        if calibration.size is None:
-            guesses["size"] = (
-                "the calibration is for pictures of this size, which it does not state"
-            )
-    world = upright(calibrations, up)
-    metres = METRES[unit or "m"]
-    lowest = 0.0
-    for calibration in calibrations:
-        place = calibration.in_metres(metres).position
-        if place is not None:
-            lowest = min(lowest, float(world[1] @ place))
-    if lowest < -BELOW:
-        guesses["below"] = (
-            f"a camera stands {-lowest:.1f} m below its world's origin: is its "
-            "translation its place?"
-        )
-    return world, metres, guesses
-
-
-def _unit_of_distances(distances: Sequence[float]) -> Unit:
-    """Return the likely unit of the cameras' distances from their world's origin."""
-    farthest = max(distances)
-    if farthest <= FAR:
-        return "m"
-    return "cm" if farthest <= FARTHER else "mm"
-
-
-def unit_of_heights(ratio: float) -> Unit:
-    """Return the likely unit of calibrations.
-
-    Args:
-        ratio: The person's height in that unit, over their height in metres.
-
-    """
-    return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
-
-
-def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Array:
-    """Return about which way a person faces in each frame (T,), NaN if unknown.
-
-    Angles are radians about the vertical. Each is the mean direction over the second
-    around its frame, so that a few wrong facings do not count.
-
-    Args:
-        facings: (T,) as `Segmenter.facing`.
-        camera: The camera that they are relative to.
-        fps: Frames per second.
-
-    """
-    values = np.asarray(facings, dtype=np.float64)
-    reach = max(round(AROUND * fps), 1)
-    towards = np.arctan2(-camera.rotation[2, 0], -camera.rotation[2, 2])
-    known = np.isfinite(values)
-    directions = np.where(known, np.exp(1j * (np.nan_to_num(values) + towards)), 0.0)
-    around = [slice(max(k - reach, 0), k + reach + 1) for k in range(len(values))]
-    total = np.array([directions[rows].sum() for rows in around])  # (T,) complex
-    count = np.array([known[rows].sum() for rows in around])
-    # the limit excludes frames without any facing, whose total is 0
-    agrees = np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9)
-    return np.where(agrees, np.angle(total), np.nan)
 
 
 def _unequal(views: Sequence[View]) -> list[str]:
@@ -535,211 +321,3 @@ def place_of(
     across = (middles[0] - camera.centre) / camera.focal * depth
     in_camera = np.array([*across, depth])
     return np.asarray(camera.rotation.T @ (in_camera - camera.translation))
-
-
-def listed(
-    cameras: Sequence[Camera | Calibration | str | Path],
-) -> list[Camera | Calibration]:
-    """Return cameras, after reading those that are files.
-
-    A file may hold several cameras, which are for several views in their order. Raises
-    InputError if a file is not a calibration.
-    """
-    known = list[Camera | Calibration]()
-    for camera in cameras:
-        if isinstance(camera, Camera | Calibration):
-            known.append(camera)
-            continue
-        mistake = _mistaken_for_calibration(Path(camera))
-        if mistake:
-            raise InputError(
-                f"{camera}: expected a calibration of the camera, got {mistake}"
-            )
-        known += read_calibrations(camera)
-    return known
-
-
-def _mistaken_for_calibration(path: Path) -> str:
-    """Return what a path is if it cannot be a calibration, or else ""."""
-    suffix = path.suffix.lower()
-    if suffix in ARRAYS:
-        return "a file of masks"
-    if suffix in IMAGES:
-        return "an image"
-    return "a folder" if path.is_dir() else ""
-
-
-def calibrated(
-    cameras: Sequence[Camera | Calibration | str | Path],
-    filmed: Sequence[tuple[int, int] | None],
-    names: Sequence[str] = (),
-) -> list[Camera | Calibration]:
-    """Return the camera of each view, or an empty list for one view without a camera.
-
-    Args:
-        cameras: Cameras, calibrations, or their files, in the order of the views.
-        filmed: Width and height of each view's video; None for masks.
-        names: Names of the views' sources. If the cameras have the same names, they are
-            paired by these and not by order.
-
-    Raises:
-        InputError: Cameras and views do not fit each other.
-
-    """
-    known = listed(cameras)
-    views = len(filmed)
-    if not known and views > 1:
-        raise InputError(
-            f"camera must be given for each of several views, {views}, got none"
-        )
-    if known and len(known) != views:
-        calibrations = [each for each in known if isinstance(each, Calibration)]
-        came = ", ".join(calibration.name for calibration in calibrations)
-        chosen = ""
-        if len(known) > views and came:
-            chosen = f": {cut(came)}; FILE:NAME is one of a file"
-        raise InputError(
-            f"camera must be given for each view, {views}, got {len(known)}{chosen}"
-        )
-    if views > 1 and any(
-        isinstance(camera, Calibration) and camera.rotation is None for camera in known
-    ):
-        raise InputError(
-            "camera must say where each of several cameras stands, got a file without "
-            "rotation"
-        )
-    if views > 1 and len(names) == views:
-        known = [known[k] for k in order_by_name(known, names)]
-    for camera, size in zip(known, filmed, strict=False):
-        if isinstance(camera, Calibration) and size is not None:
-            _fitting(camera, size, scaled=False)
-    return known
-
-
-def order_by_name(
-    cameras: Sequence[Camera | Calibration], sources: Sequence[str]
-) -> list[int]:
-    """Return which camera took each source, by their names or else in order.
-
-    Words that all names share and leading zeros do not count: walk-a.mp4 and walk-b.mp4
-    are from the cameras a and b, or cam_a and cam_b.
-
-    Args:
-        cameras: The cameras; only calibrations have names.
-        sources: The names of the sources, one per camera.
-
-    Returns:
-        For each source, the index of its camera.
-
-    Raises:
-        InputError: The names can be paired in several ways.
-
-    """
-    in_order = list(range(len(cameras)))
-    names = [camera.name for camera in cameras if isinstance(camera, Calibration)]
-    if len(names) < len(cameras):
-        return in_order
-    # files may be named after the cameras, or the folders that they are in
-    stems = [Path(source).stem for source in sources]
-    folders = [Path(source).parent.name for source in sources]
-    orders = set[Pairing]()
-    for given in (stems, folders, sources):
-        order = _order_by_words(names, given)
-        if order is not None:
-            orders.add(order)
-    if not orders:
-        order = _order_by_part(names, stems)
-        if order is not None:
-            orders.add(order)
-    if len(orders) > 1:
-        raise InputError(
-            "cameras must have names that only fit one order of the sources, got "
-            f"{cut(', '.join(names))} for {cut(', '.join(sources))}; "
-            "give one file a camera, of other names"
-        )
-    return list(*orders) if orders else in_order
-
-
-def _order_by_words(names: Sequence[str], given: Sequence[str]) -> Pairing | None:
-    """Return the order in which cameras and sources have the same names; None if none.
-
-    Names are compared by all of their words, or else without the words that all share.
-    """
-    for words_of in (_all_words, _own_words):
-        of_sources = words_of(given)
-        of_cameras = words_of(names)
-        are_unique = len(set(of_sources)) == len(of_sources)
-        if are_unique and set(of_sources) == set(of_cameras):
-            return tuple(of_cameras.index(words) for words in of_sources)
-    return None
-
-
-def _order_by_part(names: Sequence[str], given: Sequence[str]) -> Pairing | None:
-    """Return the order in which the name of each source contains one camera's name.
-
-    None if a source contains none or several of them, or if two contain the same.
-    """
-    words = [f" {' '.join(_words(name))} " for name in names]
-    order = list[int]()
-    for source in given:
-        text = f" {' '.join(_words(source))} "
-        found = [k for k, name in enumerate(words) if name.strip() and name in text]
-        if len(found) != 1:
-            return None
-        order += found
-    return tuple(order) if len(set(order)) == len(names) else None
-
-
-def _words(name: str) -> tuple[str, ...]:
-    """Return the words and numbers of a name, in lower case, without leading zeros."""
-    words = list[str]()
-    for part in re.findall(r"[0-9]+|[^\W\d_]+", name.casefold()):
-        if part.isdigit():
-            part = part.lstrip("0") or "0"
-        words.append(part)
-    return tuple(words)
-
-
-def _all_words(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return the words of each name."""
-    return [_words(name) for name in names]
-
-
-def _own_words(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return the words of each name without common ones at the beginning or the end."""
-    every = _all_words(names)
-    shortest = min(len(words) for words in every)
-    before = 0
-    while before < shortest and len({words[before] for words in every}) == 1:
-        before += 1
-    after = 0
-    remaining = shortest - before
-    while after < remaining and len({words[-1 - after] for words in every}) == 1:
-        after += 1
-    return [words[before : len(words) - after] for words in every]
-
-
-def _fitting(
-    calibration: Calibration, size: tuple[int, int], *, scaled: bool
-) -> Calibration:
-    """Return the calibration for pictures of a size.
-
-    `scaled` pictures may have another size of the same shape. Raises InputError for any
-    other size, because cameras often film with only a part of the sensor then, and it
-    is not known which.
-    """
-    padded = calibration.padded(size)
-    if padded is not None:
-        return padded
-    name = f" {quoted(calibration.name)}" if calibration.name else ""
-    if calibration.size is None:
-        middle = "x".join(f"{value:g}" for value in calibration.matrix[:2, 2])
-        raise InputError(
-            f"camera{name} must be of {size[0]}x{size[1]}, got a centre of {middle}"
-        )
-    width, height = calibration.size
-    if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
-        return calibration
-    raise InputError(
-        f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
-    )

@@ -14,16 +14,14 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.files import check_new, new_folder, opencv_name
 from posefit.footage.cleaning import cleaned
+from posefit.footage.extraction import Extraction
+from posefit.footage.kinds import Resolved, resolve
+from posefit.footage.options import SourceOptions
+from posefit.footage.scanner import Progress
 from posefit.footage.scene import observed_views
-from posefit.footage.segmentation import Extraction, Progress, Segmentation
-from posefit.footage.source import (
-    Resolved,
-    films_of,
-    resolve,
-    scene_of,
-    useless_for,
-    views_of_masks,
-)
+from posefit.footage.segmentation import Segmentation
+from posefit.footage.source import films_of, scene_of, views_of_masks
+from posefit.footage.uses import useless_for
 from posefit.footage.video import VideoWriter
 from posefit.footage.views import Range, View, border_of
 from posefit.motion.clips import FPS
@@ -146,7 +144,7 @@ def _written(
 def _masks(source: Resolved, how: Extraction, frames: Range) -> list[View]:
     """Return the views of a source that needs no extraction."""
     if source.medium == "motion":
-        return observed_views(scene_of(source, frames=frames))
+        return observed_views(scene_of(source, SourceOptions(frames=frames)))
     views = views_of_masks(source, frames)
     return [cleaned(view, choice=how.person) for view in views]
 

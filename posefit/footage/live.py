@@ -18,8 +18,10 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.files import opencv_name
+from posefit.footage.extraction import Extraction
 from posefit.footage.images import PIXELS
-from posefit.footage.segmentation import Extraction, PersonSegmenter
+from posefit.footage.scaled import ScaledVideo
+from posefit.footage.segmenter import PersonSegmenter
 from posefit.footage.video import Video, scaled
 from posefit.footage.views import View
 from posefit.motion.clips import FPS
@@ -220,12 +222,12 @@ def live_views(
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    segmenter = PersonSegmenter(
-        Video.of_images(learned, Path(stream.name), stream.fps), how
-    )
+    before = Video.of_images(learned, Path(stream.name), stream.fps)
+    video = ScaledVideo(before, how.width)
+    segmenter = PersonSegmenter(video, how)
     quality = None
     for live in images:
-        image = scaled(live.image, segmenter.size)
+        image = scaled(live.image, video.size)
         (person, *_), _, landmarks = segmenter.frame(image)
         quality = quality or segmenter.quality()
         usable = bool(segmenter.row(quality, image, person, live.number)["usable"])

@@ -32,7 +32,7 @@ CLEARER = 2.0
 MIN_DETECTIONS = 8  # frames that show a person alone; fewer may be noise
 COLOUR = 0.01  # heights: the distance that one grey level of different colour adds
 AREA = 0.5  # heights: the distance that an area e times as large adds
-GAP_FRAMES = 30.0  # a gap of this many frames halves what a distance counts
+GAP_SECONDS = 1.0  # a gap of this many seconds halves what a distance counts
 UNREACHABLE = 1e6  # heights: replaces infinity, which the assignment does not accept
 
 
@@ -175,7 +175,7 @@ class People:
         self.tracklets: list[Tracklet] = []
         self.active: list[Tracklet] = []  # who may be in the next frame
         self._frame = -1
-        self._patience = MAX_GAP_SECONDS * fps
+        self._fps = fps
 
     def add(self, masks: Sequence[Mask], image: Image | None = None) -> list[Tracklet]:
         """Return who is in the next frame.
@@ -190,7 +190,7 @@ class People:
         blobs = [_Blob(mask, image) for mask in masks]
         active = []
         for tracklet in self.active:
-            if frame - max(tracklet.detections) <= self._patience:
+            if frame - max(tracklet.detections) <= MAX_GAP_SECONDS * self._fps:
                 active.append(tracklet)
             else:
                 # what only later frames need is freed, or memory would grow with noise
@@ -240,7 +240,10 @@ class People:
         for tracklet in by_score:
             apart = [person for person in persons if _are_apart(tracklet, person)]
             if apart and tracklet.confirmed(least):
-                distances = [_least_distance(tracklet, person) for person in apart]
+                distances = [
+                    min(_distance(tracklet, part, self._fps) for part in person)
+                    for person in apart
+                ]
                 apart[distances.index(min(distances))].append(tracklet)
             else:
                 persons.append([tracklet])
@@ -352,11 +355,7 @@ def _are_apart(tracklet: Tracklet, person: Sequence[Tracklet]) -> bool:
     return all(frames.isdisjoint(part.detections) for part in person)
 
 
-def _least_distance(tracklet: Tracklet, person: Sequence[Tracklet]) -> float:
-    return min(_distance(tracklet, part) for part in person)
-
-
-def _distance(tracklet: Tracklet, other: Tracklet) -> float:
+def _distance(tracklet: Tracklet, other: Tracklet, fps: float) -> float:
     """Return how unlikely it is that two tracklets show one person, in heights."""
     first, second = sorted((tracklet, other), key=lambda part: min(part.detections))
     start = min(second.detections)
@@ -365,8 +364,8 @@ def _distance(tracklet: Tracklet, other: Tracklet) -> float:
     away = float(np.linalg.norm(np.array(place) - first.latest.place)) / first.height
     size = float(abs(np.log(second.area / first.area)))
     # the longer a person was hidden, the farther they may have walked
-    gap = max(0, start - first.last) / GAP_FRAMES
-    return COLOUR * colour + AREA * size + away / (1.0 + gap)
+    gap = max(0, start - first.last) / fps
+    return COLOUR * colour + AREA * size + away / (1.0 + gap / GAP_SECONDS)
 
 
 def _widened(mask: NDArray[Any], height: float) -> Mask:

@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS, page_count, read_image
-from posefit.footage.readers import Images
+from posefit.footage.numbering import Images
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 

@@ -1,14 +1,17 @@
 """The `View`: what one camera saw. Readers return one, and later steps take one.
 
-from posefit.footage.source import resolve, views_of
+from posefit.footage.kinds import resolve
+from posefit.footage.source import views_of_masks
 
-(view,) = views_of(resolve("masks.npz"))
+(view,) = views_of_masks(resolve("masks.npz"))
 print(view.numbers[view.usable], view.silhouette(0).mask.shape)
 """
 
+import os
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from tempfile import TemporaryFile, gettempdir
 from typing import Any
 
 import cv2
@@ -32,6 +35,10 @@ MOST = 0.5
 Range = tuple[int | None, int | None]
 # (T, bytes): the pixels of each frame as bits, row by row; unused bits at the end are 0
 Planes = NDArray[np.uint8]
+# masks of one camera that are held in memory
+PLANES_BYTES = 128_000_000
+# the fields of a `View` with one row per frame; some may be None
+PER_FRAME = ("numbers", "times", "bits", "known", "usable", "landmarks", "facings")
 # cache of decoded masks: large enough for a short film
 DECODED_BYTES = 64_000_000
 # a decoded silhouette per pixel: two arrays of bytes, and two of bits
@@ -74,8 +81,9 @@ class View:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only, because several views share them."""
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
+        for name in PER_FRAME:
+            value = getattr(self, name)
+            if value is not None:
                 value.flags.writeable = False
 
     def __len__(self) -> int:
@@ -84,34 +92,90 @@ class View:
     def __getitem__(self, rows: slice) -> "View":
         """Return the view of a slice of its frames, counted from 0."""
         cut: dict[str, Any] = {}
-        for name in self._array_names():
-            cut[name] = getattr(self, name)[rows]
+        for name in PER_FRAME:
+            value = getattr(self, name)
+            cut[name] = None if value is None else value[rows]
         return replace(self, **cut)
-
-    def _array_names(self) -> list[str]:
-        """Return the names of the fields that hold one row per frame."""
-        fields = vars(self).items()
-        return [name for name, value in fields if isinstance(value, np.ndarray)]
 
     def silhouette(self, k: int) -> Silhouette:
         """Decode and return the silhouette of frame k, counted from 0."""
         known = None if self.known is None else unpacked(self.known[k], self.size)
         return Silhouette.of(unpacked(self.bits[k], self.size), known)
 
+    def masks(self) -> Iterator[Mask]:
+        """Decode and yield the mask of each frame."""
+        for bits in self.bits:
+            yield unpacked(bits, self.size)
+
     @property
     def shows(self) -> NDArray[np.bool_]:
         """Whether each frame (T,) has both person and background pixels."""
-        known = full_planes(1, self.size) if self.known is None else self.known
-        bits = self.bits & known
-        return np.asarray(bits.any(axis=1) & (bits != known).any(axis=1))
+        every = full_planes(1, self.size)[0]
+        shows = np.empty(len(self), dtype=bool)
+        # frame by frame, because all planes of a long film need much memory
+        for k, frame in enumerate(self.bits):
+            known = every if self.known is None else self.known[k]
+            bits = frame & known
+            shows[k] = bits.any() and (bits != known).any()
+        return shows
 
 
 def joined(views: Sequence[View]) -> View:
-    """Return one view of all frames of several views, in order, without pictures."""
-    arrays: dict[str, Any] = {}
-    for name in views[0]._array_names():
-        arrays[name] = np.concatenate([getattr(view, name) for view in views])
-    return replace(views[0], **arrays, pictures=None)
+    """Return one view of all frames of several views, in order, without pictures.
+
+    What some of the views do not know is None in the joined one, except for `known`.
+    """
+    if any(view.known is not None for view in views):
+        views = [_with_known(view) for view in views]
+    rows: dict[str, Any] = {}
+    for name in PER_FRAME:
+        values = [getattr(view, name) for view in views]
+        rows[name] = None
+        if all(value is not None for value in values):
+            rows[name] = np.concatenate(values)
+    return replace(views[0], **rows, pictures=None)
+
+
+def _with_known(view: View) -> View:
+    """Return a view that states which pixels are known."""
+    if view.known is not None:
+        return view
+    return replace(view, known=full_planes(len(view), view.size))
+
+
+def together(views: Sequence[View]) -> list[View]:
+    """Cut the views of several cameras to the frames that all of them have.
+
+    Frames are compared by their numbers, if all cameras state them.
+
+    Raises:
+        InputError: The cameras have no frame in common, or they begin at different
+            frames and not all of them state numbers.
+
+    """
+    starts = [int(view.numbers[0]) for view in views]
+    stops = [int(view.numbers[-1]) + 1 for view in views]
+    names = [view.name for view in views]
+    if not all(view.counted for view in views):
+        if len(set(starts)) > 1:
+            each = zip(starts, names, strict=True)
+            came = " and ".join(f"{first} of {name}" for first, name in each)
+            raise InputError(f"cameras must begin with one frame, got frame {came}")
+        return list(views)
+    start = max(starts)
+    stop = min(stops)
+    spans = zip(starts, stops, names, strict=True)
+    came = ", ".join(f"{first}:{last} of {name}" for first, last, name in spans)
+    if start >= stop:
+        raise InputError(f"cameras must have frames in common, got {came}")
+    if len(set(starts)) > 1 or len(set(stops)) > 1:
+        used = f"the frames {start}:{stop} are used, which all cameras have, of {came}"
+        first_view = replace(views[0], guesses=[*views[0].guesses, used])
+        views = [first_view, *views[1:]]
+    return [
+        view[start - first : stop - first]
+        for view, first in zip(views, starts, strict=True)
+    ]
 
 
 def times_of(numbers: NDArray[np.int64], fps: float | None) -> Array:
@@ -133,15 +197,19 @@ def border_of(planes: Planes, size: tuple[int, int]) -> NDArray[np.bool_]:
     border = np.concatenate([places[[0, -1]].ravel(), places[:, [0, -1]].ravel()])
     octets = planes[:, border >> 3]  # (T, n): the byte that holds each pixel
     # `packbits` stores the first pixel in the highest bit
-    shift = 7 - (border & 7)
+    shift = (7 - (border & 7)).astype(np.uint8)
     return np.asarray(octets >> shift & 1 > 0)
 
 
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     """Return uninitialised planes for `count` masks.
 
+    More than `PLANES_BYTES` are in a temporary file without a name, of which the
+    operating system keeps in memory what there is room for.
+
     Raises:
-        InputError: The planes need more memory than this process may use.
+        InputError: The planes need more memory than this process may use, or more disk
+            than there is.
 
     """
     octets = (size[0] * size[1] + 7) // 8
@@ -151,7 +219,20 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
             f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of "
             f"memory, got {count} of {size[0]}x{size[1]} pixels"
         )
-    return np.empty((count, octets), dtype=np.uint8)
+    if count * octets <= PLANES_BYTES:
+        return np.empty((count, octets), dtype=np.uint8)
+    try:
+        with TemporaryFile() as file:
+            # a file with holes would end the process once the disk is full
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, count * octets)
+            return np.memmap(file, np.uint8, "r+", shape=(count, octets))
+    except OSError as error:
+        folder = gettempdir()
+        raise InputError(
+            f"{folder}: expected room for {count * octets / 1e9:.1f} GB of masks, "
+            f"got {error.strerror}"
+        ) from None
 
 
 def full_planes(count: int, size: tuple[int, int]) -> Planes:

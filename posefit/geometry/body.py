@@ -46,6 +46,13 @@ class Body:
         skeleton: The skeleton.
         radii: The radii (26, 2) in metres, at the start and at the end of each bone.
 
+    Example:
+        >>> from posefit import Body, load_motion
+        >>> body = Body.of(load_motion("walk").skeleton)
+        >>> body.radii.shape
+        (26, 2)
+        >>> 1.5 < body.stature < 1.9
+        True
     """
 
     skeleton: Skeleton

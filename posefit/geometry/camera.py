@@ -39,6 +39,13 @@ class Camera:
         rotation: The rotation (3, 3) from the world to the camera.
         translation: The translation (3,) in metres.
 
+    Example:
+        >>> from posefit import Camera
+        >>> camera = Camera.pinhole(640, 480, fx=700)
+        >>> camera.width, camera.height
+        (640, 480)
+        >>> Camera.from_json(camera.to_json()).focal.tolist()
+        [700.0, 700.0]
     """
 
     width: int

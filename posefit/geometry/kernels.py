@@ -159,7 +159,7 @@ def write_sines(poses, rows, lanes):
 
 @inlined
 def write_sines_of_one(pose, lanes):
-    """Write those of one pose that is in all lanes, each of them computed once."""
+    """Write sines and cosines of one pose that is in all lanes, each computed once."""
     # one angle after another, in the room of the angles of all lanes
     sines = _ANGLE + _ANGLES
     cosines = sines + _ANGLES

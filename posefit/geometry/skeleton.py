@@ -139,6 +139,12 @@ class Skeleton:
         limits: The lowest and the highest value (63, 2) in radians of each joint angle,
             0 for padding, or None if unknown.
 
+    Example:
+        >>> from posefit import load_motion
+        >>> motion = load_motion("walk")
+        >>> joints = motion.skeleton.joints(motion.poses, motion.translations)
+        >>> joints.shape[1:]
+        (27, 3)
     """
 
     name: str

@@ -51,6 +51,21 @@ def mirrored_poses(skeleton: Skeleton, poses: Array) -> Array:
     the body's side the silhouette stays the same, because the camera looks across this
     plane and depth is invisible. The farther the camera is from there, the more the
     silhouette changes.
+
+    Args:
+        skeleton: The skeleton.
+        poses: The poses (n, 66).
+
+    Returns:
+        The mirrored poses (n, 66).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import load_motion, mirrored_poses
+        >>> walk = load_motion("walk")
+        >>> once = mirrored_poses(walk.skeleton, walk.poses)
+        >>> bool(np.allclose(mirrored_poses(walk.skeleton, once), walk.poses))
+        True
     """
     exchanged = _exchanged(skeleton, poses, JOINTS)
     exchanged[:, 2] *= -1.0  # a lean to the left becomes a lean to the right
@@ -63,6 +78,20 @@ def turned_poses(poses: Array) -> Array:
     From the front or from behind, an upright body at rest keeps its outline. A walking
     body nearly keeps it, with left and right on the other sides. From the side, knees
     and feet point the wrong way.
+
+    Args:
+        poses: The poses (n, 66).
+
+    Returns:
+        The turned poses (n, 66).
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import load_motion, turned_poses
+        >>> poses = load_motion("walk").poses
+        >>> turn = np.cos(turned_poses(poses)[:, 0] - poses[:, 0])
+        >>> bool(np.allclose(turn, -1.0))
+        True
     """
     poses = np.array(poses, dtype=np.float64)
     poses[:, 0] = wrapped(poses[:, 0] + np.pi)
@@ -85,6 +114,14 @@ def reflected_poses(skeleton: Skeleton, poses: Array, camera_yaw: float) -> Arra
     Returns:
         The reflected poses (n, 66).
 
+    Example:
+        >>> import numpy as np
+        >>> from posefit import load_motion, reflected_poses
+        >>> walk = load_motion("walk")
+        >>> once = reflected_poses(walk.skeleton, walk.poses, camera_yaw=0.5)
+        >>> twice = reflected_poses(walk.skeleton, once, camera_yaw=0.5)
+        >>> bool(np.allclose(np.sin(twice), np.sin(walk.poses)))
+        True
     """
     reflected = mirrored_poses(skeleton, poses)
     reflected[:, 0] = wrapped(2.0 * camera_yaw + np.pi - reflected[:, 0])
@@ -97,6 +134,23 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     Each limb gets the mirrored angles of the other; the rest of the body stays. From
     the side, the near and the far limb overlap or cross, and the silhouette is nearly
     the same whichever is in front.
+
+    Args:
+        skeleton: The skeleton.
+        poses: The poses (n, 66).
+        limbs: The pair of limbs, "legs" or "arms".
+
+    Returns:
+        The poses (n, 66) with exchanged limbs.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import exchanged_limbs, load_motion
+        >>> walk = load_motion("walk")
+        >>> once = exchanged_limbs(walk.skeleton, walk.poses, "legs")
+        >>> twice = exchanged_limbs(walk.skeleton, once, "legs")
+        >>> bool(np.allclose(twice, walk.poses))
+        True
     """
     if limbs not in _BONES:
         raise InputError(
@@ -106,7 +160,23 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
 
 
 def facing(camera: Camera, place: Array) -> float:
-    """Return the yaw in radians of a person at a place (3,) who faces the camera."""
+    """Return the yaw in radians of a person at a place (3,) who faces the camera.
+
+    Args:
+        camera: The camera.
+        place: The position (3,) of the person in metres.
+
+    Returns:
+        The yaw in radians.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Camera, facing
+        >>> place = np.array([0.0, 0.9, 0.0])
+        >>> camera = Camera.around(place, azimuth=0.5, distance=3.0, size=(320, 240))
+        >>> round(facing(camera, place), 6)
+        0.5
+    """
     x, _, z = camera.position - np.asarray(place)
     return float(np.arctan2(x, z))
 
@@ -135,7 +205,7 @@ def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
 def _frames(skeleton: Skeleton) -> list[tuple[int, Array | None]]:
     """Return each inner joint with the map from its counterpart's frame to its own.
 
-    The map includes the reflection. None stands for the reflection alone, so that
+    The map includes the reflection. None means the reflection alone, so that
     angles of more than half a turn can be kept.
     """
     frames: list[tuple[int, Array | None]] = []

@@ -1,10 +1,12 @@
 """Clinical joint angles, in degrees: of hip, knee and ankle, of shoulder and elbow.
 
 Each is zero in the anatomical position, and has the same sign on both sides of the
-body. The axes are those of `posefit.measuring.segments`. The shoulder's plane and
-rotation are undefined if the arm hangs straight down, like longitudes at a pole; near
-that pose they are left out.
+body. `posefit.measuring.segments` defines the axes. The shoulder's plane and rotation
+are undefined if the arm hangs straight down, like longitudes at a pole; near that pose
+they are left out.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -49,13 +51,17 @@ BETWEEN = {
     "shoulder": ("thorax", "upper_arm"),
     "elbow": ("upper_arm", "forearm"),  # WU2005 (elbow)
 }
+
+
+def _columns() -> Iterator[str]:
+    for joint, angles in MEANINGS.items():
+        for side in SIDES:
+            for angle in angles:
+                yield f"{side}_{joint}_{angle}"
+
+
 # columns of angles.csv, in order
-COLUMNS = tuple(
-    f"{side}_{joint}_{angle}"
-    for joint, angles in MEANINGS.items()
-    for side in SIDES
-    for angle in angles
-)
+COLUMNS = tuple(_columns())
 # mirrors left and right, in segments' axes
 _ACROSS = np.diag([1.0, 1.0, -1.0])
 # degrees between an arm and its straight-down or straight-up pose: so near, an error of
@@ -127,6 +133,16 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     Args:
         skeleton: the skeleton.
         poses: successive poses (T, 66).
+
+    Returns:
+        The angles (T,) in degrees by name.
+
+    Example:
+        >>> from posefit import clinical_angles, load_motion
+        >>> walk = load_motion("16_15")
+        >>> angles = clinical_angles(walk.skeleton, walk.poses)
+        >>> round(float(angles["left_knee_flexion"].max()), -1)
+        70.0
     """
     segments = segment_rotations(skeleton, poses)
     columns: dict[str, Array] = {}
@@ -137,11 +153,8 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
             if side == "left":
                 rotation = _ACROSS @ rotation @ _ACROSS
             axes[name.removeprefix(f"{side}_")] = rotation
-        by_joint = {
-            joint: joint_angles(joint, *(axes[segment] for segment in pair))
-            for joint, pair in BETWEEN.items()
-        }
-        for joint, values in by_joint.items():
+        for joint, (proximal, distal) in BETWEEN.items():
+            values = joint_angles(joint, axes[proximal], axes[distal])  # (T, 3)
             # near 0, the first and the last angle are about the same axis
             apart = np.cos(values[:, 1])
             if joint == "shoulder":

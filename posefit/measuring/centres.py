@@ -45,6 +45,18 @@ def joint_centres(motion: Motion) -> dict[str, Array]:
     """Return the centres of the twelve large joints by name.
 
     They have shape (T, 3), in metres in the world.
+
+    Args:
+        motion: The motion.
+
+    Returns:
+        The centres (T, 3) by name.
+
+    Example:
+        >>> from posefit import joint_centres, load_motion
+        >>> centres = joint_centres(load_motion("walk", fps=30.0))
+        >>> len(centres), centres["left_knee"].shape[1]
+        (12, 3)
     """
     joints = motion.joints
     return {name: joints[:, PLACES.index(name)] for name in CENTRES}

@@ -4,9 +4,9 @@ X points forwards, Y up along the segment and Z to the person's right. So all se
 of a person in the anatomical position (upright, knees and elbows straight, arms
 hanging, palms forwards) have the same orientation. Wu et al. 2002, 2005.
 
-A bone's axes are defined in the rest pose, which is that of the CMU database: upright,
-feet and face forwards, arms out with the palms down, legs apart, and the soles at right
-angles to the shanks.
+A bone's axes are defined in the CMU database's rest pose: upright, feet and face
+forwards, arms out with the palms down, legs apart, and the soles at right angles to the
+shanks.
 """
 
 import numpy as np

@@ -7,16 +7,16 @@
 | the built-in motions, which need no data | built_in.py |
 | recorded clips of ten people, with the package | recorded.py |
 | what "instance 17" is: numbers, random streams, variations | instances.py |
-| how joints accelerate, and how far feet slide while they stand | steadiness.py |
+| how joints accelerate, and how far feet slide on the ground | steadiness.py |
 | Acclaim skeletons, such as CMU's `02.asf` | asf.py |
 | Acclaim motions, such as CMU's `02_01.amc`; `read_clip` reads both files | amc.py |
 | lines of text files, with errors that name file and line | lines.py |
 | BVH, of many programs | bvh.py |
-| what the joints of other programs are, by their names | joint_names.py |
+| joints of other programs, recognised by their names | joint_names.py |
 | a motion of another program's skeleton, as one of posefit's | rig.py |
 | files for OpenSim, and for Blender and browsers | opensim.py, gltf.py |
 
-Files are checked in full. A mistake in one raises InputError, which says the file, the
-line, what was expected and what came. Files keep degrees and their own length unit; in
-memory there are radians and metres.
+Files are checked in full. A mistake in one raises InputError, which names the file and
+the line, and says what was expected and what came. Files keep degrees and their own
+length unit; in memory there are radians and metres.
 """

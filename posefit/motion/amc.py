@@ -51,7 +51,7 @@ def read_clip(
         asf: path of the skeleton.
         amc: path of the motion.
         fps: frames per second, by default the file's own rate, or else CMU's.
-        unit: length unit of both files, by default the one that the .asf states.
+        unit: length unit of both files, by default as stated in the .asf.
         up: axis of the world that points up, y by default.
 
     Raises:
@@ -170,9 +170,9 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
             row[start:stop] = line.numbers(stop - start)
         elif number is not None or not line.words:  # the frame is over
             if len(bones_read) < len(spans):
-                missing = quoted(next(bone for bone in spans if bone not in bones_read))
+                missing = [bone for bone in spans if bone not in bones_read]
                 raise line.mistake(
-                    f"bone {missing} in frame {frame}",
+                    f"bone {quoted(missing[0])} in frame {frame}",
                     None if number is None else f"frame {number}",
                 )
             data.extend(row)
@@ -191,7 +191,7 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
 
 
 def _frame_number(line: Line) -> int | None:
-    """Return the number on a line that holds nothing else, or None."""
+    """Return the number on a line that holds only a number, or else None."""
     word = line.key
     if len(line.words) != 1 or len(word) >= 10:
         return None

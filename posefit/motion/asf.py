@@ -54,7 +54,7 @@ class _Bone(NamedTuple):
 
 
 class Acclaim(NamedTuple):
-    """Content of an .asf file: skeleton, metres per unit, and what was guessed."""
+    """Content of an .asf file: skeleton, metres per unit, and guesses."""
 
     skeleton: Skeleton
     metres: float
@@ -70,7 +70,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
 
     Args:
         path: the file.
-        unit: length unit of the file, by default the one that it states.
+        unit: length unit of the file, by default as stated in it.
 
     Raises:
         InputError: the file is not an Acclaim skeleton with the 26 bones; the message
@@ -100,7 +100,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
         if guess is not None:
             wanted = metres_of(guess)
             came += (
-                f"; lengths are taken for {UNIT_NAMES[guess]}: "
+                f"; lengths are taken as {UNIT_NAMES[guess]}: "
                 f"{stature / metres * wanted:.2f} m; --unit sets it"
             )
         notes.append(came)
@@ -114,7 +114,8 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
 def _limits(bones: dict[str, _Bone]) -> Array | None:
     """Return the limits (63, 2) of the joint angles, or None if some are unknown."""
     limits = np.zeros((ANGLES, 2))
-    for name in (JOINTS[joint] for joint in INNER if bones[JOINTS[joint]].free):
+    free_joints = [JOINTS[joint] for joint in INNER if bones[JOINTS[joint]].free]
+    for name in free_joints:
         if bones[name].limits is None:
             return None
         limits[channel_angles(name, bones[name].free)] = bones[name].limits
@@ -178,9 +179,10 @@ def _bones(lines: list[Line], radians: float) -> dict[str, _Bone]:
         if line.key == "begin" and block is None:
             block = {}
         elif block is None or line.key == "begin":
-            raise line.mistake(
-                "'begin'" if block is None else "'end' before the next bone"
-            )
+            expected = "'end' before the next bone"
+            if block is None:
+                expected = "'begin'"
+            raise line.mistake(expected)
         elif line.key == "end":
             for key in ("name", "direction", "length", "axis"):
                 if key not in block:
@@ -282,10 +284,8 @@ def write_asf(path: str | Path, skeleton: Skeleton) -> None:
     )
     text = [header]
     turning = dict(skeleton.channels)
-    channels = [
-        *((name, ()) for name in BONES if name not in turning),
-        *skeleton.channels,
-    ]
+    fixed = [(name, ()) for name in BONES if name not in turning]
+    channels = [*fixed, *skeleton.channels]
     for number, (name, free) in enumerate(channels, 1):
         direction = [1.0, 0.0, 0.0]
         length = 0.0
@@ -307,14 +307,12 @@ def write_asf(path: str | Path, skeleton: Skeleton) -> None:
             f"    axis {_spaced(axis)} XYZ\n{dof}  end\n"
         )
     text.append(":hierarchy\n  begin\n")
-    parents = {
-        name: JOINTS[above] for name, above in zip(BONES, PARENTS[1:], strict=True)
-    }
-    parents |= {
-        name: _FINGERS.get(name, "root")
-        for name, _ in skeleton.channels
-        if name not in JOINTS
-    }
+    parents = {}
+    for name, above in zip(BONES, PARENTS[1:], strict=True):
+        parents[name] = JOINTS[above]
+    for name, _ in skeleton.channels:
+        if name not in JOINTS:
+            parents[name] = _FINGERS.get(name, "root")
     for parent in JOINTS:
         children = [name for name, above in parents.items() if above == parent]
         if children:

@@ -56,11 +56,11 @@ def activity_of(name: str) -> str:
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind: the default training motions."""
     _check(name)
-    return tuple(
-        style
-        for style in _stored()["motions"]
-        if activity_of(style) == activity_of(name) and style != name
-    )
+    styles = []
+    for style in _stored()["motions"]:
+        if activity_of(style) == activity_of(name) and style != name:
+            styles.append(style)
+    return tuple(styles)
 
 
 def person_of(style: str) -> str:
@@ -148,17 +148,16 @@ def _model(name: str) -> tuple[list[int], Array, float, float]:
     _check(name)
     styles = [name] if name in _stored()["motions"] else other_styles(name)
     models = [_stored()["motions"][style] for style in styles]
-    series, period, pace = (
-        np.mean([model[key] for model in models], axis=0)
-        for key in ("series", "period", "speed")
-    )
+    series = np.mean([model["series"] for model in models], axis=0)
+    period = np.mean([model["period"] for model in models], axis=0)
+    pace = np.mean([model["speed"] for model in models], axis=0)
     return models[0]["angles"], series, float(period), float(pace)
 
 
 def _check(name: str) -> None:
     if name not in names():
         raise InputError(
-            "motion must be a file, a folder, a recorded one that posefit motions "
+            "motion must be a file, a folder, a recorded motion that posefit motions "
             f"lists, or one of {', '.join(names())}, "
             f"got {quoted(name)}{suggestion(name, names())}"
         )

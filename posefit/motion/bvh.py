@@ -50,11 +50,8 @@ NAMES = {
     "lowerneck": "Neck",
     "upperneck": "Neck1",
     "head": "Head",
-    **{
-        f"{side[0].lower()}{bone}": f"{side}{name}"
-        for side in ("Left", "Right")
-        for bone, name in _LIMBS.items()
-    },
+    **{f"l{bone}": f"Left{name}" for bone, name in _LIMBS.items()},
+    **{f"r{bone}": f"Right{name}" for bone, name in _LIMBS.items()},
     "lhipjoint": "LHipJoint",
     "rhipjoint": "RHipJoint",
 }
@@ -78,14 +75,14 @@ def read_bvh(
     out, and so are the rotations of toes and hands, and of a head above a neck of two
     joints. Joint angles are counted from the rest pose and about the axes of the CMU
     database, as in its .amc files. The root is where its position channels say; its
-    OFFSET is not added. The motion's `notes` say what was guessed.
+    OFFSET is not added. The motion's `notes` list the guesses.
 
     Args:
         path: the file.
-        unit: its length unit, by default the one in which the person has a plausible
+        unit: its length unit, by default the unit in which the person has a plausible
             stature.
-        up: the world's axis that points up, by default the one that the person stands
-            along.
+        up: the world's axis that points up, by default the axis along which the person
+            stands.
 
     Raises:
         InputError: the file is not a motion of a person; the message has its name.
@@ -105,8 +102,8 @@ def read_bvh(
     chosen = unit or unit_of(stature)
     if chosen is None:
         raise InputError(
-            f"{path}: expected a person of a stature in a unit that is known, "
-            f"or --unit {'|'.join(UNITS)}, got one of {stature:g} units"
+            f"{path}: expected a person whose height is plausible in some unit, "
+            f"or --unit {'|'.join(UNITS)}, got a height of {stature:g}"
         )
     metres = METRES[chosen] if known is None else known
     skeleton = replace(
@@ -116,26 +113,28 @@ def read_bvh(
     if others:
         followed = quoted(rig.names[rig.joints.hips])
         left_out = ", ".join(map(quoted, others))
-        notes.append(f"{path}: the person of {followed} is read; {left_out} left out")
+        notes.append(
+            f"{path}: the person with the root {followed} is read, {left_out} left out"
+        )
     if unit is None and chosen != "m":
         notes.append(
-            f"{path}: lengths are taken for {UNIT_NAMES[chosen]}, "
-            f"as the person stands {stature:.4g} of them; --unit sets it"
+            f"{path}: lengths are taken as {UNIT_NAMES[chosen]}, because the "
+            f"person is {stature:.4g} units tall; --unit sets it"
         )
     elif unit is not None and unit_of(stature * metres) is None:
         notes.append(
-            f"{path}: the person stands {stature * metres:.2f} m "
-            f"with lengths in {UNIT_NAMES[unit]}"
+            f"{path}: with lengths in {UNIT_NAMES[unit]} the person is "
+            f"{stature * metres:.2f} m tall"
         )
     if up is None and axis != "y":
         notes.append(
-            f"{path}: {axis} is taken to be up, as the person stands along it; "
+            f"{path}: {axis} is taken to be up, because the person stands along it; "
             "--up sets it"
         )
     if result.filled:
         notes.append(
-            f"{path}: without {', '.join(result.filled)}, "
-            "which are an average person's at rest"
+            f"{path}: the file lacks {', '.join(result.filled)}; "
+            "they are an average person's, at rest"
         )
     if result.off * metres > MISSED:
         off = f"{1e3 * result.off * metres:.1f} mm off"
@@ -156,7 +155,7 @@ def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
     """Return the axis that is up, such as -z, and the turn (3, 3) from it to y."""
     if up is not None:
         if up not in TURNS:
-            raise InputError(f"an axis up of x, y or z, got {quoted(up)}")
+            raise InputError(f"an upward axis of x, y or z, got {quoted(up)}")
         return up, np.array(TURNS[up], dtype=np.float64)
     number, cosine = upward(rig)
     name: Up = ("x", "y", "z")[number]
@@ -319,7 +318,7 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
     joints = joints_of(names, parents)
     if isinstance(joints, list):
         raise InputError(
-            f"a person's joints, got one without {cut(', '.join(joints), 200)}"
+            f"a person's joints, got a person without {cut(', '.join(joints), 200)}"
         )
     wanted: set[int] = set()  # the joints of the person, and all nodes above them
     for number in (

@@ -33,9 +33,9 @@ class FileOptions(NamedTuple):
     Attributes:
         asf: skeleton of an .amc file; None for the only .asf file in its folder.
         unit: length unit; None to recognise it.
-        up: axis that points up; None for y, or the axis that a .bvh's person stands
-            along.
-        rate: frames per second of an .amc file; None for what it states, or 120.
+        up: axis that points up; None for y, or in a .bvh file for the axis along which
+            the person stands.
+        rate: frames per second of an .amc file; None for the stated rate, or 120.
     """
 
     asf: str | Path | None = None
@@ -135,6 +135,15 @@ def load_motion(
     Raises:
         InputError: there is no such motion, or unit or up is given for a source that is
             not a file.
+
+    Returns:
+        The motion.
+
+    Example:
+        >>> from posefit import load_motion
+        >>> motion = load_motion("walk", fps=60.0)
+        >>> motion.fps, motion.poses.shape[1]
+        (60.0, 66)
     """
     suffix = ""
     if not isinstance(source, Motion) and source not in built_in.names():
@@ -149,14 +158,14 @@ def load_motion(
 
 
 def skeleton_file(amc: Path, asf: str | Path | None) -> Path:
-    """Return the .asf file of an .amc file: the given one, or the only one in reach."""
+    """Return the .asf file of an .amc file: `asf`, or the only one in its folder."""
     if asf is not None:
         return existing(Path(asf))
     existing(amc)
     found = sorted(amc.parent.glob("*.asf"))
     if len(found) != 1:
         raise InputError(
-            f"{amc}: expected --asf or exactly one .asf file beside it, "
+            f"{amc}: expected --asf or exactly one .asf file in its folder, "
             f"got {len(found)}"
         )
     return found[0]
@@ -217,21 +226,19 @@ def _clips(
     source: Source, stated: FileOptions, followed: Source | None
 ) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
-        clips = [
-            clip for clip in recorded.named(source) if clip.name != _stem(followed)
-        ]
+        stem = _stem(followed)
+        clips = [clip for clip in recorded.named(source) if clip.name != stem]
         if not clips:
             raise InputError(
-                "train must hold another clip than the source, "
+                "train must hold a clip other than the source, "
                 f"got {source} for {followed}"
             )
         yield from (recorded_clip(clip) for clip in clips)
     elif not isinstance(source, Motion) and Path(source).is_dir():
-        paths = sorted(
-            path
-            for path in Path(source).iterdir()
-            if path.suffix.lower() in MOTIONS and path.is_file()
-        )
+        paths = []
+        for path in sorted(Path(source).iterdir()):
+            if path.suffix.lower() in MOTIONS and path.is_file():
+                paths.append(path)
         if not paths:
             raise InputError(
                 f"{source}: expected a folder of {' or '.join(MOTIONS)} files, "
@@ -240,8 +247,8 @@ def _clips(
         others = [path for path in paths if not _same(path, followed)]
         if not others:
             raise InputError(
-                f"{source}: expected a folder with another clip than the source, "
-                "got that one alone"
+                f"{source}: expected a folder with a clip other than the source, "
+                "got only that clip"
             )
         yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):

@@ -72,26 +72,23 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     turns = motion.skeleton.turns(motion.poses)
     moved = [(0, "translation", motion.translations)]
     moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]
-    samplers = [
-        {"input": times, "output": data.add(values, None)} for _, _, values in moved
-    ]
-    channels = [
-        {"sampler": k, "target": {"node": node, "path": path}}
-        for k, (node, path, _) in enumerate(moved)
-    ]
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    for node, moving, values in moved:
+        target = {"node": node, "path": moving}
+        channels.append({"sampler": len(samplers), "target": target})
+        samplers.append({"input": times, "output": data.add(values, None)})
+    materials = []
+    for name, colour in COLOURS.items():
+        looks = {**MATT, "baseColorFactor": [*colour, 1.0]}
+        materials.append({"name": name, "pbrMetallicRoughness": looks})
     document = {
         "asset": {"version": "2.0", "generator": "posefit"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": nodes,
         "meshes": meshes,
-        "materials": [
-            {
-                "name": name,
-                "pbrMetallicRoughness": {**MATT, "baseColorFactor": [*colour, 1.0]},
-            }
-            for name, colour in COLOURS.items()
-        ],
+        "materials": materials,
         "animations": [{"name": "track", "samplers": samplers, "channels": channels}],
         "accessors": data.accessors,
         "bufferViews": data.views,
@@ -132,7 +129,9 @@ class _Buffer:
         indices = values.ndim == 1
         raw = values.astype("<u2" if indices else "<f4")
         view = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": raw.nbytes}
-        self.views.append(view if target is None else {**view, "target": target})
+        if target is not None:
+            view["target"] = target
+        self.views.append(view)
         kind = "SCALAR" if indices or raw.shape[1] == 1 else f"VEC{raw.shape[1]}"
         accessor: dict[str, Any] = {
             "bufferView": len(self.views) - 1,
@@ -162,13 +161,11 @@ def _capped_cone(
     rings = [(angle, radii[0], 0.0) for angle in down]
     rings += [(angle, radii[1], length) for angle in up]
     around = np.linspace(0.0, 2.0 * np.pi, RING_CORNERS, endpoint=False)
-    normals = np.array(
-        [
-            (np.cos(a) * np.cos(b), np.sin(a), np.cos(a) * np.sin(b))
-            for a, _, _ in rings
-            for b in around
-        ]
-    )
+    outward = []  # unit vectors, ring by ring
+    for a, _, _ in rings:
+        for b in around:
+            outward.append((np.cos(a) * np.cos(b), np.sin(a), np.cos(a) * np.sin(b)))
+    normals = np.array(outward)
     scale = np.repeat([radius for _, radius, _ in rings], RING_CORNERS)[:, None]
     points = scale * normals + np.repeat(
         [(0.0, base, 0.0) for _, _, base in rings], RING_CORNERS, axis=0

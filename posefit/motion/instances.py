@@ -1,9 +1,9 @@
 """Numbered instances: what "instance 17" is, wherever posefit numbers something.
 
-An instance is a person, their pose or motion, and what cameras see of it. A number
+An instance is a person, their pose or motion, and the cameras' views of it. A number
 means the same instance on every machine and in every version, provided that the other
 settings are the same. Numbers 0 to 9,999 are for training and tuning; 10,000 to 19,999
-are held out. The table says what belongs to a number, and what the number decides.
+are held out. The table lists the settings that belong to a number, and its effects.
 
 | numbered | settings | decided by the number | stream |
 |---|---|---|---|
@@ -14,8 +14,8 @@ are held out. The table says what belongs to a number, and what the number decid
 
 So a sweep's instance 17 of "walk" is the motion of an environment's instance 17 of
 "walk" without held-out people, and both differ from instance 17 of a suite's function.
-Each row has a separate random stream, see `generator`: what one row draws changes
-nothing in another. Instance 0 of a motion is the motion itself.
+Each row has a separate random stream, see `generator`: random numbers of one row do not
+affect another. Instance 0 of a motion is the motion itself.
 """
 
 from collections.abc import Sequence
@@ -98,7 +98,7 @@ class Variation:
 
 @lru_cache(maxsize=256)
 def variation(number: int) -> Variation:
-    """Return how an instance differs from the motion itself, whatever the motion."""
+    """Return how an instance differs from its motion: the same for every motion."""
     if number == 0:
         return Variation(speed=1.0, phase=0.0, turn_degrees=0.0, start=0.0)
     rng = generator("motion", number)

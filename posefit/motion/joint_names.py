@@ -1,11 +1,11 @@
 """Recognises the joints of another program's skeleton by name and position in the tree.
 
-Names of many programs are known: those of Acclaim, the CMU conversions by cgspeed,
+The names of many programs are known: Acclaim, the CMU conversions by cgspeed,
 MotionBuilder and HumanIK, Mixamo, LAFAN1, Bandai Namco, 3ds Max's Biped, Biovision,
 Xsens, Poser, SMPL, Unreal, VRM, Blender and freemocap. Namespaces, prefixes, numbers
-and the way to write a side do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and
-`thigh.L` are the same joint. Limbs are found by the names of their joints; the spine is
-whatever lies between legs and arms.
+and the spelling of sides do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and
+`thigh.L` are the same joint. Limbs are found by the names of their joints; all joints
+between legs and arms are the spine.
 """
 
 import re
@@ -80,9 +80,9 @@ class Part(NamedTuple):
 
 def part_of(name: str) -> Part:
     """Return the content of a joint's name. If no part is known, the part is ""."""
-    words = [
-        word.lower() for word in _WORD.findall(name[-LONGEST_NAME:].rpartition(":")[2])
-    ]
+    # some programs put a namespace before a name, as in `mixamorig:Hips`
+    last = name[-LONGEST_NAME:].rpartition(":")[2]
+    words = [word.lower() for word in _WORD.findall(last)]
     sides: list[str] = []
     rest: list[str] = []
     for word in words:
@@ -133,14 +133,14 @@ class Joints(NamedTuple):
 
 
 def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str]:
-    """Return a person's joints in a tree, or what the tree lacks.
+    """Return a person's joints in a tree, or the names of missing joints.
 
     Args:
         names: names of the nodes, "" for the end of a bone without a further joint.
         parents: their parents, which come before them; -1 for a root.
 
     Returns:
-        The joints, or a list of what is missing.
+        The joints, or a list of missing ones.
     """
     parts = [part_of(name) for name in names]
     paths: list[list[int]] = []  # for each node, the nodes from a root to it
@@ -215,16 +215,13 @@ def _limbs(
 
     def nodes_named(names: set[str]) -> list[int]:
         """Return the nodes with the fewest other words in their names, root first."""
-        nodes = [
-            node
-            for node, part in enumerate(parts)
-            if part.side == side and part.part in names
-        ]
+        nodes = []
+        for node, part in enumerate(parts):
+            if part.side == side and part.part in names:
+                nodes.append(node)
         fewest = min((parts[node].others for node in nodes), default=0)
-        return sorted(
-            (node for node in nodes if parts[node].others == fewest),
-            key=lambda node: len(paths[node]),
-        )
+        plainest = [node for node in nodes if parts[node].others == fewest]
+        return sorted(plainest, key=lambda node: len(paths[node]))
 
     nodes = {joint: nodes_named(names) for joint, (names, _) in _LIMBS.items()}
     # `shoulder` is the arm, unless there is an `upperarm` below: then the clavicle
@@ -248,9 +245,10 @@ def _missing(
     paths: Sequence[Sequence[int]],
 ) -> list[str]:
     """Return what limbs lack: a joint, or its place below the joint before it."""
-    missing = [
-        f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs
-    ]
+    missing = []
+    for side, joint in NEEDED:
+        if (side, joint) not in limbs:
+            missing.append(f"{side} {joint}")
     for side in ("left", "right"):
         for above, below in (*pairwise(LEGS), *pairwise(ARMS)):
             first = limbs.get((side, above))
@@ -269,9 +267,8 @@ def _missing(
 
 def _common(paths: Sequence[Sequence[int]], nodes: Sequence[int]) -> int | None:
     """Return the last node on the paths to all the nodes, or None."""
-    shared = [
-        steps[0]
-        for steps in zip(*(paths[node] for node in nodes), strict=False)
-        if len(set(steps)) == 1
-    ]
-    return shared[-1] if shared else None
+    last = None
+    for steps in zip(*(paths[node] for node in nodes), strict=False):
+        if len(set(steps)) == 1:
+            last = steps[0]
+    return last

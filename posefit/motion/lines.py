@@ -30,7 +30,7 @@ class Line(NamedTuple):
 
         Args:
             expected: what should be there.
-            got: what is there, by default the whole line.
+            got: the actual text, by default the whole line.
         """
         if got is None:
             got = quoted_words(self.words) if self.words else "the end of the file"

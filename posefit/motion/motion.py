@@ -35,11 +35,19 @@ class Motion:
         fps: frames per second.
         first: number of the first frame, in the footage or in the longer motion that
             this one was cut from.
-        notes: what was guessed when a file was read.
+        notes: the guesses that were made when a file was read.
 
     Raises:
         InputError: an array has a wrong shape or is not finite, or the rate is not
             allowed.
+
+    Example:
+        >>> from posefit import Motion, load_motion
+        >>> walk = load_motion("walk")
+        >>> places = walk.translations[:5]
+        >>> part = Motion("part", walk.skeleton, walk.poses[:5], places, 30.0)
+        >>> len(part), part.joints.shape
+        (5, (5, 27, 3))
     """
 
     name: str

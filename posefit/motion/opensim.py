@@ -82,10 +82,9 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
     model = SubElement(document, "Model", name=skeleton.name)
     _text(model, "gravity", (0.0, -9.80665, 0.0))
     SubElement(model, "Ground", name="ground")
-    bodies, joints, marked = (
-        SubElement(SubElement(model, kind, name=kind.lower()), "objects")
-        for kind in ("BodySet", "JointSet", "MarkerSet")
-    )
+    bodies = _objects(model, "BodySet")
+    joints = _objects(model, "JointSet")
+    marked = _objects(model, "MarkerSet")
     free = coordinates(skeleton)
     _body(bodies, "root", ROOT_KILOGRAMS, np.zeros(3), 1e-6 * np.eye(3))
     root = _joint(joints, "CustomJoint", "root", "/ground", np.zeros(3), np.eye(3))
@@ -118,6 +117,11 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
         _marker(marked, markers[bone + 1], name, offset)
     indent(document)
     ElementTree(document).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def _objects(model: Element, kind: str) -> Element:
+    """Return the empty list of objects of a new set of the model, such as BodySet."""
+    return SubElement(SubElement(model, kind, name=kind.lower()), "objects")
 
 
 def _inertia(offset: Array, radii: Array) -> tuple[float, Array, Array]:

@@ -86,9 +86,10 @@ class RecordedClip:
         after = np.minimum(before + 1, len(self) - 1)
         gap = np.maximum(self.times[after] - self.times[before], 1)
         share = ((frames - self.times[before]) / gap)[:, None]
-        poses, translations = (
-            (1.0 - share) * series[before] + share * series[after]
-            for series in (self.poses, self.translations)
+        weight = 1.0 - share  # (n, 1)
+        poses = weight * self.poses[before] + share * self.poses[after]
+        translations = (
+            weight * self.translations[before] + share * self.translations[after]
         )
         return poses, translations
 
@@ -105,9 +106,9 @@ def _stored() -> dict[str, RecordedClip]:
         ends = np.cumsum(stored["counts"], dtype=np.int64)
         changes = stored["changes"].T.astype(np.int64)
         gaps = stored["gaps"].astype(np.int64)
-    skeletons = [
-        stored_skeleton(skeleton["name"], skeleton) for skeleton in skeletons_json
-    ]
+    skeletons = []
+    for skeleton in skeletons_json:
+        skeletons.append(stored_skeleton(skeleton["name"], skeleton))
     clips = {}
     for name, owner, start, stop in zip(
         names, owners, [0, *ends[:-1].tolist()], ends.tolist(), strict=True
@@ -145,8 +146,7 @@ def clip(name: str) -> RecordedClip:
     """
     if not is_recorded(name):
         raise InputError(
-            "a recorded motion must be one that posefit motions lists, "
-            f"got {quoted(name)}"
+            f"a recorded motion must be listed by posefit motions, got {quoted(name)}"
         )
     return _stored()[name]
 
@@ -172,13 +172,14 @@ def clips(
                 f"a subject of the library must be one of {', '.join(people)}, "
                 f"got {quoted(subject)}"
             )
-    chosen = [
-        clip
-        for clip in _stored().values()
-        if clip.subject not in without and clip.subject in only
-    ]
+    chosen = []
+    for clip in _stored().values():
+        if clip.subject in only and clip.subject not in without:
+            chosen.append(clip)
     if not chosen:
-        raise InputError("the library must keep at least one person, got all left out")
+        raise InputError(
+            "the library must keep at least one person, got everybody left out"
+        )
     return chosen
 
 
@@ -204,10 +205,14 @@ def named(name: str) -> Sequence[RecordedClip]:
             f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, "
             f"got {quoted(name)}"
         )
-    return clips(
-        [name for name in people if name[0] != "-"],
-        [name[1:] for name in people if name[0] == "-"],
-    )
+    only = []
+    without = []
+    for person in people:
+        if person[0] == "-":
+            without.append(person[1:])
+        else:
+            only.append(person)
+    return clips(only, without)
 
 
 def leaving_out(name: str, subjects: Iterable[str]) -> str:

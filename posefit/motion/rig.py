@@ -40,8 +40,8 @@ from posefit.motion.built_in import average_skeleton
 from posefit.motion.joint_names import Joints
 
 SAME_PLACE = 1e-4  # share of a leg within which two joints are at the same point
-# degrees: a foot, a clavicle or a bone of the spine that is so near to CMU's rest is
-# kept as it is in the file
+# degrees: a foot, a clavicle or a bone of the spine within this angle of CMU's rest
+# pose is not turned
 AS_IN_FILE = 20.0
 SAME_DIRECTION = 0.5  # degrees: the same for other bones
 UPRIGHT = 60.0  # degrees that legs and trunk may be off in a rest pose
@@ -113,9 +113,10 @@ class Rig:
         The end is the node's farthest End Site, or else the farthest child. `least` is
         how far off it must be.
         """
-        children = [
-            child for child, parent in enumerate(self.parents) if parent == node
-        ]
+        children = []
+        for child, parent in enumerate(self.parents):
+            if parent == node:
+                children.append(child)
         turns, places = self.rest
         ends = [child for child in children if not self.names[child]] or children
         tips = [turns[node].T @ (places[end] - places[node]) for end in ends]
@@ -129,10 +130,10 @@ class Rig:
     def length(self, side: str) -> float:
         """Return the mean length of a leg."""
         places = self.moving[1]
-        thigh, shin, foot = (
-            places[self.joints.limbs[side, joint]]
-            for joint in ("thigh", "shin", "foot")
-        )
+        limbs = self.joints.limbs
+        thigh = places[limbs[side, "thigh"]]
+        shin = places[limbs[side, "shin"]]
+        foot = places[limbs[side, "foot"]]
         lengths = np.linalg.norm(shin - thigh, axis=1)  # (T,)
         lengths = lengths + np.linalg.norm(foot - shin, axis=1)
         return float(lengths.mean())
@@ -171,7 +172,7 @@ class _Bone:
 
     @classmethod
     def between(cls, node: int, start: "_Bone", end: "_Bone", share: float) -> Self:
-        """Return the bone that a node carries, with an end between those of two others.
+        """Return the bone that a node carries, with an end between two other ends.
 
         The end is a share of the way from the first to the second. If these are
         unknown, it is unknown, too.
@@ -227,7 +228,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     legs = [rig.length(side) for side in ("left", "right")]
     scale = float(np.mean(legs)) / average_leg
     if not scale > 0.0:
-        raise InputError("legs with a length, got some without")
+        raise InputError("legs with a length, got a length of 0")
     bones = _bones(rig, scale)
     rest = _like_rest(rig, bones)
     turned, directions, lengths = _bones_at_rest(rig, bones, rest, scale)
@@ -388,18 +389,16 @@ def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
     """
     # (66,) whether there is a turn about an axis that CMU's joints lack
     beyond = (np.abs(poses) > UNUSED).any(axis=0) & ~average.free
-    used = {
-        BONES[joint - 1] for joint in INNER if beyond[angle_index(joint) :][:3].any()
-    }
+    used = []
+    for joint in INNER:
+        angle = angle_index(joint)
+        if beyond[angle : angle + 3].any():
+            used.append(BONES[joint - 1])
     if not used:
         return Skeleton("", offsets, average.axes, average.channels, average.limits)
     free = dict(average.channels) | dict.fromkeys(used, ("rx", "ry", "rz"))
-    return Skeleton(
-        "",
-        offsets,
-        average.axes,
-        tuple((name, free[name]) for name in BONES if name in free),
-    )
+    channels = [(name, free[name]) for name in BONES if name in free]
+    return Skeleton("", offsets, average.axes, tuple(channels))
 
 
 def _bones(rig: Rig, scale: float) -> list[_Bone]:
@@ -419,11 +418,11 @@ def _chest(rig: Rig) -> _Bone:
     limbs = rig.joints.limbs
     if joints.neck:
         return rig.of(joints.neck[0])
-    starts = [
-        (side, "clavicle" if (side, "clavicle") in limbs else "arm")
-        for side in ("left", "right")
-    ]
-    left, right = (rig.of(limbs[start]) for start in starts)
+    ends = []
+    for side in ("left", "right"):
+        joint = "clavicle" if (side, "clavicle") in limbs else "arm"
+        ends.append(rig.of(limbs[side, joint]))
+    left, right = ends
     return _Bone.between(joints.chest, left, right, 0.5)
 
 
@@ -435,10 +434,13 @@ def _neck_and_head(
     `average` has the lengths of an average person's bones.
     """
     joints = rig.joints
-    necks = [
-        rig.of(node) for node in (*joints.neck[1:], joints.head) if node is not None
-    ]
-    last = (joints.chest, *joints.neck)[-1] if joints.head is None else joints.head
+    above_neck = [*joints.neck[1:]]
+    if joints.head is not None:
+        above_neck.append(joints.head)
+    necks = [rig.of(node) for node in above_neck]
+    last = (joints.chest, *joints.neck)[-1]
+    if joints.head is not None:
+        last = joints.head
     tip = None
     if joints.neck or necks:
         tip = rig.tip(last, 0.3 * (average["upperneck"] + average["head"]))
@@ -451,9 +453,8 @@ def _neck_and_head(
         lower = necks[0]
         upper = _Bone.between(last, necks[0], crown, 0.5)
     else:
-        lower, upper = (
-            _Bone.between(last, chest, crown, share) for share in (1 / 3, 2 / 3)
-        )
+        lower = _Bone.between(last, chest, crown, 1 / 3)
+        upper = _Bone.between(last, chest, crown, 2 / 3)
     return {"lowerneck": lower, "upperneck": upper, "head": crown}
 
 
@@ -484,9 +485,9 @@ def _limbs(rig: Rig, side: str, average: Mapping[str, float]) -> dict[str, _Bone
 
 
 def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
-    """Return the three bones of the spine, whatever joints it has.
+    """Return the three bones of the spine, which may have any number of joints.
 
-    Of more than three joints the two with the steadiest distances are taken.
+    If there are more than three joints, the two with the steadiest distances count.
     """
     joints = rig.joints
     root = _Bone(joints.hips, rig.moving[1][joints.hips], rig.rest[1][joints.hips])
@@ -500,7 +501,8 @@ def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
         chain = chain[1:]
     if not chain:
         chain = [
-            _Bone.between(chest.node, root, chest, share) for share in (1 / 3, 2 / 3)
+            _Bone.between(chest.node, root, chest, 1 / 3),
+            _Bone.between(chest.node, root, chest, 2 / 3),
         ]
     elif len(chain) == 1:
         chain.append(_Bone.between(chest.node, chain[0], chest, 0.5))
@@ -584,20 +586,26 @@ def _squared(left: Array, above: Array) -> Array:
     largest = np.abs(axes).argmax(axis=0)  # (3,)
     near[largest, range(3)] = np.sign(axes[largest, range(3)])
     square = abs(np.linalg.det(near) - 1.0) < 1e-9
-    return near if square and np.degrees(geodesic(axes, near)) <= SQUARE else axes
+    if square and np.degrees(geodesic(axes, near)) <= SQUARE:
+        return near
+    return axes
 
 
 def upward(rig: Rig) -> tuple[int, float]:
     """Return the world's axis that legs and trunk point up along, and their cosine.
 
-    The axis is 0 to 2. The cosine is that of the worst limb: -1 is straight down.
+    The axis is 0 to 2. The worst limb decides the cosine: -1 is straight down.
     """
     places = rig.moving[1]
     limbs = rig.joints.limbs
-    thighs, shins, feet, arms = (
-        np.mean([places[limbs[side, joint]] for side in ("left", "right")], axis=0)
-        for joint in ("thigh", "shin", "foot", "arm")
-    )
+    limb_places = {}
+    for joint in ("thigh", "shin", "foot", "arm"):
+        both = [places[limbs[side, joint]] for side in ("left", "right")]
+        limb_places[joint] = np.mean(both, axis=0)  # (T, 3)
+    thighs = limb_places["thigh"]
+    shins = limb_places["shin"]
+    feet = limb_places["foot"]
+    arms = limb_places["arm"]
     along = []
     for low, high in ((shins, thighs), (feet, shins), (thighs, arms)):
         vectors = high - low  # (T, 3)

@@ -52,11 +52,11 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
     distances = np.linalg.norm(feet[after] - feet[before], axis=2)  # (T, 2)
     speed = distances * fps / (after - before)[:, None]
     is_low = low(feet, fps, WINDOW_SECONDS, MAX_STANDING_HEIGHT)
-    stands = (speed < MAX_STANDING_SPEED) & is_low
+    in_stance = (speed < MAX_STANDING_SPEED) & is_low
     for side in range(2):
-        for start, stop in runs(stands[:, side]):
-            stands[start:stop, side] &= stop - start >= MIN_STANDING_SECONDS * fps
-    return np.asarray(stands)
+        for start, stop in runs(in_stance[:, side]):
+            in_stance[start:stop, side] &= stop - start >= MIN_STANDING_SECONDS * fps
+    return np.asarray(in_stance)
 
 
 def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bool_]:
@@ -76,19 +76,19 @@ def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bo
     return np.asarray(feet[:, :, 1] < lowest[:, None] + height)
 
 
-def slides(joints: Array, stands: NDArray[np.bool_]) -> Array:
+def slides(joints: Array, in_stance: NDArray[np.bool_]) -> Array:
     """Return how far a foot slides along the ground in each step (steps,), in metres.
 
     A slide is the greatest distance from where the foot first stood.
 
     Args:
         joints: the joints.
-        stands: whether the left and the right foot stand (T, 2), by `standing`, maybe
-            of another motion.
+        in_stance: whether the left and the right foot are on the ground (T, 2), by
+            `standing`, maybe of another motion.
     """
     slides = []
     for side, ball in enumerate(BALLS):
-        for start, stop in runs(stands[:, side]):
+        for start, stop in runs(in_stance[:, side]):
             places = joints[start:stop, ball][:, [0, 2]]
             slides.append(float(np.linalg.norm(places - places[0], axis=1).max()))
     return np.array(slides)

@@ -50,7 +50,7 @@ class Setup:
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingLog:
-    """The course of a track, and what it did not determine."""
+    """The course of a track, and everything that it did not determine."""
 
     hypotheses: list[dict[str, Any]]
     build: Mapping[str, Any] | None

@@ -37,6 +37,8 @@ SOLID_RADIUS = 0.05
 FAINTEST_RADIUS = 0.3
 FAINTEST = 0.2  # the opacity of the faintest limbs
 _STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
+_TURN = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+_CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])  # the outline of a joint
 SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
 _ENDS = [JOINTS.index(side + name) for side in "lr" for name in ("wrist", "foot")]
 
@@ -204,9 +206,7 @@ def _cones(
 
 
 def _hull(centres: Array, radii: Array) -> Any:
-    angles = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
-    circle = np.column_stack([np.cos(angles), np.sin(angles)])
-    outline = centres[:, None] + radii[:, None, None] * circle
+    outline = centres[:, None] + radii[:, None, None] * _CIRCLE
     return cv2.convexHull(np.rint(outline.reshape(-1, 2) * 16).astype(np.int32))
 
 

@@ -157,7 +157,9 @@ def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
             raise InputError(
                 f"write must be some of {', '.join(WRITERS)}, got {quoted(kind)}{hint}"
             )
-    return tuple(kind for kind in WRITERS if not kinds or kind in kinds | {ALWAYS})
+    if not kinds:
+        return tuple(WRITERS)
+    return tuple(kind for kind in WRITERS if kind in kinds | {ALWAYS})
 
 
 class _Attempt:
@@ -226,7 +228,9 @@ def write_files(
         if write is not None:
             write(folder / name, content)
     pictures = [kind for kind in kinds if WRITERS[kind][1] is None]
-    return _write_pictures(folder, content, pictures) if pictures else []
+    if not pictures:
+        return []
+    return _write_pictures(folder, content, pictures)
 
 
 def _write_pictures(folder: Path, content: Content, kinds: Sequence[str]) -> list[str]:
@@ -259,10 +263,10 @@ def _write_pictures(folder: Path, content: Content, kinds: Sequence[str]) -> lis
         video.run(_write_frame, writer, image)
     video.run(VideoWriter.close, writer)
     summary.failure = painting.failure
-    notes = (
-        "" if content.trust is None else content.trust.sentence,
-        undetermined(content),
-    )
+    trust = ""
+    if content.trust is not None:
+        trust = content.trust.sentence
+    notes = (trust, undetermined(content))
     image = summary.run(painter.summary, table, [*filter(None, notes)])
     summary.run(_write_png, folder / "summary.png", image)
     document = page.run(lambda: track_document(track_data(content, stills)))
@@ -304,7 +308,7 @@ def page_of(content: Content) -> str:
 def _filmed(scene: Scene, warnings: list[str]) -> Iterator[Image | None]:
     """Yield the picture of each frame, then None without end.
 
-    None stands for missing footage, or for footage that cannot be read to its end.
+    None if there is no footage, or if it cannot be read to its end.
     """
     if scene.pictures is not None:
         try:

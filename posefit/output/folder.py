@@ -30,7 +30,7 @@ from posefit.reading import cut, parsed_json, read_text
 RECORD = "frames.jsonl"
 SUMMARY = "summary.json"
 MAX_SUMMARY_BYTES = 10_000_000
-# what a filter carries from the latest frame, and from the frame before that
+# the state that a filter carries from the latest frame, and from the one before
 CARRIED_FILES = ("carried-0.npz", "carried-1.npz")
 # the names of all files that a track writes to its folder
 _WRITTEN = (*FILES, RECORD, *CARRIED_FILES)
@@ -95,7 +95,7 @@ class OutputFolder(Recorder):
                     earlier.remove(_WRITTEN)
                 self._unfinished = Unfinished.begin(self.path, self._spec)
             self.building = self._unfinished.path
-            # read now, so that they are kept whatever fails before the first new frame
+            # read now, to keep them if something fails before the first new frame
             frames, state, damage = read_frames(self.building / RECORD)
         except OSError as error:
             raise InputError(
@@ -145,7 +145,7 @@ class OutputFolder(Recorder):
         if isinstance(error, OSError):
             cause = f"{error.strerror or error}{notice}"
             raise InputError(
-                f"{self.path}: expected room to write to, got {cause}"
+                f"{self.path}: expected room on the disk, got {cause}"
             ) from error
         if notice and isinstance(error, InputError):
             raise InputError(f"{error}{notice}") from error

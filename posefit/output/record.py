@@ -31,7 +31,7 @@ def append_frame(path: Path, frame: Frame, state: Mapping[str, Any]) -> None:
 
 
 def write_carried(path: Path, number: int, state: Mapping[str, Any]) -> None:
-    """Write what a filter carries from the frame of a number to the next.
+    """Write the state that a filter carries from a frame to the next.
 
     See `posefit.fitting.carried`.
     """
@@ -50,7 +50,7 @@ def write_carried(path: Path, number: int, state: Mapping[str, Any]) -> None:
 
 
 def read_carried(path: Path) -> tuple[int, dict[str, Any]] | None:
-    """Return a frame's number and what a filter carried from it.
+    """Return a frame's number, and the state that a filter carried from it.
 
     Returns None if the file does not exist or is damaged.
     """

@@ -1,6 +1,6 @@
 """The text that a track prints.
 
-It compares the method with trivial ones, and names what was not determined and the
+It compares the method with trivial ones, and names everything undetermined and the
 budget.
 """
 
@@ -9,6 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 from posefit.errors import printable
+from posefit.evaluation.errors import flagged
 from posefit.evaluation.measures import BASELINES, MEASURES, Measures
 from posefit.evaluation.trust import trust_line
 from posefit.output.content import Content
@@ -74,12 +75,13 @@ def table(track: Content) -> str:
             "distances and size depend on this guess and on --height"
         )
     if tracks := log.hypotheses:
-        best = next(k for k, hypothesis in enumerate(tracks) if hypothesis["kept"])
-        costs = [
-            f"{hypothesis['guess']} {hypothesis['cost'] + hypothesis['motion']:.2f}"
-            for hypothesis in tracks
-        ]
-        chosen = f"kept track {best + 1} of {len(tracks)}"
+        chosen = ""
+        costs = []
+        for number, hypothesis in enumerate(tracks, 1):
+            cost = hypothesis["cost"] + hypothesis["motion"]
+            costs.append(f"{hypothesis['guess']} {cost:.2f}")
+            if hypothesis["kept"]:
+                chosen = f"kept track {number} of {len(tracks)}"
         lines.append(f"{chosen}; trajectory cost by initial guess: {', '.join(costs)}")
     speed = MEASURES["evaluations_per_second"].number(measures.evaluations_per_second)
     lines.append(f"{_effort(track)}, {speed} poses a second")
@@ -104,19 +106,16 @@ def _error_lines(method: str, measures: Measures) -> list[str]:
         lines.append(
             f"{floor.label:{WIDTH}} {floor.number(measures.prior_floor_degrees):>9}"
         )
-    shown = (
-        _shown(measures, name)
-        for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate")
-    )
+    names = ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate")
+    shown = [_shown(measures, name) for name in names]
     return [*lines, f"{', '.join(shown)} of frames"]
 
 
 def _build_line(build: Mapping[str, Any]) -> str:
-    parts = [
-        f"{name} {factor:.2f} +- {build['spread'][name]:.2f}"
-        for name, factor in build["factors"].items()
-        if abs(factor - 1.0) >= MIN_BUILD_CHANGE
-    ]
+    parts = []
+    for name, factor in build["factors"].items():
+        if abs(factor - 1.0) >= MIN_BUILD_CHANGE:
+            parts.append(f"{name} {factor:.2f} +- {build['spread'][name]:.2f}")
     changes = ", ".join(parts) or "nothing notable"
     stature = f"build: {build['stature_m']:.2f} m tall"
     return f"{stature}; compared with the average: {changes}"
@@ -130,33 +129,34 @@ def held_frames(track: Content) -> str:
     show = "frame shows" if count == 1 else "frames show"
     return (
         f"{count} {show} too little of the person: the pose is held or carried on, "
-        "not searched, and may be wrong; the IoU is that of the other frames"
+        "not searched, and may be wrong; these frames are excluded from the IoU"
     )
 
 
 def undetermined(track: Content) -> str:
-    """Return one sentence about what the method did not determine, or ""."""
-    sides = len(track.log.unknown_sides or ())
-    lost = len(track.log.lost_frames or ())
-    of = f" of {track.setup.frames}"
+    """Return one sentence about everything that a method left undetermined, or ""."""
     parts = []
-    if sides:
-        parts.append(f"left and right: unknown in {_frames(sides, of)}")
-    if lost:
-        # the number of all frames is said once
-        parts.append(f"{_frames(lost, '' if sides else of)} lost")
-    return "; ".join(parts)
+    words = {"unknown_sides": "left and right unknown in", "lost": "lost in"}
+    for name, verb in words.items():
+        frames = flagged(track.table, name)
+        if frames is not None and frames.frames.any():
+            parts.append(f"{verb} {frames.frames.sum()} of {frames.count}")
+    if not parts:
+        return ""
+    return f"{', '.join(parts)} frames that show enough of the person"
 
 
 def gait_line(gait: Mapping[str, Any], *, by_side: bool = True) -> str:
     """Return one line about the gait, or why there are no figures of it."""
     if not gait["walk"]:
         return f"no figures of gait: {gait['why']}"
-    speed = "" if gait["speed"] is None else f", {gait['speed']:.2f} m/s"
-    sides = ", ".join(
-        f"{label} {left} and {right} {unit}"
-        for label, unit, left, right in gait_rows(gait)
-    )
+    speed = ""
+    if gait["speed"] is not None:
+        speed = f", {gait['speed']:.2f} m/s"
+    by_label = []
+    for label, unit, left, right in gait_rows(gait):
+        by_label.append(f"{label} {left} and {right} {unit}")
+    sides = ", ".join(by_label)
     label = "gait: " if by_side else ""
     cadence = f"{gait['cadence']:.0f} steps a minute"
     parts = [f"{label}{cadence}{speed}, over {gait['steps']} steps"]
@@ -174,12 +174,15 @@ def gait_rows(gait: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
     """
     rows = []
     for name, label, unit, factor, digits in GAIT_ROWS:
-        values = [gait[side][name] for side in ("left", "right")]
-        if values != [None, None]:
-            left, right = (
-                "-" if value is None else f"{factor * value:.{digits}f}"
-                for value in values
-            )
+        texts = []
+        for side in ("left", "right"):
+            value = gait[side][name]
+            text = "-"
+            if value is not None:
+                text = f"{factor * value:.{digits}f}"
+            texts.append(text)
+        if texts != ["-", "-"]:
+            left, right = texts
             rows.append((label, unit, left, right))
     return rows
 
@@ -207,10 +210,6 @@ def _effort(track: Content) -> str:
     besides = f" (and {', '.join(others)})" if others else ""
     evaluations = f"{frame:,.0f}{of} evaluations{besides}"
     return f"{_shown(measures, 'iou')}, {evaluations} and {seconds} ms a frame"
-
-
-def _frames(count: int, of: str) -> str:
-    return f"{count}{of} frame{'' if count == 1 and not of else 's'}"
 
 
 def _shown(measures: Measures, name: str) -> str:

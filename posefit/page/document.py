@@ -42,7 +42,7 @@ def assembled(mark: str, markup: str, style: str, data: Any, script: str) -> str
 
 
 def one_script(package: str, names: Sequence[str]) -> str:
-    """Return the shared scripts and those of a package as one script.
+    """Return the shared scripts and a package's scripts as one script.
 
     Its names are not global.
     """
@@ -52,7 +52,7 @@ def one_script(package: str, names: Sequence[str]) -> str:
 
 
 def embedded(value: Any) -> str:
-    """Return JSON that is safe in a script element, whatever texts it holds.
+    """Return JSON that is safe in a script element, with any texts.
 
     Nan and infinities are null.
     """
@@ -66,9 +66,9 @@ def _json(value: Any) -> str:
     Python objects take much memory.
     """
     if isinstance(value, dict):
-        items = [
-            f"{json.dumps(str(name))}:{_json(inner)}" for name, inner in value.items()
-        ]
+        items = []
+        for name, inner in value.items():
+            items.append(f"{json.dumps(str(name))}:{_json(inner)}")
         return f"{{{','.join(items)}}}"
     return json.dumps(plain(value), allow_nan=False, separators=(",", ":"))
 
@@ -96,11 +96,13 @@ def plain(value: Any) -> Any:
     return value
 
 
+def _variables(colours: dict[str, str]) -> str:
+    return "".join(f" --{name}: {colour};" for name, colour in colours.items())
+
+
 def colour_style(light: dict[str, str], dark: dict[str, str]) -> str:
     """Return named colours as variables of a page's style, for light and dark."""
-    bright, dim = (
-        "".join(f" --{name}: {colour};" for name, colour in scheme.items())
-        for scheme in (light, dark)
-    )
+    bright = _variables(light)
+    dim = _variables(dark)
     in_the_dark = "@media (prefers-color-scheme: dark)"
     return f":root {{{bright} }}\n{in_the_dark} {{ :root {{{dim} }} }}\n"

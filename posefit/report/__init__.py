@@ -13,7 +13,7 @@ r"""The report of a ledger: a page for any browser, figures for papers, and tabl
 | looking for | file |
 |---|---|
 | the steps of the command, and its checks | write.py |
-| the table of runs, and the protocol of a kind of runs | kind.py |
+| the table of runs, and the contest of the methods that share some | contest.py |
 | reading the rows of a ledger into that table | runs.py |
 | tracks, with the error with losses | tracks.py |
 | single searches | searches.py |
@@ -25,6 +25,7 @@ r"""The report of a ledger: a page for any browser, figures for papers, and tabl
 | the data of the page | content.py |
 | the page: markup, style and scripts as one document | page/ |
 | charts by matplotlib, and the folder of a paper's figures | figures.py |
+| single searches as files of COCO | coco.py |
 | running a row again, with or without a ledger | repeat.py |
 
 Statistics are in `posefit.statistics`.

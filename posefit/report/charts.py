@@ -11,7 +11,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.report.columns import mean
-from posefit.report.kind import Contest
+from posefit.report.contest import Contest
 from posefit.statistics.means import Intervals, block_means
 from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
@@ -150,10 +150,11 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     joints = contest.runs.data["joint_errors"][contest.blocks]  # (methods, blocks, 27)
     if not np.isfinite(joints).all():
         return []
-    return [
-        block_means(method_errors.T.astype(np.float64), contest.instance)
-        for method_errors in joints
-    ]
+    intervals = []
+    for method_errors in joints:
+        values = method_errors.T.astype(np.float64)  # (27, blocks)
+        intervals.append(block_means(values, contest.instance))
+    return intervals
 
 
 def certainty(contest: Contest) -> dict[str, Any] | None:

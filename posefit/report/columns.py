@@ -37,9 +37,9 @@ class Column:
     """A figure of a run.
 
     Attributes:
-        name: Its name in a row of a ledger, in the CSV, in the report's data and on the
-            page. `coverage.80` is the entry `80` of the row's `coverage`.
-        measure: Its label, unit, digits and meaning.
+        measure: Its name, label, unit, digits and meaning. The name is the same in a
+            row of a ledger, in the CSV, in the report's data and on the page.
+            `coverage.80` is the entry `80` of the row's `coverage`.
         compute: Computes it from a row, if rows do not have it.
         higher_is_better: Whether a higher value is better.
         in_tables: Whether tables show it.
@@ -48,13 +48,17 @@ class Column:
         average: Returns the average of several runs.
     """
 
-    name: str
     measure: Measure
     compute: Callable[[Mapping[str, Any]], float] | None = None
     higher_is_better: bool = False
     in_tables: bool = True
     optional: bool = False
     average: Callable[[Array], float | None] = mean
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.measure.name
 
     def value(self, row: Mapping[str, Any]) -> float:
         """Return the figure of a row, or nan if the row does not have it."""
@@ -91,7 +95,7 @@ class Score:
         points: The unit of differences between values.
         digits: Its digits after the point.
         down: Whether a higher value is better.
-        paired: What the tests pair, in the plural: runs or instances.
+        paired: The blocks of paired tests, in the plural: runs or instances.
         caption: The caption of the first figure.
         leaderboard: The text above the leaderboard.
     """

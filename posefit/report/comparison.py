@@ -37,6 +37,12 @@ class Comparison:
     Attributes:
         folder: The folder of the ledger.
         tally: How many cells are done, failed and quarantined.
+
+    Example:
+        >>> import posefit
+        >>> result = posefit.compare(["random@pca"], seeds=1, frames=2, evaluations=40)
+        >>> [row["spec"]["method"] for row in result.rows()]
+        ['random@pca']
     """
 
     folder: Path
@@ -127,6 +133,12 @@ def compare(
 
     Raises:
         InputError: An argument is wrong.
+
+    Example:
+        >>> import posefit
+        >>> result = posefit.compare(["random@pca"], seeds=1, frames=2, evaluations=40)
+        >>> result.tally.done
+        1
     """
     factories: dict[str, tuple[Callable[..., Any], str]] = {}
     # makes the keys of this call differ from all earlier ones of the same factories
@@ -137,14 +149,16 @@ def compare(
     for name in ("views", "corruptions", "instances"):
         if name in lists:
             crossed[name] = lists.pop(name)
-    grid = {"grid": lists.pop("grid")} if "grid" in lists else {}
+    grid = {}
+    if "grid" in lists:
+        grid["grid"] = lists.pop("grid")
     plan = Plan.of({"product": crossed, "defaults": lists, **grid})
     folder = _temporary_folder() if out is None else Path(out)
     say = interactive().log
     if factories and folder.exists():
         names = ", ".join(factories)
         say(
-            f"cells of {names} run again, whatever {folder} holds: "
+            f"cells of {names} run again, although {folder} may hold them: "
             "only rows of registered methods are reused"
         )
     pool = Pool(

@@ -8,7 +8,7 @@ from typing import Any
 
 from posefit.errors import printable
 from posefit.reading import counted
-from posefit.report.kind import Contest, Runs
+from posefit.report.contest import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.page import COLOUR_COUNT
 from posefit.report.summary import leader_sentences, unpaired_sentence
@@ -34,9 +34,18 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
     kind = runs.kind
     date = time.strftime("%d %B %Y", time.localtime(ledger.changed))
     # each text once, as many runs have the same
-    warnings = list(
-        dict.fromkeys(text for texts in runs.warnings.values() for text in texts)
-    )
+    warnings: list[str] = []
+    for texts in runs.warnings.values():
+        warnings += texts
+    warnings = list(dict.fromkeys(warnings))
+    # the texts of a row by their places in `warnings`
+    place_of = {text: k for k, text in enumerate(warnings)}
+    warned = {}
+    for row, texts in runs.warnings.items():
+        warned[row] = [place_of[text] for text in texts]
+    methods = []
+    for name, settings in zip(runs.methods, runs.settings, strict=True):
+        methods.append({"name": name, "settings": settings})
     answer = "No run has an error: nothing can be compared."
     if runs.failures:
         answer = "Every cell failed."
@@ -46,20 +55,14 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
         "ledger": printable(shlex.quote(ledger.path.name or str(ledger.path))),
         "answer": [answer],
         "header": _header(runs, contest),
-        "methods": [
-            {"name": n, "settings": v["settings"]}
-            for n, v in zip(runs.methods, runs.variants, strict=True)
-        ],
+        "methods": methods,
         "instances": [{"name": name} for name in runs.instances],
         "baseline_names": kind.baselines,
         "colours": COLOUR_COUNT,
         "columns": {name: kind.columns[name].as_dict() for name in runs.table_figures},
         "score": vars(kind.score),
         "warnings": warnings,
-        "warned": {
-            row: [warnings.index(text) for text in texts]
-            for row, texts in runs.warnings.items()
-        },
+        "warned": warned,
         "failures": runs.failures,
     }
     if contest is not None:
@@ -91,10 +94,12 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         **runs.kind.facts(runs),
         "posefit": runs.values("version"),
     }
-    texts = {
-        name: fact if isinstance(fact, str) else "; ".join(map(str, fact))
-        for name, fact in facts.items()
-    }
+    lines = []
+    for name, fact in facts.items():
+        text = fact
+        if not isinstance(fact, str):
+            text = "; ".join(map(str, fact))
+        lines.append([name, printable(text)])
     runs_words = f"{len(runs):,} {runs.kind.noun}"
     if len(runs) == 1:
         runs_words = counted(1, runs.kind.name)
@@ -102,7 +107,7 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
     return {
         "version": runs.version,
         "summary": f"{runs_words} by {counted(len(runs.methods), 'method')}; {failed}.",
-        "facts": [[name, printable(text)] for name, text in texts.items()],
+        "facts": lines,
         "notes": _notes(runs, contest),
         "done": len(runs),
         "failed": len(runs.failures),
@@ -122,25 +127,25 @@ def _problems(
 
     def add(text: str, details: Sequence[str], most: int) -> None:
         """Add a problem with at most `most` details."""
-        more = [f"and {len(details) - most:,} more"] if len(details) > most else []
-        problems.append((text, [*details[:most], *more]))
+        named = list(details[:most])
+        if len(details) > most:
+            named.append(f"and {len(details) - most:,} more")
+        problems.append((text, named))
 
     if runs.failures:
-        failures_by_method = Counter(failure["method"] for failure in runs.failures)
-        reasons = Counter(
-            reason for failure in runs.failures for reason in failure["reasons"]
-        ).most_common()
-        text = "; ".join(
-            f"{name} {count}" for name, count in failures_by_method.items()
-        )
+        reasons: Counter[str] = Counter()
+        for failure in runs.failures:
+            reasons.update(failure["reasons"])
+        text = "; ".join(f"{name} {count}" for name, count in runs.failed.items())
         failed = counted(len(runs.failures), "cell")
         add(
             f"{failed} failed, left out of all figures: {text}",
-            [f"{n} x {reason}" for reason, n in reasons],
+            [f"{n} x {reason}" for reason, n in reasons.most_common()],
             REASONS,
         )
-    if runs.unfinished:
-        names = "; ".join(runs.unfinished)
+    unfinished = [name for name in runs.failed if name not in runs.methods]
+    if unfinished:
+        names = "; ".join(unfinished)
         add(f"no cell finished, so not on the leaderboard: {names}", [], 0)
     if unpaired:
         add(unpaired, [], 0)
@@ -155,12 +160,12 @@ def _problems(
         text = f"left out of the comparison, for every method: {instances}"
         add(text, details, MAX_MISSING)
     if runs.warnings:
-        texts = Counter(
-            text for texts in runs.warnings.values() for text in texts
-        ).most_common()
+        warnings: Counter[str] = Counter()
+        for texts in runs.warnings.values():
+            warnings.update(texts)
         add(
             f"{counted(len(runs.warnings), 'run')} with a warning",
-            [f"{n} x {text}" for text, n in texts],
+            [f"{n} x {warning}" for warning, n in warnings.most_common()],
             REASONS,
         )
     return problems
@@ -177,9 +182,10 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
                 f"Methods are compared on the {size:,} of {len(runs):,} runs that all "
                 f"of them share: {instances} with {contest.seed_words}."
             )
-        others = [
-            name for m, name in enumerate(runs.methods) if m not in contest.methods
-        ]
+        others = []
+        for m, name in enumerate(runs.methods):
+            if m not in contest.methods:
+                others.append(name)
         if others:
             notes.append(
                 "Too few runs in common with the others, so not compared: "

@@ -10,7 +10,7 @@ from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
 from posefit.report.charts import Chart, track_charts
 from posefit.report.columns import Score
-from posefit.report.kind import Row, Runs
+from posefit.report.contest import Row, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.page import LIGHT
 from posefit.report.table import board_rows
@@ -63,7 +63,9 @@ def chart_figure(
         line = chart.lines[k]
         if line is None:
             continue
+        # from the eighth method on, colours repeat with another line style
         colour = COLOURS[numbers[k] % len(COLOURS)]
+        # steps, because a best cost holds until the next improvement
         axes.plot(
             line.x,
             line.y,
@@ -188,18 +190,19 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     """
     contest = contest_of(runs)
     if contest is None:
-        raise InputError("figures must be of runs with errors, got none")
+        raise InputError("figures need runs with errors, got none")
     board = leaderboard(contest)
     names = [runs.methods[m] for m in contest.methods]
-    order = [
-        contest.methods.index(row["method"]) for row in board if row["taking_part"]
-    ]
+    order = []
+    for row in board:
+        if row["taking_part"]:
+            order.append(contest.methods.index(row["method"]))
     score = runs.kind.score
-    baselines = [
-        (runs.kind.baselines[row["baseline"]], row[score.name])
-        for row in runs.kind.baseline_rows(contest)
-        if row[score.name] is not None
-    ]
+    baselines = []
+    for row in runs.kind.baseline_rows(contest):
+        if row[score.name] is not None:
+            title = runs.kind.baselines[row["baseline"]]
+            baselines.append((title, row[score.name]))
     figures = {"leaderboard": board_figure(score, board, baselines)}
     for chart in track_charts(contest):
         figures[chart.name] = chart_figure(names, chart, contest.methods, order)

@@ -4,7 +4,7 @@ import math
 from dataclasses import astuple
 from typing import Any
 
-from posefit.report.kind import Contest, Runs
+from posefit.report.contest import Contest, Runs
 from posefit.statistics.paired import SIGNIFICANCE
 from posefit.statistics.pairing import most_shared
 
@@ -35,7 +35,7 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     1. Methods that are not shown to be worse than the method of the best score, with p
        of the paired test not below 0.05. They are sorted by the number of lost tracks,
        because no difference of their errors is shown. So no method that loses tracks is
-       ahead of one that is as good and loses none.
+       ahead of an equally good method that loses none.
     2. The other methods that take part, by their score.
     3. Methods that do not take part, with the averages of all their own runs.
 
@@ -52,15 +52,16 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     runs = contest.runs
     score = runs.kind.score
     more = runs.kind.board(contest)
+    settings = runs.settings
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
         rows = contest.rows_of(m)
         row = {
             "method": m,
             "name": name,
-            "settings": runs.variants[m]["settings"],
+            "settings": settings[m],
             "runs": len(rows),
-            "failed": runs.failed[m],
+            "failed": runs.failed[name],
             "warned": sum(k in runs.warnings for k in rows.tolist()),
             "taking_part": m in contest.methods,
         }
@@ -75,6 +76,8 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
             return math.inf, 0.0
         return (-value if score.down else value), row.get("above", 0.0)
 
+    # the method of the best score comes first only if it lost no more than others that
+    # a test does not separate from it
     best = min((row for row in board if row["taking_part"]), key=badness)
     best_place = contest.methods.index(best["method"])
     worse_methods = set()
@@ -100,9 +103,9 @@ def _effects(contest: Contest, first: int) -> dict[int, dict[str, float | None]]
     They are None for a method without a test.
     """
     place = contest.methods.index(first)
-    effects: dict[int, dict[str, float | None]] = {
-        m: dict.fromkeys(EFFECT) for m in range(len(contest.runs.methods))
-    }
+    effects: dict[int, dict[str, float | None]] = {}
+    for m in range(len(contest.runs.methods)):
+        effects[m] = dict.fromkeys(EFFECT)
     for pair in contest.comparisons:
         if place not in (pair.first, pair.second):
             continue

@@ -22,7 +22,7 @@ LAST_FIELDS = ("instance", "seed")
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
 MAX_SHOWN = 12  # the most differing figures that are listed
 _BEGIN = "posefit sweep - --out rerun <<'END'\n"
-# characters that TOML or a terminal does not allow, beyond those that JSON escapes
+# characters that JSON does not escape, but TOML or a terminal does not allow
 _ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x2029)}
 
 
@@ -87,8 +87,12 @@ def _differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str
         return [*lines, f"it failed: {'; '.join(now['reasons'])}"]
     if earlier["status"] != "done":
         return [*lines, "it had failed, and is done now"]
-    names = [name for name in after if name not in (*TIMES, "key", "version")]
-    differing = [name for name in names if before.get(name) != after[name]]
+    differing = []
+    for name, value in after.items():
+        if name in (*TIMES, "key", "version"):
+            continue
+        if before.get(name) != value:
+            differing.append(name)
     for name in differing[:MAX_SHOWN]:
         lines.append(f"{name}: {before.get(name)} before, {after[name]} now")
     if len(differing) > MAX_SHOWN:
@@ -106,14 +110,13 @@ def plan_tables(spec: Mapping[str, Any]) -> dict[str, Any]:
     if spec["name"]:
         method["name"] = spec["name"]
     method["settings"] = spec["settings"]
-    lists = {
-        f"{name}s": [spec[name]]
-        for name in ("function", "dimension", "instance", "seed")
-    }
     return {
         "suite": spec["suite"],
         "methods": [method],
-        **lists,
+        "functions": [spec["function"]],
+        "dimensions": [spec["dimension"]],
+        "instances": [spec["instance"]],
+        "seeds": [spec["seed"]],
         "budgets": [spec["evaluations"] // spec["dimension"]],
         "infeasible": spec["infeasible"],
     }
@@ -138,15 +141,17 @@ def command_head(spec: Mapping[str, Any]) -> str:
 
 def _track_fields(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a track's cell in a plan, except `LAST_FIELDS`."""
-    fields = {
-        name: spec[name] for name in FIELDS if name in spec and name not in LAST_FIELDS
-    }
+    fields = {}
+    for name in FIELDS:
+        if name in spec and name not in LAST_FIELDS:
+            fields[name] = spec[name]
     if not fields.get("name", True):
         del fields["name"]
     # TOML has no null, so write settings as texts, which are parsed when they are read
-    fields["settings"] = {
-        name: setting_text(value) for name, value in spec["settings"].items()
-    }
+    settings = {}
+    for name, value in spec["settings"].items():
+        settings[name] = setting_text(value)
+    fields["settings"] = settings
     return fields
 
 

@@ -1,8 +1,8 @@
 """Reads the finished rows of a ledger into a table, which holds a hundred thousand."""
 
 import json
-from collections import Counter
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from array import array
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +11,11 @@ import numpy as np
 from posefit.errors import InputError, printable
 from posefit.reading import quoted, suggestion
 from posefit.report.columns import listed
-from posefit.report.kind import Kind, Runs
-from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
+from posefit.report.contest import Kind, Runs
+from posefit.report.repeat import repeat_command
 from posefit.report.searches import SEARCHES
 from posefit.report.tracks import TRACKS
-from posefit.settings import setting_text, settings_text
+from posefit.settings import setting_text
 from posefit.sweep.cell import cell_from, other_version
 
 if TYPE_CHECKING:
@@ -40,57 +40,45 @@ class _Distinct:
 
     def __init__(self) -> None:
         self.values: list[dict[str, Any]] = []
-        self._numbers: dict[Hashable, int] = {}
+        self._numbers: dict[str, int] = {}
 
     def number(self, value: dict[str, Any]) -> int:
         """Return the number of a value, and add it if it is new."""
-        if (key := _frozen(value)) not in self._numbers:
+        key = _text(value)
+        if key not in self._numbers:
             self._numbers[key] = len(self.values)
             self.values.append(value)
         return self._numbers[key]
 
 
-def _frozen(value: Any) -> Hashable:
-    """Return a hashable key of a JSON value. The keys of 1, 1.0 and true differ."""
-    if isinstance(value, dict):
-        return tuple(sorted((name, _frozen(inner)) for name, inner in value.items()))
-    if isinstance(value, list):
-        return tuple(map(_frozen, value))
-    if isinstance(value, str):
-        return value
-    # as 1 == 1.0 == True in Python
-    return type(value), value
-
-
 class _Rows:
-    """The finished rows of a ledger in its order.
-
-    Their methods, instances and heads of commands are numbered.
+    """The rows of a ledger in its order, with numbered methods and instances.
 
     Raises InputError if the ledger has no row, finished or quarantined, or has both
     tracks and searches.
     """
 
-    def __init__(
-        self, ledger: "Ledger", quarantined: Sequence[Mapping[str, Any]]
-    ) -> None:
+    def __init__(self, ledger: "Ledger") -> None:
         self.methods = _Distinct()
         self.places = _Distinct()
-        self.heads = _Distinct()
-        # the numbers of each row's instance, method and head
-        self.numbers: list[tuple[int, int, int]] = []
+        # of each finished row
+        self.method: list[int] = []
+        self.place: list[int] = []
         self.seeds: list[int] = []  # of any size, so not an array
         self.keys: list[str] = []
         self.warnings: list[tuple[str, ...]] = []
-        self.measured: list[tuple[Array, tuple[Any, ...]]] = []
+        # one after the other: an array for each of a million rows takes twice as much
+        self.figures = array("d")
+        self.data: list[tuple[Any, ...]] = []
+        self.quarantined = ledger.quarantined()
         shared: dict[bytes, Any] = {}  # arrays that many rows have in common
         kinds = set[str]()
-        for row in chain(ledger.rows(), quarantined):
+        for row in chain(ledger.rows(), self.quarantined):
             kinds.add(row["spec"]["kind"])
             if len(kinds) > 1:
                 raise InputError(
-                    f"{ledger.path}: expected a ledger of tracks or one of single "
-                    "searches, got both in one"
+                    f"{ledger.path}: expected a ledger of either tracks or single "
+                    "searches, got both"
                 )
             if row["status"] == "done":
                 try:
@@ -100,25 +88,25 @@ class _Rows:
                     raise ledger.damaged_row(row["key"], error) from None
         if not kinds:
             raise InputError(
-                f"{ledger.path}: expected a ledger with finished rows, "
-                "got one with none"
+                f"{ledger.path}: expected a ledger with finished rows, got none"
             )
         self.kind = KINDS[kinds.pop()]
+        # methods that only failed have the numbers from here on
+        self.finished_methods = len(self.methods.values)
+        self.failed_method = [
+            self.methods.number(_variant(cell["spec"])) for cell in self.quarantined
+        ]
 
     def _add(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> None:
         spec = row["spec"]
-        place = self.places.number(_place(spec))
-        method = self.methods.number(_variant(spec))
-        first_fields = {
-            name: value for name, value in spec.items() if name not in LAST_FIELDS
-        }
-        head = self.heads.number(first_fields)
-        self.numbers.append((place, method, head))
+        figures, data = KINDS[spec["kind"]].read(row, shared)
+        self.figures.extend(figures.tolist())
+        self.data.append(data)
+        self.method.append(self.methods.number(_variant(spec)))
+        self.place.append(self.places.number(_place(spec)))
         self.seeds.append(int(spec["seed"]))
         self.keys.append(row["key"])
-        self.warnings.append(tuple(row["warnings"]))
-        figures, data = KINDS[spec["kind"]].read(row, shared)
-        self.measured.append((figures.astype(float), data))
+        self.warnings.append(tuple(map(printable, row["warnings"])))
 
 
 def runs_of(
@@ -132,8 +120,8 @@ def runs_of(
         ledger: An open ledger, of tracks or of single searches.
         methods: The methods whose runs are returned, by their names in the report or in
             the plan. All if empty.
-        latest: Whether to return only one version of each method: the installed one, or
-            else the one that was planned last.
+        latest: Whether to return only one version of each method: the installed
+            version, or else the one planned last.
 
     Returns:
         The runs, and the failures. If every cell failed, there are no runs.
@@ -142,149 +130,127 @@ def runs_of(
         ValueError: The ledger has neither a row nor a failure, or both tracks and
             single searches, or no method has one of the names.
     """
-    quarantined = ledger.quarantined()
-    rows = _Rows(ledger, quarantined)
+    rows = _Rows(ledger)
     kind = rows.kind
-    # methods that only failed have the numbers from here on
-    count = len(rows.methods.values)
-    failed_method = [
-        rows.methods.number(_variant(cell["spec"])) for cell in quarantined
-    ]
-    variants = rows.methods.values
-    numbers = np.array(rows.numbers, dtype=int).reshape(-1, 3)
-    figures = np.array([values for values, _ in rows.measured], dtype=float)
-    figures = figures.reshape(-1, len(kind.columns))
+    figures = np.array(rows.figures).reshape(-1, len(kind.columns))
+    method_of_row = np.array(rows.method, dtype=int)
+    place_of_row = np.array(rows.place, dtype=int)
+    score = figures[:, list(kind.columns).index(kind.score.name)]
+    label_of = _labels(rows, method_of_row, score, latest)
+    chosen = _named(methods, label_of, rows) if methods else list(label_of)
+    finished = [m for m in chosen if m < rows.finished_methods]
 
-    chosen = _latest(variants) if latest else range(len(variants))
-    scores = figures[:, list(kind.columns).index(kind.score.name)]
-    badness = np.nan_to_num(-scores if kind.score.down else scores, nan=np.inf)
-    means = [badness[numbers[:, 1] == m].mean() for m in range(count)]
-    means += [np.inf] * (len(variants) - count)
-    best_first = sorted(
-        chosen, key=lambda m: (m >= count, means[m], _text(variants[m]))
-    )
-    labels = distinct(
-        [variants[m]["name"] or variants[m]["method"] for m in best_first],
-        [_variation(variants[m]) for m in best_first],
-    )
-    label_of = dict(zip(best_first, labels, strict=True))
-    if methods:
-        best_first = _named(methods, best_first, variants, label_of)
-    finished = [m for m in best_first if m < count]
-    place_of_method = {m: k for k, m in enumerate(finished)}
-
-    # the rows and the quarantined cells of these methods
-    retained = [k for k, row in enumerate(rows.numbers) if row[1] in place_of_method]
-    cells = [
-        (cell, label_of[m])
-        for cell, m in zip(quarantined, failed_method, strict=True)
-        if m in best_first
-    ]
-    failed = Counter(name for _, name in cells)
-
-    # their instances, in order, with the details that may distinguish equal names
-    present = sorted({rows.numbers[k][0] for k in retained})
-    values = rows.places.values
+    # the rows of these methods, sorted by instance, method and seed
+    method = _positions(finished, len(rows.methods.values))[method_of_row]
+    retained = np.flatnonzero(method >= 0)
+    places = rows.places.values
     place_order = sorted(
-        present, key=lambda i: (kind.rank(values[i]), _text(values[i]))
+        np.unique(place_of_row[retained]).tolist(),
+        key=lambda i: (kind.rank(places[i]), _text(places[i])),
     )
-    places = [values[i] for i in place_order]
-    details = []
-    for place in places:
-        unnamed = {
-            name: _text(value).strip('"')
-            for name, value in place.items()
-            if name not in kind.named
-        }
-        details.append(unnamed)
+    instance = _positions(place_order, len(places))[place_of_row]
+    retained_seeds = np.array([rows.seeds[k] for k in retained], dtype=object)
+    seeds, seed = np.unique(retained_seeds, return_inverse=True)
+    order = np.lexsort((seed, method[retained], instance[retained]))
+    numbers = retained[order].tolist()
 
-    commands = {
-        head: command_head(rows.heads.values[head])
-        for head in {rows.numbers[k][2] for k in retained}
-    }
-    heads = sorted(set(commands.values()))
-    place_of_command = {command: k for k, command in enumerate(heads)}
-    place_of_instance = {i: k for k, i in enumerate(place_order)}
-    rising = sorted({rows.seeds[k] for k in retained})
-    place_of_seed = {seed: k for k, seed in enumerate(rising)}
-
-    def index(row: int) -> tuple[int, int, int, int]:
-        """Return the instance, method, seed and command of a row."""
-        instance, method, head = rows.numbers[row]
-        return (
-            place_of_instance[instance],
-            place_of_method[method],
-            place_of_seed[rows.seeds[row]],
-            place_of_command[commands[head]],
-        )
-
-    indices = {k: index(k) for k in retained}
-    order = sorted(retained, key=indices.__getitem__)
-    table = np.array([indices[k] for k in order], dtype=int).reshape(-1, 4).T
-    finished_variants = []
-    for m in finished:
-        settings = printable(", ".join(settings_text(variants[m]["settings"])))
-        finished_variants.append({**variants[m], "settings": settings})
-    columns = zip(*(rows.measured[k][1] for k in order), strict=True)
+    columns = zip(*(rows.data[k] for k in numbers), strict=True)
     data: dict[str, Any] = {}
     # without rows there are no columns
     for name, column in zip(kind.data, columns, strict=False):
-        data[name] = np.array(column) if isinstance(column[0], np.ndarray) else column
+        data[name] = column
+        if isinstance(column[0], np.ndarray):
+            data[name] = np.array(column)
+    warnings = {}
+    for place, k in enumerate(numbers):
+        if rows.warnings[k]:
+            warnings[place] = rows.warnings[k]
+    failures = []
+    for cell, m in zip(rows.quarantined, rows.failed_method, strict=True):
+        if m in chosen:
+            failures.append(_failure(cell, label_of[m]))
     return Runs(
         kind=kind,
         version=ledger.version,
         methods=tuple(label_of[m] for m in finished),
-        variants=tuple(finished_variants),
-        instances=distinct([kind.place_name(place) for place in places], details),
-        places=tuple(places),
-        instance=table[0],
-        method=table[1],
-        seed=table[2],
-        head=table[3],
-        seeds=tuple(rising),
-        keys=tuple(rows.keys[k] for k in order),
-        figures=dict(zip(kind.columns, figures[order].T, strict=True)),
+        variants=tuple(rows.methods.values[m] for m in finished),
+        instances=_instance_names(kind, [places[i] for i in place_order]),
+        places=tuple(places[i] for i in place_order),
+        method=method[numbers],
+        instance=instance[numbers],
+        seed=seed[order],  # type: ignore[arg-type]
+        seeds=tuple(seeds.tolist()),
+        keys=tuple(rows.keys[k] for k in numbers),
+        figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
         data=data,
-        warnings={
-            k: tuple(map(printable, rows.warnings[row]))
-            for k, row in enumerate(order)
-            if rows.warnings[row]
-        },
-        failures=tuple(_failure(cell, name) for cell, name in cells),
-        failed=tuple(failed[label_of[m]] for m in finished),
-        unfinished=tuple(label_of[m] for m in best_first if m >= count),
-        heads=tuple(heads),
+        warnings=warnings,
+        failures=tuple(failures),
     )
+
+
+def _labels(
+    rows: _Rows, method: "Array", score: "Array", latest: bool
+) -> dict[int, str]:
+    """Return the distinct names of methods by their numbers, the best first.
+
+    Methods that only failed are last.
+    """
+    variants = rows.methods.values
+    badness = np.nan_to_num(-score if rows.kind.score.down else score, nan=np.inf)
+    means = [badness[method == m].mean() for m in range(rows.finished_methods)]
+    means += [np.inf] * (len(variants) - len(means))
+    best_first = sorted(
+        _latest(variants) if latest else range(len(variants)),
+        key=lambda m: (m >= rows.finished_methods, means[m], _text(variants[m])),
+    )
+    names = distinct(
+        [_planned_name(variants[m]) for m in best_first],
+        [_variation(variants[m]) for m in best_first],
+    )
+    return dict(zip(best_first, names, strict=True))
+
+
+def _instance_names(kind: Kind, places: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """Return the distinct names of instances."""
+    details = []
+    for place in places:
+        unnamed = {}
+        for name, value in place.items():
+            if name not in kind.named:
+                unnamed[name] = _text(value).strip('"')
+        details.append(unnamed)
+    return distinct([kind.place_name(place) for place in places], details)
+
+
+def _positions(order: Sequence[int], count: int) -> "Array":
+    """Return the position (count,) of each number in an order, -1 if it is absent."""
+    positions = np.full(count, -1)
+    positions[list(order)] = np.arange(len(order))
+    return positions
 
 
 def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
     """Return one version of each method, by their indices.
 
-    It is the installed version, or else the one that was planned last.
+    It is the installed version, or else the one planned last.
     """
-    best: dict[Hashable, tuple[bool, int]] = {}
+    best: dict[str, tuple[bool, int]] = {}
     for m, variant in enumerate(variants):
         versions = variant["version"].split(", ")
         installed = not any(map(other_version, versions))
         other_fields = {**variant, "version": ""}
-        key = _frozen(other_fields)
+        key = _text(other_fields)
         best[key] = max(best.get(key, (False, -1)), (installed, m))
     return sorted(m for _, m in best.values())
 
 
-def _named(
-    names: Sequence[str],
-    numbers: Sequence[int],
-    variants: Sequence[Mapping[str, Any]],
-    label_of: Mapping[int, str],
-) -> list[int]:
-    """Return the methods with the given names.
+def _named(names: Sequence[str], label_of: Mapping[int, str], rows: _Rows) -> list[int]:
+    """Return the methods with the given names, in the order of their labels.
 
     Raises InputError if no method has one of the names.
     """
-    names_of = {
-        m: {label_of[m], variants[m]["name"] or variants[m]["method"]} for m in numbers
-    }
+    variants = rows.methods.values
+    names_of = {m: {label, _planned_name(variants[m])} for m, label in label_of.items()}
     known = set().union(*names_of.values())
     for name in names:
         if name not in known:
@@ -292,7 +258,12 @@ def _named(
                 f"--methods must be of {listed(sorted(label_of.values()), 12)}, "
                 f"got {quoted(name)}{suggestion(name, known)}"
             )
-    return [m for m in numbers if names_of[m] & set(names)]
+    return [m for m in label_of if names_of[m] & set(names)]
+
+
+def _planned_name(variant: Mapping[str, Any]) -> str:
+    """Return a method's name in the plan."""
+    return str(variant["name"] or variant["method"])
 
 
 def _failure(cell: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -335,11 +306,11 @@ def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields that define an instance."""
-    return {
-        name: value
-        for name, value in spec.items()
-        if name not in (*_METHOD_FIELDS, "kind", "seed")
-    }
+    fields = {}
+    for name, value in spec.items():
+        if name not in (*_METHOD_FIELDS, "kind", "seed"):
+            fields[name] = value
+    return fields
 
 
 def distinct(
@@ -365,12 +336,15 @@ def distinct(
     differing = {name: _differing(several) for name, several in by_name.items()}
     longer: dict[str, None] = {}  # an ordered set
     for name, values in zip(names, details, strict=True):
-        words = [
-            f"{short} {values[field]}"
-            for field, short in differing[name].items()
-            if field in values
-        ]
-        plain = unique = printable(f"{name} ({', '.join(words)})" if words else name)
+        words = []
+        for field, short in differing[name].items():
+            if field in values:
+                words.append(f"{short} {values[field]}")
+        text = name
+        if words:
+            text = f"{name} ({', '.join(words)})"
+        plain = printable(text)
+        unique = plain
         number = 1
         while unique in longer:
             number += 1
@@ -390,11 +364,13 @@ def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
         if len({values.get(field) for values in several}) > 1:
             differing.append(field)
     short_names = [field.rpartition(".")[2] for field in differing]
-    return {
-        field: short if short_names.count(short) == 1 else field
-        for field, short in zip(differing, short_names, strict=True)
-    }
+    names = {}
+    for field, short in zip(differing, short_names, strict=True):
+        is_unique = short_names.count(short) == 1
+        names[field] = short if is_unique else field
+    return names
 
 
 def _text(value: Any) -> str:
+    """Return the JSON text of a value. Those of 1, 1.0 and true differ."""
     return json.dumps(value, sort_keys=True)

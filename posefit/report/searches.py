@@ -11,7 +11,7 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, mean, median
-from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.statistics.means import mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
@@ -47,11 +47,8 @@ _ABOVE = Measure(
     "above", "above", "", 2, "Median of the best costs above the true pose's"
 )
 COLUMNS = {
-    column.name: column
-    for column in (
-        Column("reached", _REACHED, _reached, higher_is_better=True, average=mean),
-        Column("above", _ABOVE, _above, average=median),
-    )
+    "reached": Column(_REACHED, _reached, higher_is_better=True, average=mean),
+    "above": Column(_ABOVE, _above, average=median),
 }
 SCORE = Score(
     name="reached",
@@ -72,7 +69,7 @@ SCORE = Score(
 
 
 class Searches:
-    """The kind of runs of single searches."""
+    """The kind of runs of single searches, with the attributes of `Tracks`."""
 
     name = "search"
     noun = "searches"
@@ -105,15 +102,14 @@ class Searches:
             f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} "
             "above the true pose's"
         )
+        budgets = [f"{budget:g}" for budget in runs.values("budget")]
         return {
             "instances": f"{len(runs.instances):,}",
             "suite": runs.values("suite"),
             "functions": [_function(number) for number in runs.values("function")],
             "dimensions": runs.values("dimension"),
             "seeds": f"{len(runs.seeds):,}",
-            "evaluations for each dimension": [
-                f"{budget:g}" for budget in runs.values("budget")
-            ],
+            "evaluations for each dimension": budgets,
             "infeasible proposals": runs.values("infeasible"),
             "targets of a problem": targets,
         }
@@ -140,10 +136,10 @@ class Searches:
         """
         functions = contest.place_field("function")
         instances = contest.place_field("instance")
-        board: dict[int, dict[str, Any]] = {
-            m: {"low": None, "high": None, "is_random": v["method"] == RANDOM}
-            for m, v in enumerate(contest.runs.variants)
-        }
+        board: dict[int, dict[str, Any]] = {}
+        for m, variant in enumerate(contest.runs.variants):
+            is_random = variant["method"] == RANDOM
+            board[m] = {"low": None, "high": None, "is_random": is_random}
         means = mean_intervals(contest.scores, functions, instances)
         for m, low, high in zip(contest.methods, means.low, means.high, strict=True):
             if np.isfinite(low):
@@ -153,21 +149,22 @@ class Searches:
 
     def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
         """Return a row for random search, if it takes part: its best variant."""
-        shares = [
-            float(shares_of_runs.mean())
-            for m, shares_of_runs in zip(contest.methods, contest.scores, strict=True)
-            if contest.runs.variants[m]["method"] == RANDOM
-        ]
-        return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
+        shares = []
+        for m, shares_of_runs in zip(contest.methods, contest.scores, strict=True):
+            if contest.runs.variants[m]["method"] == RANDOM:
+                shares.append(float(shares_of_runs.mean()))
+        if not shares:
+            return []
+        return [{"baseline": RANDOM, "reached": max(shares)}]
 
     def place_words(self, contest: Contest) -> str:
         """Return the functions, dimensions and instances of a contest in words."""
         functions = sorted(set(contest.place_field("function").tolist()))
         dimensions = sorted(set(contest.place_field("dimension").tolist()))
-        problems = {
-            (contest.runs.places[i]["function"], contest.runs.places[i]["instance"])
-            for i in contest.instances
-        }
+        problems = set()
+        for i in contest.instances:
+            place = contest.runs.places[i]
+            problems.add((place["function"], place["instance"]))
         noun = "function" if len(functions) == 1 else "functions"
         words = f"{noun} {listed(functions, len(functions))}"
         words += f" in {listed(dimensions, len(dimensions))} dimensions"
@@ -177,9 +174,11 @@ class Searches:
         """Return a sentence about the share of targets that random search reached."""
         if first["is_random"]:
             return ["That is random search: no method does better."]
-        return [
-            f"Random search reached {SCORE.text(row['reached'])}." for row in baselines
-        ]
+        sentences = []
+        for row in baselines:
+            text = SCORE.text(row["reached"])
+            sentences.append(f"Random search reached {text}.")
+        return sentences
 
     def page(self, _: Runs, contest: Contest | None, /) -> dict[str, Any]:
         """Return the curves, the running times and the list of sections."""
@@ -230,7 +229,12 @@ def search_charts(contest: Contest) -> list[Chart]:
             log=True,
         )
         charts.append(chart)
-    ends = [float(line.y[-1]) for chart in charts for line in chart.lines if line]
+    # one scale for all charts, so that functions can be compared
+    ends = []
+    for chart in charts:
+        for line in chart.lines:
+            if line:
+                ends.append(float(line.y[-1]))
     end = min(1.0, 1.1 * max(0.05, *ends))
     return [replace(chart, most=end) for chart in charts]
 
@@ -243,25 +247,28 @@ def running_times(contest: Contest) -> list[dict[str, Any]]:
     decide its mean running time.
     """
     runs = contest.runs.data["runs"]
-    return [
-        {
-            "method": method,
-            "function": score.function,
-            "name": score.name,
-            "dimension": score.dimension,
-            "runs": score.runs,
-            "reached": 100.0 * score.reached,
-            "above": score.above,
-            "times": [score.running_times[above] for above in SHOWN],
-        }
-        for method in contest.methods
-        for score in suite_scores(runs[k] for k in contest.rows_of(method).tolist())
-        if score.function != ALL
-    ]
+    rows = []
+    for method in contest.methods:
+        runs_of_method = [runs[k] for k in contest.rows_of(method).tolist()]
+        for score in suite_scores(runs_of_method):
+            if score.function == ALL:
+                continue
+            row = {
+                "method": method,
+                "function": score.function,
+                "name": score.name,
+                "dimension": score.dimension,
+                "runs": score.runs,
+                "reached": 100.0 * score.reached,
+                "above": score.above,
+                "times": [score.running_times[above] for above in SHOWN],
+            }
+            rows.append(row)
+    return rows
 
 
 def _function(number: int) -> str:
     return f"{number} {suite_function(number).name}"
 
 
-SEARCHES: Kind = Searches()
+SEARCHES = Searches()

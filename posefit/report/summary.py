@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import listed, p_text
-from posefit.report.kind import Contest, Row
+from posefit.report.contest import Contest, Row
 from posefit.statistics.paired import POWER, SIGNIFICANCE
 
 # If a difference would take more seeds or instances, the methods are practically equal.
@@ -34,11 +34,20 @@ def leader_sentences(
     first, *others = (row for row in board if row["taking_part"])
     kind = contest.runs.kind
     where = f"{kind.place_words(contest)} with {contest.seed_words}"
-    tested = [row for row in others if row["p"] is not None]
-    different = [row for row in tested if row["p"] < SIGNIFICANCE]
-    worse = [row for row in different if row["behind"] > 0.0]
-    better = [row for row in different if row not in worse]
-    unclear = [row for row in tested if row not in different]
+    tested = []
+    worse = []
+    better = []
+    unclear = []
+    for row in others:
+        if row["p"] is None:
+            continue
+        tested.append(row)
+        if row["p"] >= SIGNIFICANCE:
+            unclear.append(row)
+        elif row["behind"] > 0.0:
+            worse.append(row)
+        else:
+            better.append(row)
     facts = f"{_value(contest, first)} on {where}"
     if worse:
         text = f"{first['name']} {facts}; it leads {_led(contest, worse, others)}."
@@ -117,6 +126,7 @@ def _power(contest: Contest, unclear: Sequence[Row]) -> str:
     if score.paired == "runs":
         needed = needed / len(contest.instances)
         unit = "seeds of each instance"
+    # a difference of nearly 0 would need millions of runs, a number that misleads
     if needed > MAX_NEEDED:
         return (
             f"Not even {MAX_NEEDED:,} {unit} would show differences as small as these."

@@ -6,7 +6,7 @@ from typing import Any
 
 from posefit.evaluation.measures import BASELINES
 from posefit.report.columns import Score
-from posefit.report.kind import Row, Runs
+from posefit.report.contest import Row, Runs
 from posefit.report.leaderboard import EFFECT
 from posefit.report.tracks import LOSS_BASELINE
 
@@ -91,10 +91,11 @@ def board_rows(runs: Runs, board: Sequence[Row]) -> list[dict[str, Any]]:
     if "lost_tracks" in board[0]:
         names.append("lost_tracks")
     names += ["runs", "failed", "warned", *others]
-    return [
-        {"method" if name == "name" else name: row[name] for name in names}
-        for row in board
-    ]
+    rows = []
+    for row in board:
+        figures = {name: row[name] for name in names[1:]}
+        rows.append({"method": row["name"], **figures})
+    return rows
 
 
 def latex_table(score: Score, board: Sequence[Row]) -> str:

@@ -17,9 +17,11 @@ from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed, mean
-from posefit.report.kind import Contest, Kind, Place, Row, Runs
+from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
+from posefit.report.repeat import command_head
 from posefit.statistics.means import block_means
+from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
 
 LOSS = "error_with_losses_degrees"
@@ -81,43 +83,47 @@ def _columns() -> list[Column]:
         measure = MEASURES["skill"]
         skill_measure = replace(
             measure,
+            name=f"skill.{name}",
             label=f"{measure.label}: {label}",
             meaning=f"{measure.meaning}; compared with the {label}",
         )
-        skills.append(Column(f"skill.{name}", skill_measure, higher_is_better=True))
-        baseline_measure = replace(MEASURES["baselines_degrees"], label=label)
-        baselines.append(
-            Column(f"baselines_degrees.{name}", baseline_measure, in_tables=False)
+        skills.append(Column(skill_measure, higher_is_better=True))
+        baseline_measure = replace(
+            MEASURES["baselines_degrees"], name=f"baselines_degrees.{name}", label=label
         )
+        baselines.append(Column(baseline_measure, in_tables=False))
     intervals = []
     for level in charts.LEVEL_NAMES:
         shown = level == TABLE_LEVEL
-        coverage = replace(_share("coverage"), label=f"{level} % interval holds")
-        width = replace(MEASURES["interval_mm"], label=f"{level} % interval")
+        coverage = replace(
+            _share("coverage"),
+            name=f"coverage.{level}",
+            label=f"{level} % interval holds",
+        )
+        width = replace(
+            MEASURES["interval_mm"],
+            name=f"interval_mm.{level}",
+            label=f"{level} % interval",
+        )
         intervals += [
-            Column(
-                f"coverage.{level}",
-                coverage,
-                higher_is_better=True,
-                in_tables=shown,
-                optional=True,
-            ),
-            Column(f"interval_mm.{level}", width, in_tables=shown, optional=True),
+            Column(coverage, higher_is_better=True, in_tables=shown, optional=True),
+            Column(width, in_tables=shown, optional=True),
         ]
+    error = replace(MEASURES["error_degrees"], name="error_degrees.mean")
     return [
-        Column(LOSS, loss, compute=error_with_losses),
+        Column(loss, compute=error_with_losses),
         # only in rows and the CSV: a page with 100,000 rows has no room for it
-        Column("error_degrees.mean", MEASURES["error_degrees"], in_tables=False),
+        Column(error, in_tables=False),
         *skills,
-        Column("lost_rate", _share("lost_rate")),
-        Column("swap_rate", _share("swap_rate")),
-        Column("unknown_rate", _share("unknown_rate"), optional=True),
+        Column(_share("lost_rate")),
+        Column(_share("swap_rate")),
+        Column(_share("unknown_rate"), optional=True),
         *intervals,
-        Column("mpjpe_mm", MEASURES["mpjpe_mm"]),
-        Column("iou", MEASURES["iou"], higher_is_better=True),
-        Column("seconds_per_frame", MEASURES["seconds_per_frame"]),
-        Column("cpu_seconds_per_frame", MEASURES["cpu_seconds_per_frame"]),
-        Column("evaluations_used", MEASURES["evaluations"]),
+        Column(MEASURES["mpjpe_mm"]),
+        Column(MEASURES["iou"], higher_is_better=True),
+        Column(MEASURES["seconds_per_frame"]),
+        Column(MEASURES["cpu_seconds_per_frame"]),
+        Column(replace(MEASURES["evaluations"], name="evaluations_used")),
         *baselines,
     ]
 
@@ -137,18 +143,29 @@ SCORE = Score(
     "as much as the mean training pose. "
     "The line is its 95 % interval; dashed lines are baselines. In simulated studies "
     "the interval holds the true mean in 94 to 97 %, and in 88 to 91 % where a few "
-    "errors are many times as large as the others.",
+    "errors are many times larger than the others.",
     leaderboard="Each figure is the mean of a method's runs. In the error with losses "
     "a lost frame counts at least as much as the mean training pose. First come the "
-    "methods that are not worse than the one of the lowest error (p not below 0.05), "
-    "those that lost the fewest tracks first; then the others by their error. Skill is "
-    "1 − error with losses / baseline: 0 is no better than the baseline, which uses "
-    "the true root and translation. ",
+    "methods that are not shown to be worse than the method of the lowest error "
+    "(p at least 0.05), in order of lost tracks; then the others by their error. "
+    "Skill is 1 − error with losses / baseline: 0 is no better than the baseline, "
+    "which uses the true root and translation. ",
 )
 
 
 class Tracks:
-    """The kind of runs of tracks."""
+    """The kind of runs of tracks.
+
+    Attributes:
+        name: The kind's name, in the singular.
+        noun: Its runs, in the plural.
+        title: The title of the page.
+        columns: Its figures by name.
+        score: The figure that orders the methods.
+        named: The fields that an instance's name contains.
+        data: The names of a row's other data.
+        baselines: The label of each baseline by name.
+    """
 
     name = "track"
     noun = "tracks"
@@ -164,7 +181,10 @@ class Tracks:
     def read(
         self, row: Row, shared: dict[bytes, Any], /
     ) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data."""
+        """Return the figures of a row and its other data.
+
+        `shared` holds arrays that many rows have in common, to save memory.
+        """
         used = np.array(row["trace"]["evaluations"], np.float32)
         # many rows have the same evaluations in their traces
         used = shared.setdefault(used.tobytes(), used)
@@ -238,10 +258,10 @@ class Tracks:
             high = math.nan
             baselines = shared
             if m not in contest.methods:
-                baselines = {
-                    name: mean(figures[f"baselines_degrees.{name}"][rows])
-                    for name in BASELINES
-                }
+                baselines = {}
+                for name in BASELINES:
+                    errors = figures[f"baselines_degrees.{name}"][rows]
+                    baselines[name] = mean(errors)
             elif not 0 < lost_tracks < MIN_LOST:
                 place = contest.methods.index(m)
                 low = float(intervals.low[place])
@@ -261,10 +281,10 @@ class Tracks:
             # (methods, blocks); the mean is over the methods that have a value
             values = np.ma.masked_invalid(contest.of(f"baselines_degrees.{name}"))
             errors[name] = mean(values.mean(axis=0).filled(np.nan))
-        return [
-            {"baseline": name, LOSS: error, **_skills(error, errors)}
-            for name, error in errors.items()
-        ]
+        rows = []
+        for name, error in errors.items():
+            rows.append({"baseline": name, LOSS: error, **_skills(error, errors)})
+        return rows
 
     def place_words(self, contest: Contest) -> str:
         """Return the instances of a contest in words: `4 instances of run and walk`."""
@@ -291,40 +311,53 @@ class Tracks:
         if contest is not None:
             joints = charts.joint_errors(contest)
             certainty = charts.certainty(contest)
-            optional = {"joints": joints, "certainty": certainty}
-            sections = [
-                "leaderboard",
-                "comparison",
-                "curves",
-                *(name for name, present in optional.items() if present),
-                *sections,
-            ]
+            chart_sections = ["leaderboard", "comparison", "curves"]
+            if joints:
+                chart_sections.append("joints")
+            if certainty:
+                chart_sections.append("certainty")
+            sections = [*chart_sections, *sections]
             part = {
                 "pairs": paired_tests_of(contest),
                 "charts": [chart.as_dict() for chart in charts.track_charts(contest)],
                 "joint_errors": [vars(intervals) for intervals in joints],
                 "certainty": certainty,
             }
-        numbers = [_exact(place["instance"]) for place in runs.places]
+        instances = []
+        for name, place in zip(runs.instances, runs.places, strict=True):
+            instances.append({"name": name, "number": _exact(place["instance"])})
+        heads, head = _heads(runs)
+        rows = {
+            "method": runs.method,
+            "instance": runs.instance,
+            "head": head,
+            "seed": runs.seed,
+            **{name: runs.figures[name] for name in runs.table_figures},
+            "key": [key[:8] for key in runs.keys],
+        }
         return {
             **part,
             "sections": sections,
             "joints": [place.replace("_", " ") for place in PLACES],
-            "instances": [
-                {"name": name, "number": number}
-                for name, number in zip(runs.instances, numbers, strict=True)
-            ],
-            "rows": {
-                "method": runs.method,
-                "instance": runs.instance,
-                "head": runs.head,
-                "seed": runs.seed,
-                **{name: runs.figures[name] for name in runs.table_figures},
-                "key": [key[:8] for key in runs.keys],
-            },
+            "instances": instances,
+            "rows": rows,
             "seeds": [_exact(seed) for seed in runs.seeds],
-            "heads": runs.heads,
+            "heads": heads,
         }
+
+
+def _heads(runs: Runs) -> tuple[list[str], list[int]]:
+    """Return the beginnings of the commands that run rows again, and each row's index.
+
+    Rows that differ only in their last fields have the same beginning.
+    """
+    pairs = list(zip(runs.method.tolist(), runs.instance.tolist(), strict=True))
+    commands = {}
+    for m, i in set(pairs):
+        commands[m, i] = command_head({**runs.variants[m], **runs.places[i]})
+    heads = sorted(set(commands.values()))
+    index = {head: k for k, head in enumerate(heads)}
+    return heads, [index[commands[pair]] for pair in pairs]
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:
@@ -354,21 +387,9 @@ def _skills(
     return skills
 
 
-def views(place: Place) -> list[str]:
-    """Return the directions of an instance's cameras in degrees."""
-    return [f"{view:g}" for view in place["view_degrees"]]
-
-
-def damage(place: Place) -> list[str]:
-    """Return the kinds of damage of an instance with their strengths."""
-    return [
-        f"{kind} {strength:g}" for kind, strength in sorted(place["corruption"].items())
-    ]
-
-
 def _exact(number: int) -> int | str:
     """Return a number that a browser can read exactly: as a text if it is too large."""
     return number if abs(number) < 2**53 else str(number)
 
 
-TRACKS: Kind = Tracks()
+TRACKS = Tracks()

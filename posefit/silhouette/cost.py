@@ -75,6 +75,18 @@ def areas(
     Raises:
         InputError: if shapes do not match, or if a number is not finite.
 
+    Example:
+        >>> from posefit import Body, Camera, Silhouette, areas, load_motion, project
+        >>> walk = load_motion("walk")
+        >>> body = Body.of(walk.skeleton)
+        >>> place = walk.translations[0]
+        >>> camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(320, 240))
+        >>> mask = project(body, camera, walk.poses[0], place)
+        >>> counts = areas(
+        ...     body, camera, Silhouette.of(mask), walk.poses[:1], walk.translations[:1]
+        ... )
+        >>> counts[0, :2].tolist(), bool(counts[0, 2] == mask.sum())
+        ([0, 0], True)
     """
     # writeable arrays: numba would compile another kernel for read-only ones
     poses = writeable(poses)
@@ -163,6 +175,19 @@ def pose_costs(
         if
             a number is not finite.
 
+    Example:
+        >>> from posefit import Body, Camera, Silhouette
+        >>> from posefit import load_motion, pose_costs, project
+        >>> walk = load_motion("walk")
+        >>> body = Body.of(walk.skeleton)
+        >>> place = walk.translations[0]
+        >>> camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(320, 240))
+        >>> observed = Silhouette.of(project(body, camera, walk.poses[0], place))
+        >>> costs, _ = pose_costs(
+        ...     body, [camera], [observed], walk.poses[:9], walk.translations[:9]
+        ... )
+        >>> float(costs[0]), bool(costs[8] > 5.0)
+        (0.0, True)
     """
     check_square(cameras)
     views = zip(cameras, silhouettes, strict=True)
@@ -251,6 +276,10 @@ def mismatch(areas: Areas, beta: float = BETA) -> Array:
     Raises:
         InputError: if the areas are not numbers of this shape.
 
+    Example:
+        >>> from posefit import mismatch
+        >>> mismatch([[0, 0, 50], [50, 50, 0], [50, 0, 50]]).tolist()
+        [0.0, 100.0, 25.0]
     """
     counts = np.asarray(areas)
     if counts.ndim != 2 or counts.shape[1] != 3 or counts.dtype.kind not in "iuf":
@@ -278,6 +307,14 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     Raises:
         InputError: if shapes do not match, or if a number is not finite.
 
+    Example:
+        >>> from posefit import Body, Camera, load_motion, project
+        >>> walk = load_motion("walk")
+        >>> place = walk.translations[0]
+        >>> camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(320, 240))
+        >>> mask = project(Body.of(walk.skeleton), camera, walk.poses[0], place)
+        >>> mask.shape, bool(mask.any())
+        ((240, 320), True)
     """
     if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
         came = f"{np.shape(pose)} and {np.shape(translation)}"

@@ -59,7 +59,7 @@ def touches_border(mask: Mask) -> bool:
 def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
     """Return the rows and columns of a mask's box with a margin in pixels.
 
-    For an empty mask they are those of the first pixel.
+    For an empty mask it is the first pixel's box.
     """
     left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))
     if not wide:
@@ -87,7 +87,15 @@ def without_small_pieces(mask: Mask) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """The person's pixels in one camera's image, and which pixels are known."""
+    """The person's pixels in one camera's image, and which pixels are known.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Silhouette
+        >>> silhouette = Silhouette.of(np.eye(8, dtype=bool))
+        >>> silhouette.mask.shape, silhouette.known
+        ((8, 8), True)
+    """
 
     mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
     valid: Mask = field(repr=False)  # (height, width)
@@ -198,8 +206,8 @@ class Device(Protocol):
             translations: (n, 3) metres; the caller has checked the shape.
 
         Returns:
-            R, B, Y (n, 3) in pixels, equal to those of `posefit.silhouette.cost.areas`
-            on a CPU.
+            R, B, Y (n, 3) in pixels, equal to the result of
+            `posefit.silhouette.cost.areas` on a CPU.
 
         """
 

@@ -80,7 +80,7 @@ def _owners(
 ) -> NDArray[np.int64]:
     """Return the number (n,) of each piece's person; 0 for a speck near nobody.
 
-    The number of a person is that of one of their large pieces.
+    A person has the number of one of their large pieces.
     """
     count = len(areas)
     large = np.flatnonzero(areas > MIN_PIECE_AREA * areas.max())

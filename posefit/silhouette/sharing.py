@@ -35,9 +35,8 @@ def parts_of(n: int, threads: int) -> tuple[slice, ...]:
 def shares_of(n: int, threads: int) -> tuple[slice, ...]:
     """Return slices of n rows, each of which takes long: one a thread."""
     count = max(min(threads, n), 1)
-    return tuple(
-        slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1))
-    )
+    borders = [n * part // count for part in range(count + 1)]
+    return tuple(slice(first, stop) for first, stop in pairwise(borders))
 
 
 def work_through(
@@ -68,10 +67,9 @@ def work_through(
             work(part, *taken)
 
     # in a copy of this thread's context, which holds the count of drawn poses
-    others = [
-        _pool(threads).submit(copy_context().run, take_turns)
-        for _ in range(min(threads, len(parts)) - 1)
-    ]
+    others = []
+    for _ in range(min(threads, len(parts)) - 1):
+        others.append(_pool(threads).submit(copy_context().run, take_turns))
     take_turns()
     for other in others:
         if not other.cancel():

@@ -77,7 +77,7 @@ def _build_ctpop(_context: Any, builder: Any, _signature: Any, arguments: Any) -
     return builder.ctpop(arguments[0])
 
 
-# numba compares the names of the arguments with those of `popcount`
+# numba requires the argument names of `popcount`
 @overload(popcount)
 def _popcount_compiled(bits):  # noqa: ARG001
     return lambda bits: _ctpop(bits)  # type: ignore[call-arg]

@@ -34,9 +34,10 @@ def finite(
     """
     array = np.asarray(values, dtype=np.float64)
     least = least or (1,) * len(dimensions)
-    if array.ndim != len(dimensions) or any(
-        n < m for n, m in zip(array.shape, least, strict=True)
-    ):
+    has_shape = array.ndim == len(dimensions)
+    if has_shape:
+        has_shape = not any(np.array(array.shape) < least)
+    if not has_shape:
         needed = f", at least {least}" if max(least) > 1 else ""
         raise InputError(
             f"{name} must have shape ({', '.join(dimensions)}){needed}, "

@@ -73,10 +73,8 @@ def _stored() -> dict[str, Learned]:
     groups = {}
     for k, name in enumerate(names):
         # the file has all numbers but the order in whole steps
-        values = {
-            key: value[k] if key == "order" else STEP * value[k]
-            for key, value in arrays.items()
-        }
+        values = {key: STEP * value[k] for key, value in arrays.items()}
+        values["order"] = arrays["order"][k]
         groups[name] = Learned(**values)
     return groups
 

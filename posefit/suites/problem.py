@@ -3,7 +3,7 @@
 Each is a `posefit.Problem` with a `SuiteCost` as its cost function. Its attributes have
 the same names as in COCO, so loops written for COCO run on it unchanged.
 
-A suite may get more problems, but nothing else about it ever changes.
+A suite may get more problems. Everything else about it stays the same for ever.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -183,6 +183,13 @@ def suite(
 
     Raises:
         ValueError: There is no such problem.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> problem = posefit.suite("posefit-2026.3", 1, 0, 9)
+        >>> problem(np.zeros((3, 9))).shape, problem.evaluations
+        ((3,), 3)
     """
     number, instance, dimension = checked_address(name, function, instance, dimension)
     one_of("infeasible", infeasible, INFEASIBLE)
@@ -221,6 +228,12 @@ class Suite:
 
     Raises:
         ValueError: A number is unknown, or there are no problems.
+
+    Example:
+        >>> import posefit
+        >>> suite = posefit.Suite(functions=[1], dimensions=[9], instances=[0, 1])
+        >>> [problem.dimension for problem in suite]
+        [9, 9]
     """
 
     def __init__(
@@ -241,18 +254,18 @@ class Suite:
         instances = _numbers("instances", instances)
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
-        self.passed_over = tuple(
-            function
-            for function in chosen
-            if not set(dimensions) & set(function.dimensions)
-        )
+        passed_over = []
+        for function in chosen:
+            if not set(dimensions) & set(function.dimensions):
+                passed_over.append(function)
+        self.passed_over = tuple(passed_over)
         self.name = name
         self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget}
-        self._addresses = [
-            checked_address(name, function.number, instance, dimension)
-            for dimension, function, instance in product(dimensions, chosen, instances)
-            if dimension in function.dimensions
-        ]
+        self._addresses = []
+        for dimension, function, instance in product(dimensions, chosen, instances):
+            if dimension in function.dimensions:
+                address = checked_address(name, function.number, instance, dimension)
+                self._addresses.append(address)
         if not self._addresses:
             raise InputError(
                 "a suite must hold at least one problem, "
@@ -272,7 +285,7 @@ class Suite:
         if isinstance(index, slice):
             raise InputError(
                 f"index must be the number of one problem, got {quoted(index)}: "
-                "itertools.islice makes several, one after the other"
+                "itertools.islice gives several"
             )
         problem = suite(self.name, *self._addresses[index], **self._options)
         problem.index = index % len(self)

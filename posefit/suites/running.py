@@ -137,6 +137,14 @@ def run_of(
     Raises:
         ValueError: Nothing feasible was evaluated, the budget is unknown, or there were
             more evaluations than the budget.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> problem = posefit.suite("posefit-2026.3", 1, 0, 9, budget=10)
+        >>> _ = problem(np.zeros((10, 9)))
+        >>> posefit.run_of(problem, "my search").method
+        'my search'
     """
     if not len(problem.points):
         raise InputError(
@@ -147,7 +155,7 @@ def run_of(
         budget = problem.budget
     if budget is None:
         raise InputError(
-            f"{problem.id}: budget must be known, here or of the problem, got none"
+            f"{problem.id}: budget must be given, here or in the problem, got none"
         )
     if problem.evaluations > budget:
         raise InputError(
@@ -229,6 +237,15 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
 
     Raises:
         ValueError: There are no runs.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> problem = posefit.suite("posefit-2026.3", 1, 0, 9, budget=10)
+        >>> _ = problem(np.zeros((10, 9)))
+        >>> scores = posefit.suite_scores([posefit.run_of(problem, "my search")])
+        >>> scores[0].runs
+        1
     """
     groups: dict[tuple[int, int, str, int, str], list[SuiteRun]] = {}
     for run in runs:

@@ -7,7 +7,6 @@ import hashlib
 import json
 import time
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -19,6 +18,7 @@ from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.footage.scene import Scene
+    from posefit.registry import Offer
 
 ALL_AROUND = 180.0  # degrees; with an error this large the yaw is unknown
 RNG_STREAM_PERSON = 2001  # of the errors in a method's knowledge of the person
@@ -111,11 +111,11 @@ class TrackCell(Cell):
         first_pose: "searched" or "given".
         hypotheses: How many times the motion is tracked, see
             `posefit.tracking.restarts`.
-        yaw_off_degrees: The largest error of the first frame's yaw, as it is given to
-            the method. At 180 the yaw is not given. The error depends on the instance
-            and the motion's name.
-        body_off_percent: The largest error of each bone's length and radii, as they are
-            given to the method. It depends on the same two.
+        yaw_off_degrees: The largest error of the first frame's yaw that the method
+            gets. At 180 it gets no yaw. The error depends on the instance and the
+            motion's name.
+        body_off_percent: The largest error of each bone's length and radii that the
+            method gets. It depends on the same two.
         seed: Of everything random.
         name: The method's name in reports.
         files: The SHA-256 of each motion file that is read, by path.
@@ -163,10 +163,11 @@ class TrackCell(Cell):
         """
         from posefit.evaluation.errors import anytime_trace, mode_reliability
         from posefit.evaluation.measures import MEASURES
+        from posefit.footage.options import SourceOptions
         from posefit.geometry.skeleton import joint_distances
         from posefit.motion.clips import training_clips, training_motions
         from posefit.tracking.defaults import completed
-        from posefit.tracking.options import VIEW, TrackOptions
+        from posefit.tracking.options import TrackOptions
         from posefit.tracking.pipeline import track_scene
 
         for path, digest in self.files.items():
@@ -180,13 +181,13 @@ class TrackCell(Cell):
         training = training_motions(clips, scene.fps)
         # the scene has the views already, and the training motions are loaded
         option_names = {field.name for field in fields(TrackOptions)}
-        option_names -= {*VIEW, "train"}
-        values = {
-            field.name: getattr(self, field.name)
-            for field in fields(self)
-            if field.name in option_names
-        }
-        options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
+        option_names -= {each.name for each in fields(SourceOptions)} | {"train"}
+        values = {}
+        for each in fields(self):
+            if each.name in option_names:
+                values[each.name] = getattr(self, each.name)
+        values["settings"] = settings_text(self.settings)
+        options = TrackOptions(**values)
         result = track_scene(scene, training, completed(options, self.motion))
         assert result.truth is not None
         truth = result.truth.joints
@@ -194,9 +195,10 @@ class TrackCell(Cell):
         # in mm, with both roots at one point, as in `mpjpe_mm`
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # (joints,)
         measured = asdict(result.measures)
-        figures = {
-            name: measured[name] for name in MEASURES if name not in RENAMED_MEASURES
-        }
+        figures = {}
+        for name in MEASURES:
+            if name not in RENAMED_MEASURES:
+                figures[name] = measured[name]
         return {
             **figures,
             "warnings": result.log.warnings,
@@ -278,7 +280,8 @@ class SearchCell(Cell):
 
 
 KINDS: dict[str, type[TrackCell] | type[SearchCell]] = {
-    kind.kind: kind for kind in (TrackCell, SearchCell)
+    TrackCell.kind: TrackCell,
+    SearchCell.kind: SearchCell,
 }
 
 
@@ -305,8 +308,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     for planned in cell.version.split(", "):
         if installed := other_version(planned):
             raise InputError(f"a worker must have {planned}, got {installed}")
-    with _guarded(cell):
-        figures = cell.measure()
+    figures = cell.measure()
     row = {
         "key": cell.key,
         "spec": cell.spec,
@@ -324,26 +326,19 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     return row
 
 
-def _guarded(cell: Cell) -> AbstractContextManager[None]:
-    """Return a context that undoes a plugin's changes to libraries.
-
-    posefit's own plugins change none, so that they need no such context.
-    """
-    from posefit.sweep.worker import functions_kept
-
-    if _own_origins().issuperset(cell.version.split(", ")[1:]):
-        return nullcontext()
-    return functions_kept()
+def foreign_plugins(version: str) -> str:
+    """Return the part of a cell's version that is about plugins from elsewhere."""
+    own = _own_origins()
+    return ", ".join(part for part in version.split(", ") if part not in own)
 
 
 @lru_cache(maxsize=1)
 def _own_origins() -> frozenset[str]:
-    """Return the origins of posefit's own plugins."""
+    """Return the origins of posefit and its own plugins."""
     from posefit.hooks import PROJECT
-    from posefit.registry import registry
 
-    offers = (offer for named in registry().offers.values() for offer in named.values())
-    return frozenset(offer.origin for offer in offers if offer.distribution == PROJECT)
+    own = [offer.origin for offer in _offers() if offer.distribution == PROJECT]
+    return frozenset([posefit_build(), *own])
 
 
 def other_version(origin: str) -> str | None:
@@ -361,7 +356,10 @@ def other_version(origin: str) -> str | None:
     origins = installed()
     if origin in origins:
         return None
-    return next((other for other in origins if other.partition(" ")[0] == name), None)
+    for other in origins:
+        if other.partition(" ")[0] == name:
+            return other
+    return None
 
 
 @lru_cache(maxsize=1)
@@ -370,10 +368,14 @@ def installed() -> frozenset[str]:
 
     See `posefit.registry.Offer.origin`.
     """
+    return frozenset([posefit_build(), *(offer.origin for offer in _offers())])
+
+
+def _offers() -> list["Offer"]:
+    """Return what all plugins offer."""
     from posefit.registry import registry
 
-    offers = (offer for named in registry().offers.values() for offer in named.values())
-    return frozenset([posefit_build(), *(offer.origin for offer in offers)])
+    return [offer for named in registry().offers.values() for offer in named.values()]
 
 
 def cell_scene(cell: TrackCell) -> "Scene":
@@ -389,9 +391,9 @@ def cell_scene(cell: TrackCell) -> "Scene":
     scene = _with_known_person(cell, scene)
     if not cell.corruption:
         return scene
-    noise = {
-        kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED
-    }
+    # dropped masks are not noise on a mask: `with_corruption` takes their share apart
+    noise = dict(cell.corruption)
+    noise.pop(DROPPED, None)
     observations = with_corruption(
         scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance
     )
@@ -399,9 +401,9 @@ def cell_scene(cell: TrackCell) -> "Scene":
 
 
 def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
-    """Return the scene with the person as it is given to a method.
+    """Return the scene with the first yaw and the body that a method gets.
 
-    Their first yaw and their body have random errors up to the cell's limits.
+    Both have random errors up to the cell's limits.
     """
     import numpy as np
 

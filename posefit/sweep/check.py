@@ -18,6 +18,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import between, whole
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
+from posefit.options import Check, choice, declared, within
 from posefit.reading import SHOWN, quoted, suggestion
 from posefit.registry import Offer, registry, version_of
 from posefit.silhouette.corruption import CORRUPTIONS
@@ -33,7 +34,7 @@ from posefit.sweep.cell import (
     json_of,
 )
 from posefit.tracking.method import method_names, parsed_settings, places_of
-from posefit.tracking.options import Check, TrackOptions, choice, declared, within
+from posefit.tracking.options import TrackOptions
 from posefit.version import source_digest
 
 # the fields of a track that a plan may set; posefit adds the other two
@@ -73,11 +74,9 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
         raise InputError(
             f"train must not contain the motion itself, got {values['motion']}"
         )
-    files = {
-        path: digest
-        for motion in (values["motion"], *train)
-        for path, digest in _files(motion)
-    }
+    files: dict[str, str] = {}
+    for motion in (values["motion"], *train):
+        files.update(_files(motion))
     version = version_of(offer.origin for offer in offers)
     cell = TrackCell(
         **{
@@ -171,11 +170,12 @@ def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
 
     Raises InputError if a name is unknown or a value is invalid.
     """
-    if unknown := [name for name in spec if name not in checks]:
-        known = suggestion(unknown[0], checks)
-        raise InputError(
-            f"a cell must hold {', '.join(checks)}, got {quoted(unknown[0])}{known}"
-        )
+    for name in spec:
+        if name not in checks:
+            raise InputError(
+                f"a cell must hold {', '.join(checks)}, "
+                f"got {quoted(name)}{suggestion(name, checks)}"
+            )
     return {name: checks[name](name, value) for name, value in spec.items()}
 
 

@@ -14,7 +14,6 @@ from functools import partial
 from typing import Any
 
 from posefit.errors import InputError
-from posefit.sweep.cell import run_cell
 from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome, Run, text_of
 from posefit.sweep.pool import Pool
 from posefit.version import posefit_build
@@ -46,7 +45,7 @@ class Cluster:
         self,
         scheduler: str,
         limits: Limits,
-        run: Run = run_cell,
+        run: Run,
         patience: float = CONNECT_TIMEOUT_SECONDS,
     ) -> None:
         try:
@@ -74,8 +73,7 @@ class Cluster:
             self.close()
             cause = " ".join(str(error).split())
             raise InputError(
-                "scheduler must be one with workers that answers, "
-                f"got {scheduler}: {cause}"
+                f"scheduler must answer and have workers, got {scheduler}: {cause}"
             ) from None
 
     def _check_versions(self) -> None:
@@ -87,7 +85,9 @@ class Cluster:
         wanted = posefit_build()
         for worker, found in self._client.run(eval, _BUILD, on_error="return").items():
             if found != wanted:
-                came = found if isinstance(found, str) else f"none ({text_of(found)})"
+                came = found
+                if not isinstance(found, str):
+                    came = f"none ({text_of(found)})"
                 raise InputError(f"the worker {worker} must have {wanted}, got {came}")
         try:
             self._client.run_on_scheduler(eval, _BUILD)
@@ -110,10 +110,12 @@ class Cluster:
                 f"scheduler must stay, got {self._address}, which went away"
             ) from None
 
-    def submit(self, job: Any) -> None:
+    def submit(self, job: Any, tenant: str = "") -> None:
         """Send a job; Dask chooses the worker."""
         key = f"posefit-{secrets.token_hex(16)}"
-        future = self._client.submit(self._call, job, key=key, pure=False, retries=0)
+        future = self._client.submit(
+            self._call, job, tenant, key=key, pure=False, retries=0
+        )
         self._running[future] = job
 
     def wait(self, seconds: float) -> list[Outcome]:
@@ -130,9 +132,12 @@ class Cluster:
                 futures = tuple(self._running)
                 wait: Any = self._distributed.wait
                 wait(futures, seconds, "FIRST_COMPLETED")
-        return [
-            self._outcome(future) for future in tuple(self._running) if future.done()
-        ]
+        outcomes = []
+        # a copy, because `_outcome` removes the job from `_running`
+        for future in tuple(self._running):
+            if future.done():
+                outcomes.append(self._outcome(future))
+        return outcomes
 
     def close(self) -> None:
         """Leave the scheduler."""
@@ -153,7 +158,9 @@ class Cluster:
             return Outcome(job, None, text_of(error))
 
 
-def _call(run: Run, limits: Limits, job: Any) -> tuple[Any, str | None, bool]:
+def _call(
+    run: Run, limits: Limits, job: Any, tenant: str
+) -> tuple[Any, str | None, bool]:
     """Run a job on a thread of a Dask worker.
 
     Returns:
@@ -167,7 +174,7 @@ def _call(run: Run, limits: Limits, job: Any) -> tuple[Any, str | None, bool]:
         multiprocessing.current_process().daemon = False
         _thread.pool = Pool(1, limits, run)
         _thread.runs = current
-    _thread.pool.submit(job)
+    _thread.pool.submit(job, tenant)
     while not (outcomes := _thread.pool.wait(POLL_SECONDS)):
         pass
     return outcomes[0].result, outcomes[0].reason, outcomes[0].is_own_fault

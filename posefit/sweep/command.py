@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -13,7 +12,7 @@ from posefit.progress import bars_shown
 from posefit.reading import counted, cut
 from posefit.sweep.cell import Cell, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
-from posefit.sweep.engine import Engine, Limits, Run
+from posefit.sweep.engine import Engine, Limits
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS
 from posefit.sweep.pool import Pool, cores
@@ -53,15 +52,14 @@ def swept(
     from tqdm.auto import tqdm
 
     with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
-        versions = Counter(spec["version"] for spec in ledger.old_specs())
-        for version, count in versions.items():
+        for version, count in ledger.versions().items():
             if any(map(other_version, version.split(", "))):
                 say(
                     f"{counted(count, 'row')} in {out} are of another version, "
                     f"{cut(version)}, and do not count here"
                 )
-        elsewhere = done_elsewhere(Path(out)) if shard is None else set()
-        ledger.plan(cells_of(plan, shard), elsewhere)
+        others = shards_in(Path(out)) if shard is None else []
+        ledger.plan(cells_of(plan, shard), done_in(others))
         if retry_quarantined:
             count = ledger.release_quarantined()
             cells = "cell is" if count == 1 else "cells are"
@@ -121,12 +119,17 @@ def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     return (cell for cell in plan if int(cell.key, 16) % count == number - 1)
 
 
-def done_elsewhere(out: Path) -> set[str]:
-    """Return the keys of the cells that shards in a folder have done.
+def shards_in(out: Path) -> list[Path]:
+    """Return the ledgers of shards in a folder.
 
-    A run without shards does not repeat them.
+    A run without shards does not repeat their cells.
     """
-    files = [file for file in sorted(out.glob(SHARDS)) if file.stat().st_size]
+    return sorted(out.glob(SHARDS))
+
+
+def done_in(ledgers: Iterable[Path]) -> set[str]:
+    """Return the keys of the cells that are done in ledgers, as far as these exist."""
+    files = [file for file in ledgers if file.exists() and file.stat().st_size]
     if not files:
         return set()
     with Ledger(*files) as ledger:
@@ -135,7 +138,6 @@ def done_elsewhere(out: Path) -> set[str]:
 
 def engine(
     limits: Limits,
-    run: Run = run_cell,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -144,7 +146,6 @@ def engine(
 
     Args:
         limits: The longest time and the most memory of a cell.
-        run: Called with each cell in a worker.
         workers: Number of processes on this machine, by default one per processor.
         scheduler: The address of a Dask scheduler whose workers run the cells instead.
 
@@ -165,8 +166,8 @@ def engine(
         if scheduler is not None:
             from posefit.sweep.cluster import Cluster
 
-            return Cluster(scheduler, limits, run)
-        return Pool(workers or cores(), limits, run)
+            return Cluster(scheduler, limits, run_cell)
+        return Pool(workers or cores(), limits, run_cell)
 
     return start
 

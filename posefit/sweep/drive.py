@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from posefit.errors import InputError
+from posefit.sweep.cell import foreign_plugins
 from posefit.sweep.engine import POLL_SECONDS, Engine, Outcome
 from posefit.sweep.ledger import Writer
 
@@ -64,7 +65,7 @@ def drive(
                     place = waiting.popleft()
                     cell = ledger.cell(place)
                     running[cell.key] = place
-                    engine.submit(cell)
+                    engine.submit(cell, foreign_plugins(cell.version))
                 if not (outcomes := engine.wait(POLL_SECONDS)):
                     continue
                 # a row counts once it is on the disk, so count in a copy until then

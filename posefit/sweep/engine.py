@@ -65,8 +65,14 @@ class Engine(Protocol):
         """
         ...
 
-    def submit(self, job: Any) -> None:
-        """Start a job."""
+    def submit(self, job: Any, tenant: str = "") -> None:
+        """Start a job.
+
+        Args:
+            job: The job.
+            tenant: Whose job it is. Jobs of different tenants never share a process, so
+                what one leaves behind in its process cannot reach another.
+        """
         ...
 
     def wait(self, seconds: float) -> list[Outcome]:

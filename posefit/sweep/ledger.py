@@ -118,13 +118,26 @@ class Ledger:
 
     Raises:
         InputError: There is no ledger, it is damaged, or it cannot be read here.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> import posefit
+        >>> few = {"seeds": 1, "frames": 2, "evaluations": 40}
+        >>> with TemporaryDirectory() as folder:
+        ...     out = f"{folder}/results"
+        ...     result = posefit.compare(["random@pca"], out=out, **few)
+        ...     with posefit.Ledger(out) as ledger:
+        ...         print(len(list(ledger.rows())))
+        1
     """
 
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
-        self.files = list(
-            dict.fromkeys(file for path in paths for file in _files(Path(path)))
-        )
+        # each file once, even if it is named twice
+        files: dict[Path, None] = {}
+        for path in paths:
+            files.update(dict.fromkeys(_files(Path(path))))
+        self.files = list(files)
         self._open: list[tuple[Path, sqlite3.Connection]] = []
         # by key of each done or quarantined cell: its file, and whether it is done
         self._places: dict[str, tuple[int, bool]] = {}
@@ -142,10 +155,11 @@ class Ledger:
         If several files have a cell, the first finished one counts, else the first.
         """
         query = "SELECT key, status FROM cells WHERE status != 'planned'"
+        places = {False: (k, False), True: (k, True)}  # shared, as cells are many
         for key, status in self._query(k, query):
             done = status == "done"
             if key not in self._places or (done and not self._places[key][1]):
-                self._places[key] = k, done
+                self._places[key] = places[done]
 
     def __enter__(self) -> Self:
         return self
@@ -155,9 +169,6 @@ class Ledger:
 
     def __len__(self) -> int:
         return sum(done for _, done in self._places.values())
-
-    def __contains__(self, key: str) -> bool:
-        return self._places.get(key, (0, False))[1]
 
     def done(self) -> set[str]:
         """Return the keys of the finished cells."""
@@ -177,13 +188,9 @@ class Ledger:
 
         Without finished rows, the installed version.
         """
-        query = (
-            "SELECT DISTINCT json_extract(spec, '$.version') FROM cells "
-            "WHERE status = 'done'"
-        )
         builds = set()
         for k in range(len(self._open)):
-            for (version,) in self._query(k, query):
+            for version, _ in self._query(k, VERSIONS):
                 # the versions of plugins follow after commas
                 builds.add(str(version).partition(", ")[0])
         if not builds:
@@ -226,7 +233,7 @@ class Ledger:
         file = self._open[self._places[key][0]][0]
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
-            f"{file}: the row of cell {name} must be one that posefit wrote: "
+            f"{file}: the row of cell {name} must be written by posefit: "
             f"{cut(text_of(error))}; "
             f'to run it again: sqlite3 {FILE} "{statement}"'
         )
@@ -247,10 +254,15 @@ class Ledger:
         try:
             yield from database.execute(query, values)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            raise _unreadable(file, error) from None
+            raise _unusable(file, error) from None
 
 
 SELECT = "SELECT key, spec, faults, row FROM cells"
+# the versions of the finished cells, with their numbers
+VERSIONS = """
+    SELECT json_extract(spec, '$.version'), count(*) FROM cells
+    WHERE status = 'done' AND json_valid(spec) GROUP BY 1
+"""
 
 
 def _parsed_row(
@@ -295,7 +307,7 @@ class Writer:
                 self._db = opened.enter_context(closing(database))
                 self._prepare()
             except (OSError, sqlite3.Error) as error:
-                raise _unwritable(self.path, error) from None
+                raise _unusable(self.path, error, writes=True) from None
             self._opened = opened.pop_all()
 
     def _prepare(self) -> None:
@@ -339,7 +351,7 @@ class Writer:
             with self._db:  # commits, or rolls back
                 yield
         except sqlite3.Error as error:
-            raise _unwritable(self.path, error) from None
+            raise _unusable(self.path, error, writes=True) from None
 
     def plan(
         self, cells: Iterable[Cell], elsewhere: Container[str] = frozenset()
@@ -438,10 +450,9 @@ class Writer:
         )
         return self._db.execute(query).rowcount
 
-    def old_specs(self) -> Iterator[Mapping[str, Any]]:
-        """Return an iterator of the specs of finished cells."""
-        query = "SELECT spec FROM cells WHERE status = 'done'"
-        return (json.loads(spec) for (spec,) in self._db.execute(query))
+    def versions(self) -> dict[str, int]:
+        """Return the number of finished cells by their version."""
+        return dict(self._db.execute(VERSIONS).fetchall())
 
 
 def _files(path: Path) -> list[Path]:
@@ -483,7 +494,7 @@ def _reader(file: Path) -> sqlite3.Connection:
                     "got an empty file"
                 )
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            raise _unreadable(file, error) from None
+            raise _unusable(file, error) from None
         opened.pop_all()
     return database
 
@@ -520,7 +531,7 @@ def _check_place(path: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")
     if path.is_symlink() and not path.exists():
-        raise InputError(f"{path}: expected a ledger, got a link that leads nowhere")
+        raise InputError(f"{path}: expected a ledger, got a broken link")
     if not folder.is_dir():
         return
     names = [name for name in sorted(os.listdir(folder)) if not name.startswith(".")]
@@ -615,48 +626,28 @@ def _is_damage(error: Exception) -> bool:
     return isinstance(error, sqlite3.DatabaseError) and not is_operational
 
 
-def _unreadable(file: Path, error: Exception) -> InputError:
-    """Return the error of a ledger that cannot be read."""
+def _unusable(file: Path, error: Exception, *, writes: bool = False) -> InputError:
+    """Return the error of a ledger that cannot be read, or written to."""
     if isinstance(error, sqlite3.ProgrammingError):
         return InputError(f"{file}: expected an open ledger, got a closed one")
     if _is_damage(error):
-        return _damaged(file, error)
-    reason = cut(str(error))
-    if "locked" in reason:
-        found = f"one in use ({reason}): try again when no other program locks it"
-    elif _is_without_shared_memory(error):
-        found = (
-            f"one on a disk that SQLite cannot share ({reason}): "
-            "copy it to a local folder and read that"
+        return InputError(
+            f"{file}: expected an intact SQLite file, got {cut(str(error))}: use a "
+            "backup, or recover the readable part with "
+            f"sqlite3 {file.name} .recover"
         )
-    else:
+    found = cut(str(getattr(error, "strerror", None) or error))
+    if "locked" in found:
+        found = f"one in use ({found}): try again when no other program locks it"
+    elif _is_without_shared_memory(error):
+        advice = "copy it to a local folder and read that"
+        if writes:
+            advice = "write to a local folder, and copy it afterwards"
+        found = f"one on a disk that SQLite cannot share ({found}): {advice}"
+    elif not writes:
         found = (
-            f"one that cannot be opened here ({reason}): copy it, "
+            f"one that cannot be opened here ({found}): copy it, "
             f"with {file.name}{WAL} if that exists, to a folder of yours"
         )
-    return InputError(f"{file}: expected a ledger that can be read, got {found}")
-
-
-def _unwritable(path: Path, error: Exception) -> InputError:
-    """Return the error of a ledger that cannot be written to."""
-    if _is_damage(error):
-        return _damaged(path, error)
-    reason = cut(str(getattr(error, "strerror", None) or error))
-    if "locked" in reason:
-        found = f"one in use ({reason}): try again when no other program locks it"
-    elif _is_without_shared_memory(error):
-        found = (
-            f"a disk that SQLite cannot share ({reason}): "
-            "write to a local folder, and copy it afterwards"
-        )
-    else:
-        found = reason
-    return InputError(f"{path}: expected a file that can be written to, got {found}")
-
-
-def _damaged(file: Path, error: Exception) -> InputError:
-    """Return the error of a damaged file."""
-    return InputError(
-        f"{file}: expected an intact SQLite file, got {cut(str(error))}: use a backup, "
-        f"or recover the readable part with sqlite3 {file.name} .recover"
-    )
+    wanted = "written to" if writes else "read"
+    return InputError(f"{file}: expected a ledger that can be {wanted}, got {found}")

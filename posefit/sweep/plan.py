@@ -168,13 +168,15 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     _check_names("product", crossed, [*LISTS, *PARTS])
     if any(part in crossed for part in PARTS):
         crossed = _with_methods(crossed)
-    lists = {
-        LISTS[name]: _listed(f"product.{name}", LISTS[name], values)
-        for name, values in crossed.items()
-    }
+    lists = {}
+    for name, values in crossed.items():
+        lists[LISTS[name]] = _listed(f"product.{name}", LISTS[name], values)
     names = []
     for field, entries in lists.items():
-        names.append({name for entry in entries for name in _fields(field, entry)})
+        fields_of_list: set[str] = set()
+        for entry in entries:
+            fields_of_list.update(_fields(field, entry))
+        names.append(fields_of_list)
     for some, others in combinations(names, 2):
         if some & others:
             raise InputError(
@@ -194,23 +196,25 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     def make(spec: Entry) -> Cell:
         """Return a cell, with the shared settings that its method has."""
         method = spec.get("method", defaults.get("method"))
-        names = families(method) if shared and isinstance(method, str) else ()
-        applicable = {
-            name: value
-            for name, value in shared.items()
-            if name.partition(".")[0] in names
-        }
+        names: Sequence[str] = ()
+        if shared and isinstance(method, str):
+            names = families(method)
+        applicable = {}
+        for name, value in shared.items():
+            if name.partition(".")[0] in names:
+                applicable[name] = value
         used.update(applicable)
         settings = applicable | flattened("settings", spec.get("settings", {}))
         return cell_of({**defaults, **spec, "settings": settings})
 
     def cells() -> Iterator[Cell]:
         yield from map(make, chain(_product(lists), single))
-        if unused := [name for name in shared if name not in used]:
-            raise InputError(
-                "defaults.settings must be of the plan's methods, "
-                f"got {quoted(unused[0])}, which none uses"
-            )
+        for name in shared:
+            if name not in used:
+                raise InputError(
+                    "defaults.settings must be of the plan's methods, "
+                    f"got {quoted(name)}, which none uses"
+                )
 
     _check_count(lists)
     return cells
@@ -247,7 +251,9 @@ def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
                 settings[key if "." in key else f"{name}.{key}"] = value
         method = f"{optimiser['optimiser']}@{prior['prior']}"
         methods.append({"method": method, "settings": settings})
-    lists = {name: values for name, values in crossed.items() if name not in PARTS}
+    lists = dict(crossed)
+    for part in PARTS:
+        del lists[part]
     return {**lists, "methods": methods}
 
 
@@ -308,7 +314,7 @@ def _fields(field: str, entry: Any) -> Entry:
 def _listed(name: str, field: str, values: Any, first: int = 0) -> Sequence[Any]:
     """Return the entries of a list.
 
-    For instances and seeds a number N stands for the N numbers from `first` on.
+    For instances and seeds a number N means the N numbers from `first` on.
     """
     if field in ("instance", "seed") and type(values) is int:
         if values > MAX_CELLS:
@@ -337,7 +343,9 @@ def _gridded(
     Returns:
         The entries, each with its settings.
     """
-    lists = flattened("grid", grid) if isinstance(grid, Mapping) else {}
+    lists: dict[str, Any] = {}
+    if isinstance(grid, Mapping):
+        lists = flattened("grid", grid)
     if (grid and not lists) or not isinstance(grid, Mapping):
         raise InputError(f"grid must hold {GRID}, got {quoted(grid)}")
     for name, values in lists.items():
@@ -348,7 +356,9 @@ def _gridded(
     known = set[str]()
     for entry in (_fields("method", entry) for entry in methods):
         method = entry.get("method")
-        names = names_of(method) if lists and isinstance(method, str) else ()
+        names: Sequence[str] = ()
+        if lists and isinstance(method, str):
+            names = names_of(method)
         known.update(names)
         applicable = [name for name in lists if name.partition(".")[0] in names]
         entry_settings = flattened("settings", entry.get("settings", {}))
@@ -363,11 +373,12 @@ def _gridded(
         for chosen in product(*(lists[name] for name in applicable)):
             settings = entry_settings | dict(zip(applicable, chosen, strict=True))
             entries.append({**entry, "settings": settings} if applicable else entry)
-    if unused := [name for name in lists if name not in used]:
-        raise InputError(
-            f"grid must hold settings of {', '.join(sorted(known))}, the plan's "
-            f"methods, got {quoted(unused[0])}"
-        )
+    for name in lists:
+        if name not in used:
+            raise InputError(
+                f"grid must hold settings of {', '.join(sorted(known))}, the plan's "
+                f"methods, got {quoted(name)}"
+            )
     return entries
 
 

@@ -1,12 +1,12 @@
 """The preview of `posefit sweep --dry-run`: a plan's cells and their approximate time.
 
-Each method runs a few frames. This also finds settings that a method's factory refuses,
-which checking a plan cannot find.
+Each method runs a few frames, in another process. This also finds settings that a
+method's factory refuses, which checking a plan cannot find.
 """
 
-import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import closing
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 from posefit.errors import InputError
 from posefit.reading import cut
 from posefit.settings import settings_text
-from posefit.sweep.cell import Cell, TrackCell, json_of, run_cell
-from posefit.sweep.command import cells_of, done_elsewhere, file_of
-from posefit.sweep.engine import text_of
-from posefit.sweep.ledger import Ledger
+from posefit.sweep.cell import Cell, TrackCell, foreign_plugins, json_of, run_cell
+from posefit.sweep.command import cells_of, done_in, file_of, shards_in
+from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome
 from posefit.sweep.plan import Plan
+from posefit.sweep.pool import Pool
 
 VALUES = 12  # the most values of a field that a preview lists
 # Frames of the two short runs of a method. The difference of their times is the time of
@@ -36,13 +36,14 @@ class Preview(NamedTuple):
     seconds: float  # of the cells to run, one after the other
 
 
-def preview(plan: str, out: str | None, shard: str | None) -> Preview:
+def preview(plan: str, out: str | None, shard: str | None, limits: Limits) -> Preview:
     """Return the preview of a plan, or of one shard of it.
 
     Args:
         plan: The plan's file, as `posefit.sweep.plan.Plan.read` takes it.
         out: The folder of the ledger, or None. Its finished cells will not run again.
         shard: The shard as I/N, or None for all cells.
+        limits: The longest time and the most memory of a run.
 
     Returns:
         The preview.
@@ -68,7 +69,9 @@ def preview(plan: str, out: str | None, shard: str | None) -> Preview:
         f"{len(listed):,} cells, {to_run:,} of them to run, {evaluations:,} evaluations"
     )
     lines = [*_value_lines(counts), last]
-    return Preview(lines, listed, sum(each.seconds() for each in times.values()))
+    with closing(Pool(1, limits, run_cell)) as pool:
+        seconds = sum(each.seconds(pool) for each in times.values())
+    return Preview(lines, listed, seconds)
 
 
 def time_line(seconds: float, workers: int) -> str:
@@ -90,13 +93,12 @@ def _cells(
     """Yield the cells of a plan or of a shard, each with whether it is done."""
     name = file_of(shard)
     cells = cells_of(Plan.read(plan), shard)
-    done = set[str]()
+    ledgers = []
     if out is not None:
+        ledgers.append(Path(out) / name)
         if shard is None:
-            done |= done_elsewhere(Path(out))
-        if (path := Path(out) / name).exists():
-            with Ledger(path) as ledger:
-                done |= ledger.done()
+            ledgers += shards_in(Path(out))
+    done = done_in(ledgers)
     yield from ((cell, cell.key in done) for cell in cells)
 
 
@@ -107,10 +109,9 @@ def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
         is_varied = len(values) > 1 and name not in ("version", "files")
         if name not in ("method", "motion") and not is_varied:
             continue
-        shown = [
-            f"{count:,} x {cut(value)}"
-            for value, count in islice(values.items(), VALUES)
-        ]
+        shown = []
+        for value, count in islice(values.items(), VALUES):
+            shown.append(f"{count:,} x {cut(value)}")
         if len(values) > VALUES:
             shown.append(f"and {len(values) - VALUES:,} other values")
         lines.append(f"{name:16}  {', '.join(shown)}")
@@ -129,18 +130,19 @@ class _Times:
         self.count += 1
         self._amount += _amount(cell)
 
-    def seconds(self) -> float:
+    def seconds(self, pool: Pool) -> float:
         """Return about how many seconds the cells take.
 
         Raises InputError if a run fails.
         """
         if not isinstance(self._first, TrackCell):
-            return _seconds(self._first) / _amount(self._first) * self._amount
+            return _seconds(self._first, pool) / _amount(self._first) * self._amount
         short = replace(self._first, frames=SHORT)
         longer = replace(self._first, frames=LONGER)
-        _seconds(longer)  # imports and compiles
-        of_short = _seconds(short)
-        slope = (_seconds(longer) - of_short) / (_amount(longer) - _amount(short))
+        _seconds(longer, pool)  # imports and compiles
+        of_short = _seconds(short, pool)
+        more = _amount(longer) - _amount(short)
+        slope = (_seconds(longer, pool) - of_short) / more
         slope = max(slope, 0.0)
         fixed = max(of_short - slope * _amount(short), 0.0)
         return fixed * self.count + slope * self._amount
@@ -152,15 +154,15 @@ def _amount(cell: Cell) -> float:
     return float(cell.total_evaluations * views)
 
 
-def _seconds(cell: Cell) -> float:
+def _seconds(cell: Cell, pool: Pool) -> float:
     """Return how long a cell takes. Raises InputError naming its method if it fails."""
-    start_time = time.perf_counter()
-    try:
-        run_cell(cell)
-    except Exception as error:
+    pool.submit(cell, foreign_plugins(cell.version))
+    outcomes: list[Outcome] = []
+    while not outcomes:
+        outcomes = pool.wait(POLL_SECONDS)
+    (outcome,) = outcomes
+    if outcome.reason is not None:
         settings = ", ".join(settings_text(cell.settings))
         method = f"{cell.method} with {settings}" if settings else cell.method
-        raise InputError(
-            f"{method} fails in its first frames: {text_of(error)}"
-        ) from error
-    return time.perf_counter() - start_time
+        raise InputError(f"{method} fails in its first frames: {outcome.reason}")
+    return float(outcome.result["seconds"])

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.files import new_file
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
 from posefit.settings import settings_text
@@ -89,37 +88,44 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         "status": row["status"],
         "reason": "; ".join(row.get("reasons", [])),
     }
-    columns |= {
-        name: value for name, value in spec.items() if name not in ("files", "version")
-    }
+    for name, value in spec.items():
+        if name not in ("files", "version"):
+            columns[name] = value
     columns["settings"] = ", ".join(settings_text(spec["settings"]))
     if spec["kind"] == "track":
-        corruptions = [
-            f"{kind} {strength:g}"
-            for kind, strength in sorted(spec["corruption"].items())
-        ]
-        columns["corruption"] = ", ".join(corruptions)
+        columns["corruption"] = ", ".join(damage(spec))
         columns["train"] = ", ".join(spec["train"])
-        views = [f"{view:g}" for view in spec["view_degrees"]]
-        columns["view_degrees"] = ", ".join(views)
+        columns["view_degrees"] = ", ".join(views(spec))
         columns["size"] = "x".join(map(str, spec["size"]))
     for name, value in row.items():
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability"):
             continue
         if name == "joint_errors_mm":
-            columns |= {
-                f"{name}.{joint}": error
-                for joint, error in zip(JOINTS, value, strict=True)
-            }
+            for joint, error in zip(JOINTS, value, strict=True):
+                columns[f"{name}.{joint}"] = error
         elif isinstance(value, Mapping):
-            columns |= {f"{name}.{part}": figure for part, figure in value.items()}
+            for part, figure in value.items():
+                columns[f"{name}.{part}"] = figure
+        elif isinstance(value, list):
+            columns[name] = "; ".join(value)
         else:
-            columns[name] = "; ".join(value) if isinstance(value, list) else value
+            columns[name] = value
     return columns
 
 
+def views(spec: Mapping[str, Any]) -> list[str]:
+    """Return the directions of a track's cameras in degrees."""
+    return [f"{view:g}" for view in spec["view_degrees"]]
+
+
+def damage(spec: Mapping[str, Any]) -> list[str]:
+    """Return the kinds of damage of a track's masks with their strengths."""
+    kinds = sorted(spec["corruption"].items())
+    return [f"{kind} {strength:g}" for kind, strength in kinds]
+
+
 def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
-    """Write rows as a new CSV file in UTF-8.
+    """Write rows as a CSV file in UTF-8.
 
     The file has all columns that any row has, in the order of their first row. Missing
     values are empty. If a spreadsheet would run a text as a formula, an apostrophe is
@@ -127,19 +133,19 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
 
     Args:
         rows: The values of each row by column.
-        path: The new file.
+        path: The file.
 
     Raises:
-        ValueError: There is no row, or the file exists or cannot be written.
+        ValueError: There is no row.
+        OSError: The file cannot be written.
     """
     table = list(rows)
     if not table:
         raise InputError("rows must be at least one, got none")
-    columns = list(dict.fromkeys(name for row in table for name in row))
-    with (
-        new_file(path) as building,
-        building.open("w", newline="", encoding="utf-8") as file,
-    ):
+    columns: dict[str, None] = {}  # an ordered set
+    for row in table:
+        columns.update(dict.fromkeys(row))
+    with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns, restval="")
         writer.writeheader()
         for row in table:
@@ -158,11 +164,9 @@ def search_run(row: Mapping[str, Any]) -> SuiteRun:
     """Return the suite run that a ledger's row of a single search describes."""
     spec = row["spec"]
     trace = row["trace"]
-    problem = {
-        name: value
-        for name, value in spec.items()
-        if name not in ("kind", "name", "evaluations", "version")
-    }
+    problem = dict(spec)
+    for name in ("kind", "name", "evaluations", "version"):
+        problem.pop(name, None)
     return SuiteRun(
         **problem,
         budget=spec["evaluations"],

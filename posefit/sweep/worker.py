@@ -1,50 +1,190 @@
-"""Turns a process into a worker of a pool. All patches of other libraries are here.
+"""A process of this machine that runs jobs, one after the other.
 
-- A spawned process would import the script that started it again. So `__main__` names
-  no file while a process is started.
-- pebble assumes that a process that ends with status 0 was allowed to. So `os._exit(0)`
-  has another status in a worker.
+A spawned process would import the script that started it again. So `__main__` names no
+file while a process is started.
 """
 
 import _signal  # type: ignore[import-not-found]
+import multiprocessing
 import os
 import pickle
 import random
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import lru_cache
+from functools import partial
+from math import inf
 from multiprocessing import resource_tracker
-from multiprocessing.context import SpawnContext, SpawnProcess
-from types import ModuleType
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
+import cloudpickle
 import numpy as np
 from numpy.random import mtrand
 
 from posefit.errors import PluginWarning
-from posefit.limits import end_with_parent
-from posefit.sweep.engine import single_thread
+from posefit.limits import end_with_parent, memory
+from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
-EXIT_ZERO_STATUS = 64  # the status of a process in which a job called `os._exit(0)`
+MARK = "POSEFIT_WORKER"  # the environment variable of a process' mark
+BEGUN = b""  # a worker sends this when it begins a job
+END_SECONDS = 1.0  # the longest that a process without a connection takes to end
 _starting = threading.Lock()
-# By module name: its members, and a copy of its callable members from before any job.
-_functions: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
 # all signals but the two that no process can handle
 _SIGNALS = sorted(
     signal.valid_signals()
     - {getattr(signal, name, None) for name in ("SIGKILL", "SIGSTOP")}
 )
+# Signals that nothing in a cell raises by mistake, so they came from outside. The
+# kernel sends one too when memory runs out; but a cell reaches its own memory limit
+# first if the machine has as much memory as all cells together may take.
+EXTERNAL_SIGNALS = {
+    signal.SIGKILL,
+    signal.SIGTERM,
+    signal.SIGINT,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGUSR1,
+    signal.SIGUSR2,
+}
+
+
+class Worker:
+    """The driver's side of a process that runs jobs.
+
+    Args:
+        task: A pickled pair: the function that is called with each job, and a function
+            to call before the first job, or None.
+        limits: The longest time and the most memory of a job.
+        tenant: Whose jobs it runs, see `posefit.sweep.engine.Engine.submit`.
+
+    Attributes:
+        tenant: The same.
+        connection: Becomes readable when a job begins or ends.
+    """
+
+    def __init__(self, task: bytes, limits: Limits, tenant: str) -> None:
+        self.tenant = tenant
+        self._limits = limits
+        self._job: Any = None
+        self._deadline = inf
+        self.connection, other_end = multiprocessing.Pipe()
+        self._process = _Process(
+            target=_serve,
+            args=(os.getpid(), sys.path, other_end, task, limits.gigabytes),
+            daemon=True,
+        )
+        self._process.start()
+        other_end.close()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether it has a job."""
+        return self._job is not None
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether its process has not ended."""
+        return self._process.exitcode is None
+
+    def begin(self, job: Any) -> None:
+        """Send a job to the process."""
+        self._job = job
+        # `outcome` tells what became of a process that ended meanwhile
+        with suppress(OSError):
+            self.connection.send_bytes(cloudpickle.dumps(job))
+
+    def outcome(self) -> Outcome | None:
+        """Return the outcome of the job, or None if it has not ended.
+
+        Unless the job returned or raised an error, its process has ended.
+        """
+        answer = BEGUN
+        try:
+            while answer == BEGUN and self.connection.poll():
+                answer = self.connection.recv_bytes()
+                self._deadline = time.monotonic() + self._limits.seconds
+        except (EOFError, OSError):
+            # The process has ended, or a job has closed the connection. `join` would
+            # wait without limit for a job that has closed its other files, too.
+            until = time.monotonic() + END_SECONDS
+            while self.is_alive and time.monotonic() < until:
+                time.sleep(0.01)
+            return self._ended()
+        if answer == BEGUN:
+            if not self.is_alive:
+                return self._ended()
+            if time.monotonic() > self._deadline:
+                return self._failed(
+                    f"it ran past its limit of {self._limits.seconds:g} s"
+                )
+            return None
+        try:
+            outcome = Outcome(self._job, *pickle.loads(answer))
+        except Exception as error:  # a result that cannot be read
+            return self._failed(text_of(error))
+        self._job = None
+        self._deadline = inf
+        return outcome
+
+    def _ended(self) -> Outcome:
+        """Return the outcome of the job after its process has ended."""
+        code = self._process.exitcode
+        if code is None:
+            return self._failed("it closed the connection of its process")
+        if code >= 0:
+            return self._failed(f"its process ended itself with status {code}")
+        # a negative code is the number of the signal that killed it
+        number = -code
+        name = f"signal {number}"
+        if number in set(signal.Signals):
+            name = signal.Signals(number).name
+        is_own_fault = number not in EXTERNAL_SIGNALS
+        return self._failed(f"its process died of {name}", is_own_fault=is_own_fault)
+
+    def _failed(self, reason: str, *, is_own_fault: bool = True) -> Outcome:
+        """End the process, and return the outcome of the job."""
+        job = self._job
+        self.end()
+        return Outcome(job, None, reason, is_own_fault=is_own_fault)
+
+    def end(self) -> None:
+        """End the process and all processes that its jobs have started."""
+        if self.connection.closed:
+            return
+        pid = self._process.pid
+        assert pid is not None
+        # a process that a job starts belongs to the worker's process group
+        with suppress(OSError, AttributeError):
+            os.killpg(pid, signal.SIGKILL)
+        # unless it has left the group
+        _end_marked(self._process.mark)
+        self._process.kill()
+        self._process.join()
+        self.connection.close()
+        self._job = None
 
 
 class _Process(SpawnProcess):
     """A process that does not import the script that started it.
 
     The script may start a comparison without an `if __name__ == "__main__"`.
+
+    Attributes:
+        mark: The value of an environment variable that only this process and those that
+            it starts have.
     """
+
+    def __init__(self, *arguments: Any, **more: Any) -> None:
+        super().__init__(*arguments, **more)
+        self.mark = token_hex()
 
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802
@@ -55,9 +195,21 @@ class _Process(SpawnProcess):
             }
             try:
                 vars(main).update(dict.fromkeys(before))
+                os.environ[MARK] = process.mark
                 return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
             finally:
+                os.environ.pop(MARK, None)
                 vars(main).update(before)
+
+
+def _end_marked(mark: str) -> None:
+    """End all other processes whose environment has a mark, where /proc lists them."""
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        process = int(path.parent.name)
+        # a process may end meanwhile, and others do not let us read theirs
+        with suppress(OSError):
+            if process != os.getpid() and mark.encode() in path.read_bytes():
+                os.kill(process, signal.SIGKILL)
 
 
 @contextmanager
@@ -81,118 +233,38 @@ def _interrupts_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class Context(SpawnContext):
-    """Starts worker processes, and ends the processes that they leave behind."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._started: list[_Process] = []
-
-    def Process(  # type: ignore[override]  # noqa: N802, as its class is called
-        self, *arguments: Any, **more: Any
-    ) -> _Process:
-        """Return a new process, not yet started."""
-        process = _Process(*arguments, **more)
-        self._started.append(process)
-        return process
-
-    def end_orphans(self) -> None:
-        """End the processes whose worker has ended.
-
-        A process that a cell started belongs to its worker's process group.
-        """
-        for process in self._started.copy():
-            if process.pid is not None and not _exists(process.pid):
-                self._started.remove(process)
-                with suppress(OSError, AttributeError):
-                    os.killpg(process.pid, signal.SIGKILL)
-
-
-def _exists(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
 @contextmanager
 def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards what the body changes in this process.
+    """Undo afterwards the changes that the body makes in this process.
 
     These are the folder, the environment variables, `sys.path`, the signal handlers,
     the global random numbers and NumPy's handling of floating-point errors. A worker
-    runs cells of all methods, and the changes of one must not reach the others.
+    runs cells of several methods, and the changes of one must not reach the others.
     """
-    state = _first_state()
+    folder = os.getcwd()
+    variables = dict(os.environ)
+    path = sys.path[:]
+    handlers = _handlers()
+    numbers = random.getstate()
+    bit_generator = mtrand.get_bit_generator()
+    numpy_numbers = np.random.get_state()  # noqa: NPY002
     try:
         with np.errstate():
             yield
     finally:
-        state.restore()
-
-
-@lru_cache(maxsize=1)
-def _first_state() -> "_State":
-    """Return the state before the first job, to which each job returns."""
-    return _State()
-
-
-class _State:
-    """The state of this process when the object was made, to which it can return."""
-
-    def __init__(self) -> None:
-        self._folder = os.getcwd()
-        self._variables = dict(os.environ)
-        self._path = sys.path[:]
-        self._handlers = _handlers()
-        self._numbers = random.getstate()
-        self._bits = mtrand.get_bit_generator()
-        self._numpy = np.random.get_state()  # noqa: NPY002
-
-    def restore(self) -> None:
-        """Undo all changes since then."""
-        os.chdir(self._folder)
+        os.chdir(folder)
         # most jobs change nothing, and a comparison is faster than writing everything
-        if dict(os.environ) != self._variables:
+        if dict(os.environ) != variables:
             os.environ.clear()
-            os.environ.update(self._variables)
-        sys.path[:] = self._path
-        if (handlers := _handlers()) != self._handlers:
-            for number, before, now in zip(
-                _SIGNALS, self._handlers, handlers, strict=True
-            ):
-                # None stands for a handler that Python did not install
-                if before is not None and now != before:
-                    signal.signal(number, before)
-        random.setstate(self._numbers)
-        if mtrand.get_bit_generator() is not self._bits:
-            mtrand.set_bit_generator(self._bits)
-        np.random.set_state(self._numpy)  # noqa: NPY002
-
-
-@contextmanager
-def functions_kept() -> Iterator[None]:
-    """Put back afterwards the functions and classes of modules that the body replaces.
-
-    A plugin that replaces `numpy.linalg.norm`, for example, would change the results of
-    the next method in this process. Modules that the body itself loads do not change.
-    """
-    for name, module in tuple(sys.modules.items()):
-        if name in _functions or not isinstance(module, ModuleType):
-            continue
-        members = vars(module)
-        functions = {
-            member: value for member, value in members.items() if callable(value)
-        }
-        _functions[name] = members, functions
-    try:
-        yield
-    finally:
-        for members, functions in _functions.values():
-            for member, function in functions.items():
-                if members.get(member) is not function:
-                    members[member] = function
+            os.environ.update(variables)
+        sys.path[:] = path
+        for number, before, now in zip(_SIGNALS, handlers, _handlers(), strict=True):
+            # None means a handler that Python did not install
+            if before is not None and now != before:
+                signal.signal(number, before)
+        random.setstate(numbers)
+        mtrand.set_bit_generator(bit_generator)
+        np.random.set_state(numpy_numbers)  # noqa: NPY002
 
 
 def _handlers() -> list[Any]:
@@ -201,7 +273,7 @@ def _handlers() -> list[Any]:
     return list(map(_signal.getsignal, _SIGNALS))
 
 
-def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
+def become_worker(parent: int, path: list[str]) -> None:
     """Make this process a worker.
 
     It has one thread, ignores Ctrl-C, which the driver handles, and ends with its
@@ -210,7 +282,6 @@ def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
     Args:
         parent: The process id of the driver.
         path: The driver's `sys.path`.
-        prepare: A pickled function to call first, or a pickled None.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # a process that a cell starts must not inherit the block
@@ -224,10 +295,48 @@ def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
     sys.path[:] = path
     # the driver has already issued these warnings
     warnings.simplefilter("ignore", PluginWarning)
-    leave = os._exit
-    # the module's docstring says why
-    os._exit = lambda status: leave(status or EXIT_ZERO_STATUS)
     single_thread()
-    end_with_parent(parent)
-    if (called := pickle.loads(prepare)) is not None:
-        called()
+    end_with_parent(parent, partial(_end_marked, os.environ[MARK]))
+
+
+def _serve(
+    parent: int, path: list[str], connection: Connection, task: bytes, gigabytes: float
+) -> None:
+    """Run each job that the driver sends. Answers are pickled.
+
+    An answer is a pair: the job's result, and the reason if it failed.
+    """
+    become_worker(parent, path)
+    process = os.getpid()
+    run: Run | None = None
+    while True:
+        try:
+            job = connection.recv_bytes()
+        except (EOFError, OSError):
+            # the driver has ended: `end_with_parent` ends this process and all others
+            threading.Event().wait()
+        connection.send_bytes(BEGUN)
+        try:
+            if run is None:
+                run = _prepared(task)
+            with memory(gigabytes), left_as_it_was():
+                result = run(pickle.loads(job))
+            answer = cloudpickle.dumps((result, None))
+        except MemoryError:
+            reason = f"it wanted more memory than its limit of {gigabytes:g} GB"
+            answer = pickle.dumps((None, reason))
+        # also SystemExit: a cell that exits must not end its worker
+        except BaseException as error:
+            answer = pickle.dumps((None, text_of(error)))
+        # a job may have forked the process, but there is one answer
+        if os.getpid() != process:
+            os._exit(0)
+        connection.send_bytes(answer)
+
+
+def _prepared(task: bytes) -> Run:
+    """Return the function of a worker's jobs after the worker is prepared for them."""
+    run, prepare = pickle.loads(task)
+    if prepare is not None:
+        prepare()
+    return run  # type: ignore[no-any-return]

@@ -44,11 +44,17 @@ def check_optimiser(
 
     Args:
         factory: takes (space, rng) and keyword-only settings.
-        next_frame: what the optimiser does at a new frame, as it is registered.
+        next_frame: the registered treatment of the optimiser at a new frame.
         settings: passed to the factory.
 
     Returns:
         The report. It is true if no check failed.
+
+    Example:
+        >>> import posefit
+        >>> from posefit.plugin import check_optimiser
+        >>> check_optimiser(posefit.optimiser("random")).of("failed")
+        []
     """
     return run_checks(factory, checks_of("optimiser", factory, settings, next_frame))
 
@@ -62,6 +68,12 @@ def check_prior(factory: Factory, *, settings: Settings = None) -> Report:
 
     Returns:
         The report. It is true if no check failed.
+
+    Example:
+        >>> import posefit
+        >>> from posefit.plugin import check_prior
+        >>> check_prior(posefit.prior("pca")).of("failed")
+        []
     """
     return run_checks(factory, checks_of("prior", factory, settings))
 
@@ -73,7 +85,7 @@ def check_tracker(
 
     Args:
         factory: takes (task) and keyword-only settings.
-        looks_ahead: whether the tracker reads later frames first, as it is registered.
+        looks_ahead: whether the tracker is registered to read later frames first.
         settings: passed to the factory.
 
     Returns:

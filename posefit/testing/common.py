@@ -1,4 +1,4 @@
-"""Rules that several kinds of plugins share, and what the other rules are made of."""
+"""Rules that several kinds of plugins share, and the parts of other rules."""
 
 import copy
 import inspect
@@ -209,10 +209,10 @@ def global_random_state() -> tuple[object, ...]:
 
 @contextmanager
 def left_alone() -> Iterator[None]:
-    """Check that the body leaves the global random generators as they are."""
+    """Check that the body leaves the global random generators unchanged."""
     before = global_random_state()
     yield
     expect(
         global_random_state() == before,
-        "the global random state must stay as it is, got another",
+        "the global random state must not change, got another",
     )

@@ -34,10 +34,10 @@ MAX_SHARE_OF_CHANCE = 0.95  # a cost beats chance if it is below this share of i
 SIDES_BUDGET = 2_440
 MAX_SHARE_AT_SIDES = 0.15
 SIDES_SEEDS = range(3)
-MAX_SECONDS = 0.05  # for a proposal: twenty thousand times what a pose costs
+MAX_SECONDS = 0.05  # a proposal: twenty thousand times a pose's cost
 TURNS = 24  # populations after which true costs must have helped
 LOADED = b"loaded"
-# the program of the new process; what the plugin prints goes to standard error
+# the program of the new process; the plugin's prints go to standard error
 TRACING = f"""
 import os, pickle, sys
 out = os.fdopen(os.dup(1), "wb", 0)
@@ -109,10 +109,8 @@ class Case(PluginCase):
 
     def trace(self, seed: int = 0) -> list[Array]:
         """Return six populations that a new optimiser proposes."""
-        return [
-            proposals
-            for proposals, _ in self.steps(self.build(SPACE, seed), SPACE, sphere, 6)
-        ]
+        steps = self.steps(self.build(SPACE, seed), SPACE, sphere, 6)
+        return [proposals for proposals, _ in steps]
 
     def best(
         self, space: Space, evaluate: Evaluate, seed: int, evaluations: int
@@ -161,9 +159,7 @@ def check_population(proposals: Array, space: Space) -> None:
 
 def same(first: list[Array], second: list[Array]) -> bool:
     """Return whether two traces are the same bit for bit."""
-    return len(first) == len(second) and all(
-        np.array_equal(a, b) for a, b in zip(first, second, strict=True)
-    )
+    return len(first) == len(second) and all(map(np.array_equal, first, second))
 
 
 def shape(case: Case) -> str:
@@ -294,9 +290,8 @@ def order(case: Case) -> str:
         means = [sphere(proposals).mean() for proposals, _ in steps]
         return float(np.mean(means[len(means) // 2 :]))
 
-    good, bad = (
-        [last(evaluate, seed) for seed in range(3)] for evaluate in (sphere, shuffled)
-    )
+    good = [last(sphere, seed) for seed in range(3)]
+    bad = [last(shuffled, seed) for seed in range(3)]
     if good == bad:
         raise SkippedError("it ignores the costs, or has one proposal at a time")
     expect(
@@ -337,7 +332,7 @@ def new_process(case: Case) -> None:
         raise SkippedError("the factory cannot be imported in another process")
     expect(
         trace,
-        "it must work in a new process, got one that ended in the middle "
+        "it must work in a new process, got an early end: "
         f"{ran.stderr.decode()[-300:]}",
     )
     expect(
@@ -435,11 +430,11 @@ def sphere_problem(case: Case) -> str:
 def sides(case: Case) -> str:
     """A search comes near a minimum that lies in a corner of the box."""
     _skip_baseline(case)
-    draws = [
-        draw_population(BOX, np.random.default_rng(seed), SIDES_BUDGET)
-        for seed in SEEDS
-    ]
-    chance = float(np.median([float(slope(drawn).min()) for drawn in draws]))
+    lowest_drawn = []
+    for seed in SEEDS:
+        drawn = draw_population(BOX, np.random.default_rng(seed), SIDES_BUDGET)
+        lowest_drawn.append(float(slope(drawn).min()))
+    chance = float(np.median(lowest_drawn))
     below = MAX_SHARE_AT_SIDES * chance
     lowest = [_lowest(case, seed, below) for seed in SIDES_SEEDS]
     best = float(np.median(lowest))
@@ -477,16 +472,17 @@ def real_problem(case: Case) -> str:
 
 def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     _skip_baseline(case)
-    draws = [
-        draw_population(space, np.random.default_rng(seed), BUDGET) for seed in SEEDS
-    ]
-    chance = float(np.median([float(evaluate(drawn).min()) for drawn in draws]))
+    lowest_drawn = []
+    for seed in SEEDS:
+        drawn = draw_population(space, np.random.default_rng(seed), BUDGET)
+        lowest_drawn.append(float(evaluate(drawn).min()))
+    chance = float(np.median(lowest_drawn))
     below = MAX_SHARE_OF_CHANCE * chance
     lowest = list[float]()
     for seed in SEEDS:
         lowest.append(case.best(space, evaluate, seed, BUDGET))
         if sum(cost < below for cost in lowest) > len(SEEDS) // 2:
-            # the median is below whatever the other seeds give
+            # the median is below for any results of the other seeds
             break
     best = float(np.median(lowest))
     expect(
@@ -506,10 +502,8 @@ def speed(case: Case) -> str:
     """A proposal takes less than 50 ms to make."""
 
     def search(seed: int) -> int:
-        return sum(
-            len(proposals)
-            for proposals, _ in case.steps(case.build(BOX, seed), BOX, sphere, 10)
-        )
+        steps = case.steps(case.build(BOX, seed), BOX, sphere, 10)
+        return sum(len(proposals) for proposals, _ in steps)
 
     return check_speed("a proposal", MAX_SECONDS, search)
 

@@ -1,7 +1,7 @@
 """Checks an installed plugin in a separate process, so that no plugin stops a report.
 
 `python -m posefit.testing.process` is that process. It reads what to check as JSON,
-and writes a line of JSON before and after each check. What the plugin prints goes to
+and writes a line of JSON before and after each check. The plugin's prints go to
 standard error. If the process ends or hangs during a check, that check has failed, and
 another process continues with the next one.
 """
@@ -109,7 +109,7 @@ def _check() -> None:
     """Run the checks that standard input asks for, and end this process."""
     faulthandler.enable()
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    # what the plugin prints must not mix with the messages
+    # the plugin's prints must not mix with the messages
     os.dup2(2, 1)
     task = json.load(sys.stdin)
     end_with_parent(task["parent"])
@@ -150,10 +150,10 @@ def _checks(
 
     offer = registry().offer(kind, name)
     if rivals := registry().rivals(offer):
-        theirs = ", ".join(
-            f"{plugin.name} ({plugin.distribution} {plugin.version})"
-            for plugin in rivals
-        )
+        labels = []
+        for plugin in rivals:
+            labels.append(f"{plugin.name} ({plugin.distribution} {plugin.version})")
+        theirs = ", ".join(labels)
         raise InputError(
             f"{kind} {name!r} must be of one plugin, "
             f"got that of {offer.distribution}, which is used, "
@@ -169,7 +169,9 @@ def _checks(
     names = [check.name for check in checks]
     for rule in only:
         one_of("--only", rule, names)
-    return offer.label, [check for check in checks if not only or check.name in only]
+    if only:
+        checks = [check for check in checks if check.name in only]
+    return offer.label, checks
 
 
 if __name__ == "__main__":

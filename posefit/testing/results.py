@@ -16,7 +16,7 @@ SAME_CAUSE = 2  # failures with the same cause after which the other checks are 
 
 
 class BrokenError(AssertionError):
-    """A rule is broken. The message says what was expected and what came."""
+    """A rule is broken. The message has the expected and the actual value."""
 
 
 class SkippedError(Exception):
@@ -36,7 +36,7 @@ class Result:
     name: str
     outcome: Literal["passed", "failed", "skipped"]
     detail: str = ""
-    traceback: str = ""  # of what the plugin raised, from its first own frame
+    traceback: str = ""  # of the plugin's error, from its first own frame
 
 
 @dataclass(frozen=True)
@@ -99,19 +99,17 @@ class Report:
             )
             # one traceback per cause
             if result.traceback and _cause(result.detail) not in causes:
-                lines += [
-                    f"           {line}".rstrip()
-                    for line in result.traceback.splitlines()
-                ]
+                for line in result.traceback.splitlines():
+                    lines.append(f"           {line}".rstrip())
             causes.add(_cause(result.detail))
         return "\n".join(lines)
 
     @property
     def summary(self) -> str:
         """How many checks ran, failed and were skipped."""
-        passed, failed, skipped = (
-            len(self.of(outcome)) for outcome in ("passed", "failed", "skipped")
-        )
+        passed = len(self.of("passed"))
+        failed = len(self.of("failed"))
+        skipped = len(self.of("skipped"))
         return f"{passed + failed} checks ran, {failed} failed, {skipped} skipped"
 
 

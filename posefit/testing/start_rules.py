@@ -34,11 +34,10 @@ def images() -> tuple[Task, Sequence[Observation]]:
     """Return a task of unknown first yaw, and three frames of the walk in one view."""
     task, motion, _ = scene()
     camera = Camera.around(motion.translations[0], 0.8, DISTANCE, SIZE)
-    masks = [
-        project(task.body, camera, motion.poses[k], motion.translations[k])
-        for k in FRAMES
-    ]
-    observations = [Observation([Silhouette.of(mask)]) for mask in masks]
+    observations = []
+    for k in FRAMES:
+        mask = project(task.body, camera, motion.poses[k], motion.translations[k])
+        observations.append(Observation([Silhouette.of(mask)]))
     return replace(
         task, cameras=[camera], yaw=None, translation="aligned"
     ), observations
@@ -108,7 +107,7 @@ def several_views(case: Case) -> None:
 
 
 def same_again(case: Case) -> None:
-    """The same frame gives the same poses and weights, whatever came before."""
+    """The same frame gives the same poses and weights, after any other frames."""
     start = case.build()
     for observation in [images()[1][-1], *images()[1]]:
         guess = start.posterior(observation)
@@ -128,7 +127,7 @@ def inputs(case: Case) -> None:
     task, (observation, *_) = images()
     same = unchanged(observation.silhouettes[0].mask, task.anchor)
     case.build().posterior(observation)
-    expect(same(), "observations and task must stay as they are, got others")
+    expect(same(), "observations and task must not change, got others")
 
 
 def gain(case: Case) -> str:
@@ -145,11 +144,11 @@ def gain(case: Case) -> str:
                 task.body, task.cameras, observation.silhouettes, space
             )
             start = start_in(cost, modes_apart(task.body.skeleton, guess))
-            drawn = [
-                draw_population(each, np.random.default_rng(0), POPULATION)
-                for each in (replace(space, start=start), space)
-            ]
-            costs.append([cost(population).min() for population in drawn])
+            costs_of_frame = []
+            for each in (replace(space, start=start), space):
+                drawn = draw_population(each, np.random.default_rng(0), POPULATION)
+                costs_of_frame.append(cost(drawn).min())
+            costs.append(costs_of_frame)
     if not costs:
         raise SkippedError("it knows no pose of the built-in walk")
     guided, blind = np.mean(costs, axis=0)

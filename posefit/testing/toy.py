@@ -51,7 +51,7 @@ def slope(proposals: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Toy:
-    """A box of `dimensions` in which `rule` says what is allowed.
+    """A box of `dimensions` in which `rule` decides which points are allowed.
 
     The first `wrapping` coordinates are periodic.
     """

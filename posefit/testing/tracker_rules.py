@@ -32,10 +32,10 @@ def scene() -> tuple[Task, Motion, Sequence[Observation]]:
     motion = built_in.motion("walk", frames=FRAMES)
     body = Body.of(motion.skeleton)
     camera = Camera.around(motion.translations.mean(axis=0), 0.8, 3.5, SIZE)
-    observations = [
-        Observation([Silhouette.of(project(body, camera, pose, where))], where)
-        for pose, where in zip(motion.poses, motion.translations, strict=True)
-    ]
+    observations = []
+    for pose, where in zip(motion.poses, motion.translations, strict=True):
+        silhouette = Silhouette.of(project(body, camera, pose, where))
+        observations.append(Observation([silhouette], where))
     training = [built_in.motion(style) for style in built_in.other_styles("walk")]
     anchor = motion.translations[0]
     return (
@@ -181,17 +181,15 @@ def inputs(case: Case) -> None:
     """The tracker does not modify observations or task."""
     expect(
         case.first.inputs_unchanged,
-        "observations and task must stay as they are, got others",
+        "observations and task must not change, got others",
     )
 
 
 def follows(case: Case) -> str:
     """The track is not lost: its MPJPE is below 150 mm."""
     task, motion, _ = scene()
-    poses, places = (
-        np.array([getattr(frame, name) for frame in case.first.frames])
-        for name in ("pose", "translation")
-    )
+    poses = np.array([frame.pose for frame in case.first.frames])
+    places = np.array([frame.translation for frame in case.first.frames])
     error = metrics.mpjpe_mm(
         motion.joints, task.body.skeleton.joints(poses, places)
     ).mean()

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from posefit.evaluation.errors import LOST, Table, evaluated, unseen
+from posefit.evaluation.errors import Table, evaluated, flagged, unseen
 from posefit.evaluation.measures import Effort
 from posefit.evaluation.trust import trust_of
 from posefit.fitting.shape import Shape
@@ -110,8 +110,8 @@ def evaluate(
         trace=frames[0].trace.tolist() if len(frames) == 1 else None,
         modes=[round(mode.weight, 6) for mode in modes] or None,
         none_of_modes=round(float(np.mean(none_right)), 6) if none_right else None,
-        unknown_sides=_numbers(table, "unknown_sides", 1.0),
-        lost_frames=_numbers(table, "lost", LOST),
+        unknown_sides=_numbers(table, "unknown_sides"),
+        lost_frames=_numbers(table, "lost"),
         relocalised=relocalised,
         retracked_outside=outside,
         backwards_share=round(float(backwards.mean()), 6),
@@ -137,10 +137,7 @@ def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posteri
     )
 
 
-def _numbers(table: Table, name: str, least: float) -> list[int] | None:
-    """Return the numbers of the frames with at least `least` in a column.
-
-    Returns None if the whole column is unknown.
-    """
-    values = table[name]
-    return None if np.isnan(values).all() else table["frame"][values >= least].tolist()
+def _numbers(table: Table, name: str) -> list[int] | None:
+    """Return the numbers of the flagged frames, or None if it is known of none."""
+    frames = flagged(table, name)
+    return None if frames is None else table["frame"][frames.frames].tolist()

@@ -7,20 +7,17 @@ import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, Unpack
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
+from posefit.footage.kinds import Resolved, first_of, resolve
+from posefit.footage.named import Footage
+from posefit.footage.options import SourceOptions
 from posefit.footage.scene import Scene
-from posefit.footage.source import (
-    Footage,
-    Resolved,
-    check_used,
-    first_of,
-    resolve,
-    scene_of,
-)
+from posefit.footage.source import scene_of
+from posefit.footage.uses import check_used
 from posefit.motion import built_in
 from posefit.motion.clips import (
     Source,
@@ -29,13 +26,15 @@ from posefit.motion.clips import (
     training_motions,
 )
 from posefit.motion.motion import Motion
+from posefit.options import declared
 from posefit.output.files import chosen_kinds
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
 from posefit.tracking.defaults import completed
-from posefit.tracking.options import VIEW, TrackOptions, declared
+from posefit.tracking.keywords import FitKeywords, TrackKeywords
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
@@ -54,7 +53,7 @@ def track(
     resume: bool = False,
     write: str | Sequence[str] = (),
     progress: Progress | None = None,
-    **options: Any,
+    **options: Unpack[TrackKeywords],
 ) -> Track:
     """Track a person through a source's silhouettes.
 
@@ -87,12 +86,12 @@ def track(
     scene = source if isinstance(source, Scene) else None
     resolved = _resolved(source)
     changed = []
-    for name in VIEW:
-        if getattr(chosen, name) != getattr(TrackOptions, name):
-            changed.append(name)
+    for each in fields(SourceOptions):
+        if getattr(chosen, each.name) != each.default:
+            changed.append(each.name)
     if scene is not None and changed:
         raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
-    check_used(resolved.medium, chosen.view)
+    check_used(resolved.medium, chosen)
     known = resolved.medium == "motion"
     _check_for_kind(chosen, known, [*resolved.named, *chosen.train])
     named = resolved.named[0]
@@ -114,7 +113,7 @@ def track(
     with recorder:
         with progress.phase("masks"):
             start = clocks()
-            scene = scene or scene_of(resolved, progress, **chosen.view)
+            scene = scene or scene_of(resolved, chosen, progress)
             # a known motion is rendered during tracking, not read here
             if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
@@ -142,7 +141,7 @@ def fit(
     source: Footage | Sequence[Any] = "walk",
     *,
     frame: int | None = None,
-    **options: Any,
+    **options: Unpack[FitKeywords],
 ) -> Fit:
     """Estimate the pose in one frame.
 

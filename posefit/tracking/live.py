@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -16,17 +16,22 @@ from threadpoolctl import threadpool_limits
 from posefit.errors import InputError
 from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.cameras import calibrated, combined, straightening
+from posefit.footage.cameras import combined
 from posefit.footage.live import Stream, live_views
+from posefit.footage.pairing import calibrated
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of, check_used, logged
+from posefit.footage.source import body_of, logged
+from posefit.footage.straightening import straightening
+from posefit.footage.uses import check_used
 from posefit.footage.views import Observations, View, joined
 from posefit.motion.clips import training_clips, training_motions
+from posefit.options import declared
 from posefit.progress import QUIET, Progress
 from posefit.tracking.defaults import completed
 from posefit.tracking.initialise import initialise, task_of
+from posefit.tracking.keywords import TrackKeywords
 from posefit.tracking.method import method_names, prepare
-from posefit.tracking.options import TrackOptions, declared
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_hypothesis, with_notes
 from posefit.tracking.restarts import SEARCHED, TRIAL_FRAMES, TRIAL_STRIDE
 from posefit.tracking.trajectory import Hypothesis
@@ -63,7 +68,7 @@ class LiveFrame:
 
 
 def track_live(
-    source: str = "-", *, progress: Progress = QUIET, **options: Any
+    source: str = "-", *, progress: Progress = QUIET, **options: Unpack[TrackKeywords]
 ) -> Iterator[LiveFrame]:
     """Yield the tracked frames of a stream.
 
@@ -95,7 +100,9 @@ def track_live(
     stream = Stream(source)
     views = live_views(stream, chosen.extraction, progress.log)
     first = list(islice(views, TRIAL_FRAMES * TRIAL_STRIDE))
-    scene, observed = _scene_of(first, source, chosen.fps or stream.rate, chosen)
+    if chosen.fps is None:
+        chosen = chosen.changed(fps=stream.rate)
+    scene, observed = _scene_of(first, source, chosen)
     training = training_motions(clips, scene.fps)
     scene = with_notes(logged(scene, progress), training)
     for warning in scene.warnings:
@@ -130,22 +137,21 @@ def track_live(
 
 
 def _scene_of(
-    first: Sequence[View], name: str, fps: float | None, options: TrackOptions
+    first: Sequence[View], name: str, options: TrackOptions
 ) -> tuple[Scene, Callable[[View], Observation]]:
     """Return the scene of the first frames, and a function that observes later ones."""
     masks = not first or first[0].pictures is None
-    check_used("masks" if masks else "pictures", options.view)
+    check_used("masks" if masks else "pictures", options)
     if not any(view.usable[0] for view in first):
         raise InputError(
             f"{name}: expected a person in the first {len(first)} frames, got none"
         )
-    facing = next(iter(options.view["view_degrees"]), None)
-    known = calibrated(options.camera, [None])  # type: ignore[arg-type]
+    known = calibrated(options.cameras, [None])
     unit = None if known else options.unit
     body, notes, of_height = body_of(options.asf, options.height, unit)
     view = replace(joined(first), warnings=notes)
-    scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
-    scene = replace(scene, guesses=[*scene.guesses, *of_height])
+    scene = combined([view], body, known, options)
+    scene = replace(scene, name=name, guesses=[*scene.guesses, *of_height])
     _, how, _ = straightening(known[0], view.size) if known else (None, None, None)
 
     def observed(live: View) -> Observation:

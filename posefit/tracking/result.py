@@ -58,6 +58,11 @@ class Track:
         modes: Other likely motions of the whole track, the likeliest first.
         scene: The tracked scene.
 
+    Example:
+        >>> import posefit
+        >>> track = posefit.track("walk", frames=(0, 2), evaluations=80)
+        >>> track.joints.shape, track.angles("left_knee_flexion").shape
+        ((2, 27, 3), (2,))
     """
 
     motion: Motion
@@ -209,7 +214,17 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The estimated pose of one frame, number `k` of a track."""
+    """The estimated pose of one frame, number `k` of a track.
+
+    Attributes:
+        track: The track of one frame.
+        k: The number of the frame in the track.
+
+    Example:
+        >>> import posefit
+        >>> posefit.fit("walk", frame=3, evaluations=80).pose.shape
+        (66,)
+    """
 
     track: Track = field(repr=False)
     k: int

@@ -34,6 +34,15 @@ def joint_intervals(
 
     Returns:
         The radii (levels, 27) in metres, for each of the `LEVELS`.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import joint_intervals, load_motion
+        >>> from posefit.plugin import Posterior
+        >>> walk = load_motion("walk")
+        >>> posterior = Posterior(walk.poses[:4], walk.translations[:4], np.ones(4))
+        >>> joint_intervals(walk.skeleton, posterior, walk.poses[1]).shape
+        (3, 27)
     """
     model = posterior.recalibration or Recalibration()
     spreads = model.place_spreads if world else model.joint_spreads
@@ -55,6 +64,15 @@ def angle_intervals(posterior: Posterior, pose: Array) -> Array:
     Returns:
         The width of the interval to either side of each angle (levels, 66) in radians,
         at most half a turn.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import angle_intervals, load_motion
+        >>> from posefit.plugin import Posterior
+        >>> walk = load_motion("walk")
+        >>> posterior = Posterior(walk.poses[:4], walk.translations[:4], np.ones(4))
+        >>> angle_intervals(posterior, walk.poses[1]).shape
+        (3, 66)
     """
     model = posterior.recalibration or Recalibration()
     distances = np.abs(wrapped(posterior.poses - pose))

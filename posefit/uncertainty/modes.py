@@ -72,6 +72,13 @@ class Posterior:
 
     Raises:
         InputError: An array has another shape, or a weight is negative, or all are 0.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import Posterior
+        >>> posterior = Posterior(np.zeros((2, 66)), np.zeros((2, 3)), [1.0, 3.0])
+        >>> posterior.weights.tolist()
+        [0.25, 0.75]
     """
 
     poses: Array = field(repr=False)
@@ -142,6 +149,15 @@ def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
         The modes. A weight is the sum of the poses' weights, raised to the sharpness of
         the posterior's recalibration. The weights sum to 1 minus its probability that
         no mode is right.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit import load_motion, modes_of
+        >>> from posefit.plugin import Posterior
+        >>> walk = load_motion("walk")
+        >>> posterior = Posterior(walk.poses[:2], walk.translations[:2], np.ones(2))
+        >>> [mode.weight for mode in modes_of(walk.skeleton, posterior)]
+        [1.0]
     """
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
     clusters = clusters_of(distances, posterior.weights, APART)
@@ -175,9 +191,10 @@ def other_modes(
     if len(modes) < 2:
         return []
     nearest = _nearest(skeleton, modes, skeleton.joints(pose))[0]
-    others = [
-        mode for k, mode in enumerate(modes) if k != nearest and mode.weight > above
-    ]
+    others = []
+    for k, mode in enumerate(modes):
+        if k != nearest and mode.weight > above:
+            others.append(mode)
     return sorted(others, key=lambda mode: -mode.weight)
 
 
@@ -252,10 +269,10 @@ def track_modes(
     poses = np.array([frame.poses for frame in coherent])
     translations = np.array([frame.translations for frame in coherent])
     clusters = clusters_of(distances, weights, apart)
-    return [
-        TrackMode(weight, poses[:, row], translations[:, row])
-        for weight, row, _ in clusters
-    ]
+    tracks = []
+    for weight, row, _ in clusters:
+        tracks.append(TrackMode(weight, poses[:, row], translations[:, row]))
+    return tracks
 
 
 def clusters_of(

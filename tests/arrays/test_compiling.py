@@ -170,6 +170,35 @@ def test_compiling_is_announced_once_in_the_process_that_a_user_started(
     assert announced == {"child": [], "quiet": [], "": [message], "again": []}
 
 
+TIMED = """
+from time import perf_counter
+import numpy as np
+from posefit.arrays.compiling import compiling_seconds
+from posefit_loops import scaled
+
+before = compiling_seconds()
+began = perf_counter()
+scaled(np.arange(4.0))
+print(before, compiling_seconds(), perf_counter() - began)
+"""
+
+
+def test_the_time_of_compiling_is_counted_once_for_a_function_and_its_callees(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "posefit_loops.py").write_text(
+        LOOPS.replace("from constants import FACTOR", "FACTOR = 1.0")
+    )
+    (tmp_path / "script.py").write_text(TIMED)
+    for compiled in (True, False):
+        before, own, whole = map(
+            float, process(tmp_path, str(tmp_path / "script.py")).stdout.split()[-3:]
+        )
+        assert before == 0.0
+        assert (own > 0.0) == compiled
+        assert own <= whole
+
+
 @pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"])
 def test_without_a_place_for_the_cache_every_process_compiles(
     run: Any, tmp_path: Path, variable: str

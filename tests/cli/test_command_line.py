@@ -183,11 +183,9 @@ def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(
     assert run("track", path, "--out", out, *words).exit_code == 0
     summary = json.loads((out / "summary.json").read_text())
     unit, axis = summary["warnings"]
-    assert unit.startswith(f"{path}: lengths are taken for centimetres")
-    assert (
-        axis
-        == f"{path}: z is taken to be up, as the person stands along it; --up sets it"
-    )
+    assert unit.startswith(f"{path}: lengths are taken as centimetres")
+    reason = "because the person stands along it"
+    assert axis == f"{path}: z is taken to be up, {reason}; --up sets it"
     for name in ("frames.csv", "angles.csv"):
         rows = csv_rows(out / name)
         assert [int(float(row["frame"])) for row in rows] == [5, 6, 7]
@@ -203,7 +201,7 @@ def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(
     assert stated["mpjpe_mm"] == pytest.approx(summary["mpjpe_mm"])
 
 
-def test_an_amc_is_tracked_with_the_asf_beside_it_at_cmus_rate_or_one_that_is_given(
+def test_an_amc_is_tracked_with_the_asf_in_its_folder_at_cmus_rate_or_a_given_one(
     clip: tuple[Path, Path],
 ) -> None:
     text = clip[1].read_text()
@@ -214,7 +212,7 @@ def test_an_amc_is_tracked_with_the_asf_beside_it_at_cmus_rate_or_one_that_is_gi
     assert "120 frames a second are assumed" in assumed["warnings"][0]
     assert given["warnings"] == []
     clip[0].unlink()
-    assert "expected --asf or exactly one .asf file beside it, got 0" in error_of(
+    assert "expected --asf or exactly one .asf file in its folder, got 0" in error_of(
         "track", clip[1]
     )
 
@@ -302,9 +300,9 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
         (["wlak"], "did you mean 'walk'?"),
         (
             ["16_999"],
-            "motion must be a file, a folder, a recorded one that posefit motions lists, or one of walk, ",
+            "motion must be a file, a folder, a recorded motion that posefit motions lists, or one of walk, ",
         ),
-        (["library"], "a recorded one that posefit motions lists, or one of walk, "),
+        (["library"], "a recorded motion that posefit motions lists, or one of walk, "),
         (["lost/"], "lost: expected a file or a folder, got nothing of that name"),
         (
             ["walk", "--train", "lost/"],
@@ -366,7 +364,7 @@ def test_plugins_are_listed_with_their_origin_and_settings() -> None:
     assert all(row["summary"] for row in rows.values())
 
 
-def test_one_plugin_is_shown_with_what_each_setting_means_whatever_its_kind() -> None:
+def test_a_plugin_of_any_kind_is_shown_with_the_meaning_of_each_setting() -> None:
     for name, words in (
         (
             "sapso",
@@ -381,7 +379,7 @@ def test_one_plugin_is_shown_with_what_each_setting_means_whatever_its_kind() ->
     assert message.endswith("got 'sapzo'; did you mean 'sapso'?")
 
 
-def test_the_doctor_says_what_works_and_what_does_not(
+def test_the_doctor_lists_working_and_broken_plugins(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from posefit import registry
@@ -419,7 +417,7 @@ def test_the_doctor_says_what_works_and_what_does_not(
     )
 
 
-def test_the_doctor_says_what_registers_nothing_and_what_to_type_next(
+def test_the_doctor_names_plugins_that_register_nothing_and_the_next_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from posefit import registry
@@ -459,6 +457,8 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
             == f"posefit: No such command {name!r}; did you mean {path!r}?"
         )
     assert error_of("zebra") == "posefit: No such command 'zebra'"
+    # near the name of a command of another group, which does something else
+    assert error_of("suite", "extrat") == "posefit: No such command 'extrat'"
 
 
 def test_check_reports_every_rule_and_how_many_ran() -> None:
@@ -559,21 +559,21 @@ def test_a_new_command_installs_offline_and_passes_its_own_test(tmp_path: Path) 
     assert "No such command 'how-far'" in left_out.stderr
 
 
-def test_a_new_plugin_has_names_of_its_own_and_replaces_nothing(tmp_path: Path) -> None:
+def test_a_new_plugin_has_new_names_and_replaces_nothing(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
-    hidden = "name must make a new module, got '{0}': its module posefit_{0} would hide the one"
+    hidden = "name must give a new module, got '{0}': its module posefit_{0} would hide the module"
     for words, message in [
         (
             ["track", "--kind", "command"],
-            "name must be a new one, got 'track', which posefit registers already",
+            "name must be new, got 'track', which posefit registers already",
         ),
         (
             ["bench", "--kind", "command"],
-            "name must be a new one, got 'bench', which posefit registers already",
+            "name must be new, got 'bench', which posefit registers already",
         ),
         (
             ["sapso"],
-            "name must be a new one, got 'sapso', which posefit registers already",
+            "name must be new, got 'sapso', which posefit registers already",
         ),
         *(([name], hidden.format(name)) for name in ("swarm", "reproduce", "envs")),
         (["9 lives"], "name must be small letters"),

@@ -34,7 +34,7 @@ def shell(command: str, **variables: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_messages_that_nobody_can_read_end_no_work(tmp_path: Path) -> None:
+def test_unreadable_messages_do_not_stop_the_work(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN)
     sweep = f"sweep {tmp_path}/plan.toml --workers 1"
     for number, redirected in enumerate(("2>/dev/full", "<&- 2>&-")):

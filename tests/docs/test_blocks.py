@@ -21,7 +21,10 @@ from tests.docs.pages import ROOT, RUN, SHOWN, Block, blocks, pages
 BLOCKS = [block for page in pages() for block in blocks(page)]
 # pages that take seconds of a processor
 SLOW = (
-    *(f"docs/{page}.md" for page in ("ways/sweep", "howto/suite", "howto/masks")),
+    *(
+        f"docs/{page}.md"
+        for page in ("ways/sweep", "howto/suite", "howto/masks", "howto/report")
+    ),
     *(
         "docs/reference/settings.md",
         "docs/notebooks/array_to_angles.ipynb",
@@ -46,7 +49,7 @@ def _run() -> Iterator[ParameterSet]:
 
 
 @pytest.mark.parametrize(("page", "whole"), list(_run()))
-def test_the_blocks_of_a_page_run_in_order_and_print_what_it_shows(
+def test_the_blocks_of_a_page_run_in_order_and_print_the_text_below_them(
     page: str, whole: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -74,7 +77,12 @@ def test_the_blocks_of_a_page_run_in_order_and_print_what_it_shows(
 
 
 def _prepare(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Put in `folder` what the blocks of slow runs need: the video, and the page's own optimiser as installed."""
+    """Put in `folder` what the blocks of slow runs need.
+
+    These are the studies, the video, and the page's own optimiser as installed.
+    """
+    for name in ("docs", "tests"):
+        (folder / name).symlink_to(ROOT / name)
     if VIDEO.is_dir():
         (folder / "sports2d/Sports2D").mkdir(parents=True)
         (folder / "sports2d/Sports2D/Demo").symlink_to(VIDEO)
@@ -109,7 +117,7 @@ def _shell(block: Block, folder: Path) -> str:
     return result.stdout
 
 
-def test_blocks_are_of_a_known_language_and_those_that_are_not_run_are_right() -> None:
+def test_blocks_have_a_known_language_and_unrun_ones_are_valid() -> None:
     for block in BLOCKS:
         assert block.language in (*RUN, *SHOWN), block
         if not block.mark:
@@ -136,7 +144,7 @@ def test_the_check_of_commands_notices_wrong_ones() -> None:
             shell.check(words)
 
 
-def test_what_a_page_shows_as_printed_is_compared_or_has_its_reason() -> None:
+def test_printed_text_of_a_page_is_compared_or_has_a_reason() -> None:
     compared: set[str] = set()  # pages whose last block of code is run
     for block in BLOCKS:
         if block.language in ("python", "sh"):
@@ -145,7 +153,7 @@ def test_what_a_page_shows_as_printed_is_compared_or_has_its_reason() -> None:
             assert block.page in compared, f"{block} follows no block that is run"
 
 
-def test_messages_that_are_explained_exist() -> None:
+def test_explained_messages_exist() -> None:
     paths = [
         path
         for folder in ("posefit", "plugins")

@@ -41,7 +41,7 @@ def side(motion: Motion) -> Camera:
 
 
 def write_film(path: Path, motion: Motion, before: int = 0) -> Path:
-    """Write a person before a still background, after so many frames without them."""
+    """Write a person against a still background, after so many frames without them."""
     path.parent.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(0)
     camera = side(motion)

@@ -9,7 +9,7 @@ from typing import Any
 
 import generator
 import pytest
-from generator import angles, figures, settings
+from generator import angles, figures, messages, settings
 from generator.prose import restructured
 
 import posefit
@@ -43,6 +43,16 @@ def test_the_settings_of_every_method_are_described() -> None:
         offer.name for offers in registry().offers.values() for offer in offers.values()
     ]
     assert [name for name in names if f"`{name}`" not in page] == []
+
+
+def test_messages_are_listed_with_their_modules_and_the_advice_of_their_page() -> None:
+    page = messages.page()
+    assert (
+        "| `... must have shape ..., got ...` | `posefit.arrays.__init__` |  |" in page
+    )
+    assert page.count("\n| `") > 400
+    (row,) = re.findall(r"^\| `views must have the same frames.*", page, re.MULTILINE)
+    assert "`posefit.footage.cameras` | cut the views to the same moments" in row
 
 
 @pytest.fixture(scope="module")

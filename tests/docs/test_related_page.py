@@ -61,7 +61,7 @@ def test_methods_stand_in_order_with_medians_of_parts() -> None:
     assert lines[1][-1].strip("| ") == "2.0"
 
 
-def test_who_leads_is_said_with_one_that_is_not_surely_behind() -> None:
+def test_a_winner_is_named_with_a_method_that_is_not_surely_behind() -> None:
     heads, _, one_camera, _two_cameras = related.winners(ROWS)
     assert [cell.strip() for cell in heads.split("|")[1:4]] == [
         "motion",

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import ablate
 import agents
 import functions
 import proportions
@@ -110,7 +111,7 @@ def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target
     )
 
 
-def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
+def test_the_file_of_boxes_follows_from_the_library() -> None:
     """Where another LAPACK decomposes, rounding may differ, and a component may point the other way.
 
     The sign is that of its largest number; those of a left and a right limb are equally large but for rounding.
@@ -125,7 +126,7 @@ def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
     assert np.array_equal(learned["order"], stored.order)
 
 
-def test_a_body_at_rest_leaves_few_frames_and_one_that_moves_all() -> None:
+def test_a_still_body_leaves_few_frames_and_a_moving_one_all() -> None:
     def kept(places: np.ndarray) -> list[int]:
         return kept_frames(average_skeleton(), np.zeros((50, 66)), places).tolist()
 
@@ -330,3 +331,20 @@ def test_the_table_of_agents_has_a_search_in_a_line_and_the_mean_of_seeds() -> N
     ]
     assert (*sapso[:2], sapso[5]) == ("sapso", "40; 4,000", "10.0; 2.0")
     assert ppo == ["PPO", "8", "1,000", "60", "2", "6.0", "5.0 to 7.0", "400", "4,000"]
+
+
+def test_every_change_of_the_tracker_finds_its_constants_and_puts_them_back() -> None:
+    for change in [*ablate.MECHANISMS.values(), *ablate.constants().values()]:
+        places = [place for place in change if not place.startswith(ablate.CELL)]
+        before = [value_of(place) for place in places]
+        with ablate.changed(change):
+            assert [value_of(place) for place in places] == [
+                change[place] for place in places
+            ]
+        assert [value_of(place) for place in places] == before
+
+
+def value_of(place: str) -> object:
+    """Return the value of a constant of the tracker, given as `module.NAME`."""
+    module, name = place.split(".")
+    return getattr(importlib.import_module(f"{ablate.PACKAGE}.{module}"), name)

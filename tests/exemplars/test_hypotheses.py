@@ -10,15 +10,15 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
-from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import (
+from posefit_exemplars.cost_model import (
     MAX_PART_COST,
     PARTS,
-    Counts,
-    Hypotheses,
-    jump_cost,
-    step_costs,
+    max_part_cost,
+    part_step_costs,
 )
+from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.proposals import Counts
 from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.cases import each
@@ -45,7 +45,7 @@ def test_every_joint_is_in_one_part() -> None:
 def test_what_steps_cost_by_hand() -> None:
     def cost(code: float, rate: float, later: float, later_rate: float) -> float:
         return float(
-            step_costs(
+            part_step_costs(
                 0.03, MAX_PART_COST, single(code, rate), single(later, later_rate)
             )[0, 0]
         )
@@ -68,13 +68,13 @@ def test_what_steps_cost_by_hand() -> None:
     both = single(1.0, 0.0)  # two parts that are far off cost twice as much as one
     both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
     assert (
-        float(step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), both)[0, 0])
+        float(part_step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), both)[0, 0])
         == 2.0 * MAX_PART_COST
     )
 
 
 def test_jumps_cost_more_where_masks_are_less_precise() -> None:
-    assert [jump_cost(noise) for noise in (1.0, 1.5, 2.0, 9.0)] == [
+    assert [max_part_cost(noise) for noise in (1.0, 1.5, 2.0, 9.0)] == [
         4.0,
         9.0,
         12.0,
@@ -96,7 +96,11 @@ def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
         frames = scene.track(evaluations=2440, seed=seed)
         fitted.append(scene.errors_mm(frames))
         tracker = ExemplarTracker(replace(scene.task, evaluations=2440))
-        estimates = tracker._path(scene.observations, np.random.default_rng(seed))
+        estimates = tracker.clip_path.follow(
+            scene.observations,
+            tracker.hypotheses.proposals,
+            np.random.default_rng(seed),
+        )
         frames = [
             replace(frames[0], pose=estimate.pose, translation=estimate.place)
             for estimate in estimates
@@ -164,7 +168,7 @@ def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs(
             (truth[:0], np.empty((0, 3))),
         )
         nothing = np.empty(0, dtype=np.int64)
-        return follower._fresh(
+        return follower.proposals.fresh(
             estimate, Hypotheses.none(), nothing, np.random.default_rng(0)
         )[0]
 
@@ -223,8 +227,11 @@ def test_a_track_of_one_frame_has_all_its_evaluations_for_fresh_hypotheses() -> 
 
     def counts_of(observations: Sequence[Observation], task: Task) -> Counts:
         tracker = ExemplarTracker(task)
-        frames = tracker._beams(observations, np.random.default_rng(0))
-        return tracker.hypotheses.counts(next(iter(frames)).frame_costs)
+        proposals = tracker.hypotheses.proposals
+        estimates = tracker.clip_path.follow(
+            observations, proposals, np.random.default_rng(0)
+        )
+        return proposals.counts(next(iter(estimates)).frame_costs)
 
     one, two = walk.observations[:1], walk.observations[:2]
     alone = counts_of(one, walk.task)

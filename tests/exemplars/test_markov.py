@@ -13,8 +13,8 @@ from posefit_exemplars.markov import (
     mean_near,
     state_weights,
 )
+from posefit_exemplars.path import state_distances
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
-from posefit_exemplars.tracker import state_distances
 from tests.cases import each
 
 

@@ -14,12 +14,8 @@ from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
 from posefit.plugin import Array, check_tracker
 from posefit_exemplars import tracker
-from posefit_exemplars.tracker import (
-    MIN_EVALUATIONS,
-    WRONG_YAW_COST,
-    ExemplarTracker,
-    yaw_costs,
-)
+from posefit_exemplars.cost_model import WRONG_YAW_COST, yaw_costs
+from posefit_exemplars.tracker import MIN_EVALUATIONS, ExemplarTracker
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage import segmentation
-from posefit.footage.source import resolve, views_of_masks
+from posefit.footage import extraction
+from posefit.footage import segmenter as segmenters
+from posefit.footage.kinds import resolve
+from posefit.footage.source import views_of_masks
 from posefit.footage.views import Range, View
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
@@ -141,7 +143,7 @@ class Box:
 @pytest.fixture
 def segmenter(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Return how a segmenter is registered."""
-    registry = segmentation.registry()
+    registry = extraction.registry()
 
     def register(name: str, factory: Any, **more: Any) -> None:
         offer = Offer("segmenter", name, factory, "its-maker", "1.0", **more)
@@ -151,6 +153,7 @@ def segmenter(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
                 offer if other == name else registry.offer(kind, other)
             ),
         )
-        monkeypatch.setattr(segmentation, "registry", lambda: changed)
+        for module in (extraction, segmenters):
+            monkeypatch.setattr(module, "registry", lambda: changed)
 
     return register

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage.cameras import calibrated, order_by_name, unit_of_heights
-from posefit.footage.segmentation import Extraction
+from posefit.footage.extraction import Extraction
+from posefit.footage.options import SourceOptions
+from posefit.footage.pairing import calibrated, order_by_name
 from posefit.footage.source import scene_of
+from posefit.footage.world import unit_of_heights
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.units import METRES, UNIT_NAMES
 from posefit.silhouette.cost import project
@@ -30,6 +32,7 @@ from tests.footage.conftest import (
 )
 from tests.footage.test_footage import toml
 from tests.geometry import programs
+from tests.geometry.test_dialects import OF_ONE_UNIT
 
 AZIMUTHS = (np.pi / 2, 0.6)
 
@@ -61,7 +64,8 @@ def test_the_unit_of_calibrations_is_recognised_by_the_persons_height(
     path = calibration(tmp_path / "two.toml", METRES[unit])
     for stated in (None, unit):
         scene = scene_of(
-            views(tmp_path), camera=[path], up="y", unit=stated, height=1.74
+            views(tmp_path),
+            SourceOptions(camera=[path], up="y", unit=stated, height=1.74),
         )
         assert np.linalg.norm(scene.anchor - walk().translations[8]) < 0.3
         np.testing.assert_allclose([one.position for one in scene.cameras], [camera(a).position for a in AZIMUTHS], atol=1e-6)  # fmt: skip
@@ -72,7 +76,10 @@ def test_the_unit_of_calibrations_is_recognised_by_the_persons_height(
         ValueError,
         match="got .*: the masks show .* or the calibrations are in another order or unit",
     ):
-        scene_of(views(tmp_path), camera=[path], up="y", unit="foot", height=1.74)
+        scene_of(
+            views(tmp_path),
+            SourceOptions(camera=[path], up="y", unit="foot", height=1.74),
+        )
 
 
 @each("unit", ["m", "mm", "cm"])
@@ -80,10 +87,12 @@ def test_the_unit_of_one_camera_is_recognised_by_its_distance(
     tmp_path: Path, unit: Any
 ) -> None:
     path = calibration(tmp_path / "one.toml", METRES[unit], AZIMUTHS[:1])
-    scene = scene_of(views(tmp_path)[:1], camera=[path], up="y", height=1.74)
+    scene = scene_of(
+        views(tmp_path)[:1], SourceOptions(camera=[path], up="y", height=1.74)
+    )
     assert list(scene.guesses) == [f"the calibration is in {UNIT_NAMES[unit]}"]
     assert np.linalg.norm(scene.anchor - walk().translations[8]) < 1.0
-    drawn = scene_of(["walk"], camera=[path], up="y", frames=(0, 2))
+    drawn = scene_of(["walk"], SourceOptions(camera=[path], up="y", frames=(0, 2)))
     assert drawn.observations[0].silhouettes[0].mask.any()
     assert drawn.guesses == scene.guesses
     words = [
@@ -114,7 +123,7 @@ def test_a_scene_that_was_reconstructed_has_the_scale_of_the_person(
         )
         for one in (Calibration.of(camera(a), f"c{a:.1f}") for a in AZIMUTHS)
     ]
-    scene = scene_of(views(tmp_path), camera=known, up="y", height=1.74)
+    scene = scene_of(views(tmp_path), SourceOptions(camera=known, up="y", height=1.74))
     distances = [np.linalg.norm(one.position) for one in scene.cameras]
     usual = [np.linalg.norm(camera(a).position) for a in AZIMUTHS]
     if unit in (1.0, 0.001):  # a unit that files have
@@ -126,18 +135,31 @@ def test_a_scene_that_was_reconstructed_has_the_scale_of_the_person(
     assert said.startswith("the calibration's unit is ")
 
 
-def test_a_file_in_millimetres_by_its_program_needs_no_unit(tmp_path: Path) -> None:
-    path = tmp_path / "a.xcp"
-    path.write_text(programs.vicon())
+@pytest.mark.parametrize("program", OF_ONE_UNIT)
+def test_a_file_whose_program_writes_one_unit_needs_none(
+    tmp_path: Path, program: str
+) -> None:
+    write, suffix, _ = programs.SAMPLES[program]
+    path = tmp_path / f"left{suffix}"
+    path.write_text(write())
     masks = np.zeros((2, 480, 640), dtype=bool)
     masks[:, 100:400, 280:340] = True
-    scene = scene_of([masks], camera=[path], height=1.7)
+    scene = scene_of([masks], SourceOptions(camera=[path], height=1.7))
     np.testing.assert_allclose(scene.cameras[0].position, [0, 1, 4], atol=1e-6)
     assert not [guess for guess in scene.guesses if "calibration is in" in guess]
     with pytest.raises(
-        ValueError, match="unit must be left out for 'left', whose file"
+        ValueError, match="unit must be left out for 'left', whose unit"
     ):
-        scene_of([masks], camera=[path], height=1.7, unit="mm")
+        scene_of([masks], SourceOptions(camera=[path], height=1.7, unit="mm"))
+
+
+def test_a_place_that_was_added_to_a_chain_may_be_in_any_unit(tmp_path: Path) -> None:
+    path = tmp_path / "left.yaml"
+    path.write_text(programs.kalibr(rvec=[np.pi / 2, 0.0, 0.0], tvec=[0, 1000, 4000]))
+    masks = np.zeros((2, 480, 640), dtype=bool)
+    masks[:, 100:400, 280:340] = True
+    scene = scene_of([masks], SourceOptions(camera=[path], height=1.7))
+    assert "the calibration is in millimetres" in scene.guesses
 
 
 def test_a_camera_under_the_floor_is_doubted(tmp_path: Path) -> None:
@@ -146,7 +168,7 @@ def test_a_camera_under_the_floor_is_doubted(tmp_path: Path) -> None:
     masks[:, 100:400, 280:340] = True
     for tvec, doubted in (([0.0, 1.0, 4.0], False), ([0.0, -4.0, 1.0], True)):
         path.write_text(programs.opencv(tvec=tvec))
-        scene = scene_of([masks], camera=[path], height=1.7)
+        scene = scene_of([masks], SourceOptions(camera=[path], height=1.7))
         said = [
             guess for guess in scene.guesses if "is its translation its place" in guess
         ]
@@ -165,7 +187,7 @@ def test_a_height_half_or_twice_the_usual_is_no_other_unit() -> None:
 def test_one_of_several_cameras_is_chosen_by_name(tmp_path: Path) -> None:
     path = calibration(tmp_path / "two.toml", 1.0)
     source = views(tmp_path)[0]
-    scene = scene_of([source], camera=[f"{path}:cam0"], up="y")
+    scene = scene_of([source], SourceOptions(camera=[f"{path}:cam0"], up="y"))
     np.testing.assert_allclose(
         scene.cameras[0].position, camera(AZIMUTHS[0]).position, atol=1e-6
     )
@@ -226,7 +248,10 @@ def test_every_camera_follows_the_person_whom_the_first_one_follows(
     view: dict[str, Any] = (
         {"frames": (EMPTY, None), "extraction": how} if kind == "video" else {}
     )
-    scene = scene_of(sources, camera=[path], up="y", height=1.74, person=person, **view)
+    scene = scene_of(
+        sources,
+        SourceOptions(camera=[path], up="y", height=1.74, person=person, **view),
+    )
     followed = 0 if person is None else person - 1
     for silhouette, people in zip(
         scene.observations[FRAMES - 5].silhouettes, shown, strict=True
@@ -252,7 +277,7 @@ def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
         "a person of 1.74 m",
     ]
     bare.write_text("K: [[200, 0, 79.5], [0, 200, 59.5], [0, 0, 1]]\n")
-    scene = scene_of([source], camera=[bare], height=1.7)
+    scene = scene_of([source], SourceOptions(camera=[bare], height=1.7))
     assert list(scene.guesses) == [
         "the camera stands level, which its calibration does not state",
         "the calibration is for pictures of this size, which it does not state",
@@ -261,7 +286,7 @@ def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
     with pytest.raises(
         ValueError, match="camera 'bare' must be of 160x120, got a centre of 79.5x259.5"
     ):
-        scene_of([source], camera=[bare])
+        scene_of([source], SourceOptions(camera=[bare]))
 
 
 def _named(name: str) -> Calibration:
@@ -321,6 +346,8 @@ def test_the_order_of_a_calibration_file_does_not_matter_where_names_tell(
     scenes = []
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
-        scenes.append(scene_of(views(tmp_path), camera=[tmp_path / name], up="y"))
+        scenes.append(
+            scene_of(views(tmp_path), SourceOptions(camera=[tmp_path / name], up="y"))
+        )
     for one, other in zip(scenes[0].cameras, scenes[1].cameras, strict=True):
         np.testing.assert_array_equal(one.position, other.position)

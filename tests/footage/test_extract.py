@@ -10,7 +10,8 @@ import pytest
 import posefit
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.extract import extract
-from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.extraction import Extraction
+from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Still, mean_background, people

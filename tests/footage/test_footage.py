@@ -13,8 +13,10 @@ import pytest
 
 import posefit
 from posefit.fitting import metrics
+from posefit.footage.camera_motion import CameraMotion
 from posefit.footage.extract import extract
-from posefit.footage.segmentation import CameraMotion, Extraction
+from posefit.footage.extraction import Extraction
+from posefit.footage.options import SourceOptions
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.footage.views import Observations, undistorted
@@ -143,7 +145,7 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(
     assert views[3].silhouettes[0].valid.all()
     stack(tmp_path / "b.npz", front, usable=~usable)  # no frame shows enough in both
     calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
-    scene = scene_of(paths, camera=[calibration], up="y")
+    scene = scene_of(paths, SourceOptions(camera=[calibration], up="y"))
     assert np.linalg.norm(scene.anchor - walk().translations[8]) < 1.0
 
 
@@ -247,7 +249,7 @@ def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
     assert done.returncode == 2, done.stderr
     assert len(lines) == 1
-    assert "expected room to write to, got File too large" in lines[0]
+    assert "expected room on the disk, got File too large" in lines[0]
     assert "finished frames are kept" in lines[0]
     assert not (tmp_path / "out").exists()
     again = run(*words, "--resume")
@@ -288,6 +290,19 @@ def flickering(image: Any, k: int) -> Any:
         image
         * (1.0 + 0.12 * np.sin(2.0 * np.pi * (1.5 * rows + 0.37 * k)))[:, None, None]
     )
+
+
+def test_a_moving_camera_is_seen_in_pictures_as_wide_as_a_panorama() -> None:
+    rng = np.random.default_rng(0)
+    # tiles of these pictures have 7 rows and 2, less than their search needs
+    for height in (120, 40):
+        coarse = rng.integers(0, 256, (height // 10, 64, 3)).astype(np.uint8)
+        scene = cv2.resize(coarse, (640, height), interpolation=cv2.INTER_CUBIC)
+        for shift, moves in ((0.0, False), (0.5, True)):
+            camera_motion = CameraMotion((640, height))
+            for k in range(30):
+                camera_motion.add(k, np.roll(scene, round(k * shift), axis=1))
+            assert camera_motion.moves == moves
 
 
 @each("change", [in_front, flickering])

@@ -17,10 +17,11 @@ from posefit.footage import images
 from posefit.footage.cameras import combined
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import read_image, read_marks
-from posefit.footage.readers import Images
-from posefit.footage.source import body_of, resolve, scene_of
+from posefit.footage.kinds import resolve
+from posefit.footage.numbering import Images
+from posefit.footage.options import SourceOptions, text_person
+from posefit.footage.source import body_of, scene_of
 from posefit.footage.views import View
-from posefit.tracking.options import text_person
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.footage.conftest import ALL, NOBODY, SIZE, camera, read_masks, stack
@@ -434,12 +435,12 @@ def test_views_of_other_frames_or_another_rate_are_refused_by_name(
     with pytest.raises(
         ValueError, match=rf"views must have the same frames, got 6 of {a} and 4 of {b}"
     ):
-        scene_of([a, b], camera=cameras)
+        scene_of([a, b], SourceOptions(camera=cameras))
     with pytest.raises(
         ValueError,
         match=rf"views must have one frame rate.*, got 30 of {a} and 60 of {c}",
     ):
-        scene_of([a, c], camera=cameras)
+        scene_of([a, c], SourceOptions(camera=cameras))
 
 
 def test_views_of_videos_end_with_the_shortest(walk: list[Any], tmp_path: Path) -> None:
@@ -449,11 +450,9 @@ def test_views_of_videos_end_with_the_shortest(walk: list[Any], tmp_path: Path) 
         views.append(replace(masks, name=f"{name}.mp4", filmed=SIZE))
     scene = combined(
         views,
-        "a",
         body_of(None, None)[0],
         [camera(np.pi / 2), camera(np.pi / 2)],
-        None,
-        None,
+        SourceOptions(),
     )
     assert len(scene.observations) == 4
     assert scene.warnings == [

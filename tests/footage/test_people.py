@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage.people import People, person_indices, planes_of
-from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.extraction import Extraction
+from posefit.footage.people import People, _distance, person_indices, planes_of
+from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
@@ -87,6 +88,26 @@ def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) ->
     wrong = [k for k, pair in enumerate(shares) if pair[1 - which] > pair[which]]
     assert len(wrong) <= 0.02 * FRAMES
     assert np.mean(shares, axis=0)[1 - which] < 0.05
+
+
+@each("scale", [1.0, 2.0])
+def test_a_place_chooses_who_is_nearest_across_and_down(scale: float) -> None:
+    middles = {(40, 60): "left", (140, 50): "right", (140, 120): "below"}
+    image = np.full((170, 180, 3), 160, dtype=np.uint8)
+    masks = []
+    for across, down in middles:
+        mask = np.zeros(image.shape[:2], dtype=bool)
+        mask[down - 20 : down + 20, across - 7 : across + 7] = True
+        masks.append(mask)
+    people = People(30.0)
+    for _ in range(20):
+        people.add(masks, image)
+    for across, down in middles:
+        near = scale * (across + 12.0), scale * (down - 12.0)
+        parts, sentence = people.chosen(near, str, scale)
+        shown = parts[0].first[1:]
+        assert np.hypot(shown[0] - across, shown[1] - down) < 3.0
+        assert f"{scale * shown[0]:.0f},{scale * shown[1]:.0f}" in sentence
 
 
 @cache
@@ -208,6 +229,21 @@ def test_parts_that_take_turns_are_no_time_apart() -> None:
     for k in range(50):
         people.add([sides[int(k % 3 == 2 if k < 32 else k > 32)]])
     assert [len(person) for person in people.persons()] == [2]
+
+
+def test_a_gap_counts_by_its_seconds_and_not_by_its_frames() -> None:
+    before, after = np.zeros((2, *SIZE[::-1]), dtype=bool)
+    before[20:100, 20:50] = after[20:100, 115:145] = True
+    distances = list[float]()
+    for fps in (10, 20):
+        people = People(float(fps))
+        for second in range(5):
+            shown = {0: [before], 4: [after]}.get(second, [])
+            for _ in range(fps):
+                people.add(shown)
+        first, second_part = people.tracklets
+        distances.append(_distance(first, second_part, float(fps)))
+    assert distances[0] == pytest.approx(distances[1], rel=0.02)
 
 
 def test_memory_of_noise_is_given_back() -> None:

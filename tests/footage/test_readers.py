@@ -10,8 +10,10 @@ from PIL import Image
 
 from posefit.errors import InputError
 from posefit.footage.cleaning import cleaned
-from posefit.footage.readers import numbered
-from posefit.footage.source import resolve, scene_of, sources_of
+from posefit.footage.kinds import resolve
+from posefit.footage.named import sources_of
+from posefit.footage.numbering import numbered
+from posefit.footage.source import scene_of
 from posefit.progress import Progress
 from tests.cases import each
 from tests.footage.conftest import ALL, read_masks
@@ -113,7 +115,7 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
     clean = cleaned(masks)
     assert (clean.usable.tolist(), clean.warnings) == (masks.usable.tolist(), [])
     messages: list[str] = []
-    scene = scene_of([tmp_path], Progress(messages.append))
+    scene = scene_of([tmp_path], progress=Progress(messages.append))
     assert (scene.count, scene.observations[2].usable) == (9, False)
     assert f"guessed: {'; '.join(scene.guesses)}" in messages
     assert list(scene.guesses[:2]) == [*masks.guesses, "30 frames a second"]
@@ -122,7 +124,8 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
 @each(
     ("names", "count", "guess"),
     [
-        (["f0.png", "f5.png", "f10.png"], 3, "every 5th number is a frame"),
+        (["f0.png", "f5.png", "f10.png"], 3, "the numbers of frames rise by 5"),
+        (["f1.png", "f3.png", "f5.png"], 3, "the numbers of frames rise by 2"),
         (
             ["f0.png", "f5.png", "f15.png"],
             4,

@@ -14,13 +14,11 @@ import pytest
 from posefit.errors import InputError, NoPersonError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage import source
-from posefit.footage.cameras import yaws_of
+from posefit.footage.extraction import Extraction
+from posefit.footage.facing import facings_on_the_spot, yaws_of
+from posefit.footage.options import SourceOptions
 from posefit.footage.quality import FrameQuality, Verdict, moved_pixels, verdict
-from posefit.footage.segmentation import (
-    Extraction,
-    Segmentation,
-    facings_on_the_spot,
-)
+from posefit.footage.segmentation import Segmentation
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.footage.views import View
@@ -113,7 +111,8 @@ def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_th
         registry().offers["segmenter"]["mediapipe"], factory=Network, needs=None
     )
     installed = Registry((*plugins, plugins[0]._replace(offers=(offer,))))
-    monkeypatch.setattr("posefit.footage.segmentation.registry", lambda: installed)
+    for module in ("extraction", "segmenter"):
+        monkeypatch.setattr(f"posefit.footage.{module}.registry", lambda: installed)
     target = np.array([0.0, 0.9, 0.0])
     around = [
         Camera.around(target, 0.5 * k, 4.0, Video.of(path).size) for k in range(cameras)
@@ -123,9 +122,9 @@ def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_th
         with pytest.raises(
             InputError, match="the person seems to stand in the background"
         ):
-            scene_of([path] * cameras, **view)
+            scene_of([path] * cameras, SourceOptions(**view))
         return
-    scene = scene_of([path] * cameras, **view)
+    scene = scene_of([path] * cameras, SourceOptions(**view))
     masks = [observation.silhouettes[0].mask for observation in scene.observations]
     assert (overlap(masks, true) > 0.95) == (used == "mediapipe")
     first, second = (
@@ -417,7 +416,7 @@ def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None
         for path, part in zip(sources, shown, strict=True):
             np.savez(path, masks=part)
         with pytest.raises(ValueError, match=message):
-            scene_of(sources, camera=placed, height=1.75)
+            scene_of(sources, SourceOptions(camera=placed, height=1.75))
 
 
 def test_a_segmenter_that_breaks_a_rule_is_named(
@@ -499,13 +498,14 @@ def test_a_scene_has_the_yaws_that_a_segmenter_reports(
     segmenter("box", Box)
     camera = Camera.around(MIDDLE, 0.25, 5.0, (160, 120))
     scene = scene_of(
-        [filmed[0]], camera=(camera,), frames=(0, 6), extraction=Extraction("box")
+        [filmed[0]],
+        SourceOptions(camera=(camera,), frames=(0, 6), extraction=Extraction("box")),
     )
     assert [observation.yaw for observation in scene.observations] == pytest.approx(
         [0.75] * 6
     )
     assert scene.yaw == pytest.approx(0.75)
-    assert scene_of([filmed[0]], camera=(camera,)).yaw is None
+    assert scene_of([filmed[0]], SourceOptions(camera=(camera,))).yaw is None
 
 
 @pytest.mark.skipif(find_spec("mediapipe") is None, reason="without mediapipe")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from posefit.errors import InputError
+from posefit.footage.options import SourceOptions
 from posefit.footage.scene import Scene
 from posefit.footage.source import scene_of
 from posefit.geometry.body import Body
@@ -114,7 +115,7 @@ def test_the_true_pose_costs_little_as_pixels_become_square(
         for mask, k in zip(masks, AT, strict=True)
     ]
     for known in (camera, calibration):
-        scene = scene_of([path], camera=[known], up="y", height=1.7)
+        scene = scene_of([path], SourceOptions(camera=[known], up="y", height=1.7))
         (own,) = scene.cameras
         assert own.square
         np.testing.assert_allclose(own.focal, camera.focal.max())
@@ -152,7 +153,8 @@ def test_pal_dv_and_a_bent_lens_become_square_at_once(tmp_path: Path) -> None:
             )
         )
     scene = scene_of(
-        [stack(tmp_path / "a.npz", masks)], camera=[calibration], height=1.7
+        [stack(tmp_path / "a.npz", masks)],
+        SourceOptions(camera=[calibration], height=1.7),
     )
     (own,) = scene.cameras
     assert (own.width, own.height) == (round(640 * 16 / 15), 480)
@@ -170,7 +172,7 @@ def test_landmarks_and_pictures_are_those_of_square_pixels(tmp_path: Path) -> No
         np.column_stack([seen, np.ones(len(seen))])[None], len(masks), axis=0
     )
     path = stack(tmp_path / "a.npz", masks, landmarks=landmarks)
-    scene = scene_of([path], camera=[camera], height=1.7)
+    scene = scene_of([path], SourceOptions(camera=[camera], height=1.7))
     found = scene.observations[0].landmarks
     assert found is not None
     np.testing.assert_allclose(
@@ -204,7 +206,7 @@ def test_a_stream_of_pixels_that_are_not_square_is_followed(
 def test_a_known_motion_is_drawn_with_square_pixels(tmp_path: Path) -> None:
     camera = replace(usual(), focal=np.array([300.0, 600.0]))
     for known in (camera, toml(tmp_path / "one.toml", camera)):
-        scene = scene_of(["walk"], camera=[known], up="y", frames=(0, 1))
+        scene = scene_of(["walk"], SourceOptions(camera=[known], up="y", frames=(0, 1)))
         assert scene.cameras[0].square
         size = scene.cameras[0].width, scene.cameras[0].height
         assert scene.observations[0].silhouettes[0].size == size == (1280, 480)
@@ -242,9 +244,7 @@ def test_pictures_of_another_size_are_scaled_or_cropped_and_that_is_said(
     masks = [project(body, camera, motion.poses[k], motion.translations[k]) for k in AT]
     scene = scene_of(
         [stack(tmp_path / "a.npz", masks)],
-        camera=[toml(tmp_path / "one.toml", made)],
-        up="y",
-        height=1.7,
+        SourceOptions(camera=[toml(tmp_path / "one.toml", made)], up="y", height=1.7),
     )
     assert [guess for guess in scene.guesses if "calibration 'cam0'" in guess] == said
     np.testing.assert_allclose(scene.cameras[0].focal, camera.focal, rtol=1e-9)
@@ -255,7 +255,7 @@ def test_pictures_of_another_shape_are_refused(tmp_path: Path) -> None:
     made = replace(usual(), width=640, height=360, centre=np.array([320.0, 180.0]))
     path = stack(tmp_path / "a.npz", [np.eye(480, 640, dtype=bool)] * 2)
     with pytest.raises(InputError, match="'cam0' must be calibrated for 640x480, got 640x360"):  # fmt: skip
-        scene_of([path], camera=[toml(tmp_path / "one.toml", made)])
+        scene_of([path], SourceOptions(camera=[toml(tmp_path / "one.toml", made)]))
 
 
 def test_what_is_written_of_squeezed_masks_has_their_camera(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def test_the_clip_that_is_followed_is_left_out(tmp_path: Path) -> None:
     (tmp_path / "b.bvh").unlink()
     with pytest.raises(
         ValueError,
-        match="expected a folder with another clip than the source, got that one alone",
+        match="expected a folder with a clip other than the source, got only that clip",
     ):
         training_clips([tmp_path], followed=tmp_path / "a.bvh")
     with pytest.raises(

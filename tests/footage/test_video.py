@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from posefit.files import opencv_name
-from posefit.footage.source import resolve, scene_of
+from posefit.footage.kinds import resolve
+from posefit.footage.options import SourceOptions
+from posefit.footage.source import scene_of
 from posefit.footage.video import Video, _rate
 from tests.cases import each
 from tests.commands import error_of
@@ -104,9 +106,7 @@ def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(
         ("track", "--live", strange),
         ("extract", path, "--out", strange),
     ):
-        assert "expected a name in UTF-8, got one that is not" in error_of(*words), (
-            words
-        )
+        assert "expected a name in UTF-8, got other bytes" in error_of(*words), words
         assert sorted(tmp_path.iterdir()) == before, words
 
 
@@ -151,7 +151,8 @@ def test_pictures_are_a_film(filmed: Film, tmp_path: Path, suffix: str) -> None:
     # a single one, which is refused there
     assert resolve(folder / f"frame0{suffix}").medium == "masks"
     scene, other = (
-        scene_of([source], fps=fps) for source, fps in ((folder, 25.0), (path, None))
+        scene_of([source], SourceOptions(fps=fps))
+        for source, fps in ((folder, 25.0), (path, None))
     )
     assert (scene.count, scene.fps) == (len(masks), 25.0)
     views = [

@@ -161,18 +161,19 @@ def opencv(**more: Any) -> str:
     return json.dumps({**values, "rvec": [QUARTER, 0.0, 0.0], "tvec": T, **more})
 
 
-# of each dialect: how it is written, in a file of which suffix, and its unit in metres
+# of each dialect: how it is written, in a file of which suffix, and the unit of this
+# sample in metres, if the program may write any
 SAMPLES: dict[str, tuple[Callable[..., str], str, float]] = {
     "Vicon": (vicon, ".xcp", 1.0),
     "Metashape": (metashape, ".xml", 1.0),
     "NeRF's programs": (nerf, ".json", 1.0),
     "openMVG": (openmvg, ".json", 1.0),
-    "OpenCap": (opencap, ".json", 0.001),
+    "OpenCap": (opencap, ".json", 1.0),
     "Kalibr": (kalibr, ".yaml", 1.0),
     "ROS": (ros, ".yaml", 1.0),
     "EasyMocap": (easymocap, ".yml", 1.0),
-    "CMU Panoptic": (panoptic, ".json", 0.01),
-    "VoxelPose": (voxelpose, ".json", 0.001),
+    "CMU Panoptic": (panoptic, ".json", 1.0),
+    "VoxelPose": (voxelpose, ".json", 1.0),
     "RealSense": (realsense, ".json", 1.0),
     "Anipose": (anipose, ".toml", 1.0),
     "OpenCV": (opencv, ".json", 1.0),

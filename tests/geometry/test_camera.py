@@ -106,6 +106,16 @@ def test_a_wrong_camera_file_is_refused_in_one_line(
     assert "\n" not in str(caught.value)
 
 
+def test_a_pinhole_camera_by_hand() -> None:
+    # one metre to the right, half a metre up, two metres ahead
+    point = np.array([[1.0, 0.5, -2.0]])
+    pixels, far = Camera.pinhole(640, 480, fx=100.0).project(point)
+    np.testing.assert_allclose(pixels, [[320.0 + 50.0, 240.0 - 25.0]])
+    assert far.tolist() == [2.0]
+    given = Camera.pinhole(640, 480, fx=100.0, fy=200.0, cx=300.0, cy=200.0)
+    np.testing.assert_allclose(given.project(point)[0], [[350.0, 150.0]])
+
+
 def test_a_focal_length_in_millimetres_is_refused() -> None:
     with pytest.raises(
         ValueError,

@@ -23,6 +23,8 @@ from tests.geometry.programs import SAMPLES
 UNPLACED = ("ROS", "RealSense")
 # that do not say how large its pictures are
 UNSIZED = ("VoxelPose",)
+# that always write one unit
+OF_ONE_UNIT = ("Vicon", "OpenCap", "Kalibr", "CMU Panoptic", "VoxelPose")
 SIZE = (640, 480)
 
 
@@ -63,6 +65,7 @@ def test_a_known_point_is_where_it_is_by_hand(tmp_path: Path, program: str) -> N
     assert one.size == (None if program in UNSIZED else SIZE)
     assert (one.rotation is None) == (program in UNPLACED)
     assert not one.distorted
+    assert (one.scale == "metres") == (program in OF_ONE_UNIT)
     camera = one.in_metres(metres).camera(SIZE, np.eye(3))
     np.testing.assert_allclose(camera.focal, 500.0)
     np.testing.assert_allclose(camera.centre, [310.0, 250.0])

@@ -1,6 +1,7 @@
 """Rotations by law and by hand, and why the root's yaw comes first. Interpretation S3."""
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 import pytest
@@ -126,14 +127,14 @@ def test_quaternions_are_scipys_and_do_not_jump() -> None:
 
 
 def test_y_is_taken_to_any_direction() -> None:
-    directions = np.array(
-        [[0.0, 2.0, 0.0], [0.0, 0.0, -3.0], [1.0, -1.0, 0.5], [0.0, 0.0, 0.0]]
-    )
+    # every axis, every diagonal, no direction, and one that is none of these
+    numbers = [-3.0, 0.0, 3.0]
+    directions = np.array([*product(numbers, repeat=3), (1.0, -1.0, 0.5)])
     rotations = along_y(directions)
     np.testing.assert_allclose(np.linalg.det(rotations), 1.0)
     np.testing.assert_allclose(
         rotations @ np.swapaxes(rotations, -1, -2),
-        np.tile(np.eye(3), (4, 1, 1)),
+        np.tile(np.eye(3), (len(directions), 1, 1)),
         atol=1e-12,
     )
     lengths = np.linalg.norm(directions, axis=1)

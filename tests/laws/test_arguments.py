@@ -5,6 +5,8 @@ options, or an InputError.
 """
 
 import json
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,8 @@ import posefit
 from posefit.errors import InputError
 from posefit.output.identity import digest_of
 from posefit.progress import QUIET
+from posefit.tracking.front import _ARGUMENTS
+from posefit.tracking.keywords import FitKeywords, TrackKeywords
 from posefit.tracking.options import TrackOptions
 from tests.laws.sources import FPS, QUICK, Tensor, camera, masks
 
@@ -139,3 +143,17 @@ def test_what_is_no_source_is_refused_before_any_work(
     with pytest.raises(InputError, match=message):
         posefit.track(source, out=tmp_path / "out", progress=QUIET, **QUICK)
     assert not list(tmp_path.iterdir())
+
+
+def test_type_checkers_know_every_option_with_its_type() -> None:
+    def names_and_types(hints: Mapping[str, Any]) -> dict[str, str]:
+        types = {}
+        for name, hint in hints.items():
+            types[name] = str(getattr(hint, "__forward_arg__", hint)).strip("'\"")
+        return types
+
+    options = names_and_types({each.name: each.type for each in fields(TrackOptions)})
+    assert names_and_types(TrackKeywords.__annotations__) == options
+    of_fit = names_and_types(FitKeywords.__annotations__)
+    assert of_fit.keys() - options.keys() == set(_ARGUMENTS)
+    assert options.keys() - of_fit.keys() == {"frames"}

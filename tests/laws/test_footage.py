@@ -1,6 +1,7 @@
 """Numbers, times and cuts, for every kind of source: frames are those of the footage, whatever it is read from."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,13 @@ import pytest
 
 import posefit
 from posefit.footage.extract import extract
+from posefit.footage.extraction import Extraction
+from posefit.footage.kinds import KINDS, Kind, resolve
 from posefit.footage.live import live_views
+from posefit.footage.options import SourceOptions
 from posefit.footage.readers import read_array
 from posefit.footage.scene import Scene
-from posefit.footage.segmentation import Extraction
-from posefit.footage.source import KINDS, Kind, resolve, scene_of, views_of_masks
+from posefit.footage.source import scene_of, views_of_masks
 from posefit.footage.views import View, joined
 from posefit.progress import QUIET
 from tests.laws.sources import (
@@ -40,7 +43,7 @@ START, STOP = 2, 6
 
 def seen(source: Any, **options: Any) -> Scene:
     """Return what a tracker gets of a source."""
-    return scene_of(source, **options)
+    return scene_of(source, SourceOptions(**options))
 
 
 def check_numbered(scene: Scene, start: int, stop: int) -> None:
@@ -157,6 +160,25 @@ def test_frames_of_a_stream_keep_their_numbers_and_times(
             np.testing.assert_array_equal(view.silhouette(k).mask, masks()[number])
 
 
+@pytest.mark.parametrize("knows", [(False, False), (True, False), (False, True)])
+def test_a_joined_view_knows_what_each_of_its_parts_knows(
+    knows: tuple[bool, bool],
+) -> None:
+    views = list[View]()
+    for count, known in zip((3, 2), knows, strict=True):
+        view = read_array(masks()[:count], (None, None), None, FPS)
+        landmarks = np.ones((count, 27, 3)) if known else None
+        if known:
+            view = replace(view, known=np.zeros_like(view.bits))
+        views.append(replace(view, landmarks=landmarks))
+    view = joined(views)
+    assert len(view) == 5
+    # frames of which some have no landmarks have none together
+    assert view.landmarks is None
+    shown = [view.silhouette(k).valid.any() for k in range(len(view))]
+    assert shown == [not knows[0]] * 3 + [not knows[1]] * 2
+
+
 @pytest.mark.parametrize("kind", MASKS)
 def test_the_view_of_masks_has_their_numbers_times_and_bits_and_is_read_only(
     tmp_path: Path, kind: str
@@ -218,7 +240,7 @@ def test_a_kind_of_source_is_a_line_of_the_table(
         return read_array(pixels, *how)
 
     line = Kind("masks", lambda place: str(place).endswith(".h5"), view=read)
-    monkeypatch.setattr("posefit.footage.source.KINDS", (line, *KINDS))
+    monkeypatch.setattr("posefit.footage.kinds.KINDS", (line, *KINDS))
     check_numbered(seen(path, frames=(START, STOP), fps=FPS), START, STOP)
     check_alike(seen(path, fps=FPS), seen(masks(), fps=FPS))
 

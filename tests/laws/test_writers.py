@@ -26,8 +26,8 @@ from posefit.evaluation.measures import Effort
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage import video
 from posefit.footage.extract import extract
+from posefit.footage.extraction import Extraction
 from posefit.footage.scene import Scene
-from posefit.footage.segmentation import Extraction
 from posefit.footage.video import VideoWriter, video_rate
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera

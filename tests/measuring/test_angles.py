@@ -48,7 +48,7 @@ def test_the_centres_are_where_bones_meet() -> None:
 
 
 @each(("side", "inwards"), [("left", -20.0), ("right", 20.0)])
-def test_a_leg_is_at_zero_where_it_stands_straight_and_moves_in_clinical_words(
+def test_a_straight_leg_has_zero_angles_and_moves_in_clinical_directions(
     side: str, inwards: float
 ) -> None:
     def leg(**turned: float) -> dict[str, float]:
@@ -97,7 +97,7 @@ def test_a_shoulder_near_its_pole_is_left_blank() -> None:
         assert np.isnan(angles["left_shoulder_internal_rotation"]) == blank
 
 
-def test_a_mirrored_body_has_the_other_sides_angles_and_its_yaw_changes_none() -> None:
+def test_a_mirrored_body_has_the_other_sides_angles_at_any_yaw() -> None:
     # the skeleton is the same on both sides
     poses = recorded.clip("02_01").motion().poses
     angles = clinical_angles(SKELETON, poses)
@@ -139,7 +139,7 @@ def read_c3d(path: Path) -> Any:
     return pytest.importorskip("ezc3d").c3d(str(path))
 
 
-def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
+def test_another_reader_reads_the_same_c3d(walk: Motion, tmp_path: Path) -> None:
     write_c3d(tmp_path / "walk.c3d", walk, BLANK, gait_of(walk))
     read = read_c3d(tmp_path / "walk.c3d")
     points = read["data"]["points"]
@@ -208,7 +208,7 @@ def test_a_long_c3d_counts_its_frames_and_its_events(
     assert (times[0, -1], times[1, -1]) == (4.0, 14.0)  # the 255th is after 254 seconds
 
 
-def test_a_trc_is_what_a_plain_reader_reads(walk: Motion, tmp_path: Path) -> None:
+def test_a_plain_reader_reads_the_same_trc(walk: Motion, tmp_path: Path) -> None:
     write_trc(tmp_path / "walk.trc", walk, BLANK)
     lines = (tmp_path / "walk.trc").read_text().splitlines()
     assert (
@@ -224,7 +224,7 @@ def test_a_trc_is_what_a_plain_reader_reads(walk: Motion, tmp_path: Path) -> Non
     np.testing.assert_allclose(table[:, 2:], expected, atol=TENTH)
 
 
-def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
+def test_another_reader_reads_the_same_bvh(walk: Motion, tmp_path: Path) -> None:
     pybvh = pytest.importorskip("pybvh")
     write_bvh(tmp_path / "walk.bvh", walk)
     read = pybvh.read_bvh_file(tmp_path / "walk.bvh", world_up="+y")
@@ -238,7 +238,7 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
     np.testing.assert_allclose(points, walk.joints, atol=TENTH)
 
 
-def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(
+def test_angles_are_written_in_degrees_and_blank_if_unknown(
     walk: Motion, tmp_path: Path
 ) -> None:
     write_angles(tmp_path / "angles.csv", walk, BLANK)

@@ -217,7 +217,7 @@ def test_of_who_walks_in_place_only_times_are_known(
     )
 
 
-def test_a_stride_of_the_knee_is_that_between_two_strikes() -> None:
+def test_a_stride_of_the_knee_lasts_from_strike_to_strike() -> None:
     motion = walker(fps=100.0)
     bent = np.zeros(motion.poses.shape)
     # a fifth of a degree a frame
@@ -265,18 +265,30 @@ def test_a_person_who_faces_away_from_their_way_walks_backwards(
 
 @each(("speed", "back"), [(0.29, False), (0.31, True)])
 def test_below_30_cm_a_second_a_person_has_no_way(speed: float, back: bool) -> None:
-    places = np.array([0.0, 1.0, 0.0]) + np.arange(60)[
+    places = np.array([0.0, 1.0, 0.0]) + np.arange(120)[
         :, None
     ] / 30.0 * speed * np.array([0.0, 0.0, -1.0])
     assert (
         walks_backwards(
-            replace(WALK, poses=np.zeros((60, 66)), translations=places)
+            replace(WALK, poses=np.zeros((120, 66)), translations=places)
         ).any()
         == back
     )
 
 
-def test_unknown_frames_and_those_about_them_count_for_nothing() -> None:
+@each(("metres", "back"), [(0.4, False), (1.2, True)])
+def test_hips_that_go_back_by_less_than_a_leg_are_no_walk(
+    metres: float, back: bool
+) -> None:
+    # the hips go back and forth once in two seconds, as in a squat
+    places = np.zeros((90, 3))
+    places[:, 1] = 1.0
+    places[:, 2] = 0.5 * metres * np.cos(np.pi * np.arange(90) / 30.0)
+    motion = replace(WALK, poses=np.zeros((90, 66)), translations=places)
+    assert walks_backwards(motion).any() == back
+
+
+def test_unknown_frames_and_their_neighbours_do_not_count() -> None:
     assert np.flatnonzero(walks_backwards(turned(180.0), {30})).tolist() == [
         *range(8, 22),
         *range(39, 52),

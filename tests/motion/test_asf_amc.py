@@ -384,7 +384,7 @@ def written(folder: Path, motion: Motion) -> tuple[Path, Path]:
     return asf, amc
 
 
-def test_the_rate_is_the_files_own_or_given_or_assumed_and_said(tmp_path: Path) -> None:
+def test_the_rate_is_the_files_or_given_or_assumed_and_reported(tmp_path: Path) -> None:
     walk = replace(recorded.clip("16_15").motion().frames(0, 30), fps=60000 / 1001)
     asf, amc = written(tmp_path, walk)
     again = read_clip(asf, amc)
@@ -402,7 +402,7 @@ def test_the_rate_is_the_files_own_or_given_or_assumed_and_said(tmp_path: Path) 
 
 
 @each("stated", ["  length 1.0\n", "  length 0.001\n", None])
-def test_a_unit_that_makes_no_person_is_recognised_and_said(
+def test_a_unit_that_gives_no_plausible_person_is_recognised_and_reported(
     tmp_path: Path, stated: str | None
 ) -> None:
     walk = recorded.clip("16_15").motion().frames(0, 4)

@@ -89,9 +89,9 @@ def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None
         (
             "JOINT LeftLeg",
             "JOINT Knot",
-            r"expected a BVH file with a person's joints, got one without left shin",
+            r"expected a BVH file with a person's joints, got a person without left shin",
         ),
-        ("JOINT RightHand\n", "JOINT A\n", "got one without right hand"),
+        ("JOINT RightHand\n", "JOINT A\n", "got a person without right hand"),
         ("Frames: 6", "Frames: 7", "bvh:[0-9]+: expected 7 frames, got 6"),
         (
             f"Frame Time: {1 / 120!r}",
@@ -223,12 +223,12 @@ def test_hinges_bend_as_people_s_do_where_no_frame_is_like_the_pose_of_rest(
         assert np.abs(angles[f"{hinge}_adduction"]).max() < 3.0
 
 
-def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
+def test_missing_joints_of_a_rig_are_at_rest_and_reported(tmp_path: Path) -> None:
     walk = recorded.clip("16_15").motion().frames(10, 14)
     motion = read_bvh(write_rig(tmp_path / "rig.bvh", walk, STYLES["vrm"]))
     (note,) = motion.notes
     assert (
-        "without ltoes, rtoes, upperneck, head, lwrist, lhand, rwrist, rhand, which are"
+        "the file lacks ltoes, rtoes, upperneck, head, lwrist, lhand, rwrist, rhand; they are"
         in note
     )
     forwards = (
@@ -244,7 +244,7 @@ def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())  # as some editors save it
     short = read_bvh(path)
     assert (
-        "without lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand, which are"
+        "the file lacks lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand; they are"
         in short.notes[0]
     )
     above = [
@@ -262,7 +262,7 @@ def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     [(unit, axis) for unit in UNITS for axis in ("y", "z")]
     + [("m", "x"), ("cm", "-y")],
 )
-def test_unit_and_axis_are_recognised_said_and_settable(
+def test_unit_and_axis_are_recognised_reported_and_settable(
     tmp_path: Path, unit: Unit, axis: str
 ) -> None:
     walk = recorded.clip("16_15").motion().frames(10, 14)
@@ -296,23 +296,25 @@ def test_unit_and_axis_are_recognised_said_and_settable(
         assert stated.notes == ()
 
 
-def test_a_stature_that_nobody_has_is_refused_or_said(tmp_path: Path) -> None:
+def test_an_implausible_stature_is_refused_or_reported(tmp_path: Path) -> None:
     walk = recorded.clip("16_15").motion().frames(10, 12)
     path = write_rig(tmp_path / "a.bvh", walk, STYLES["motionbuilder"], 3e-3)
     with pytest.raises(
         ValueError,
-        match=r"a.bvh: expected a person of a stature .* --unit m\|cm.*, got one of 0.005",
+        match=r"a.bvh: expected a person whose height is plausible .* --unit m\|cm.*, got a height of 0.005",
     ):
         read_bvh(path)
     (note,) = read_bvh(path, unit="cm").notes
-    assert "stands 0.00 m with lengths in centimetres" in note
+    assert "with lengths in centimetres the person is 0.00 m tall" in note
     with pytest.raises(
         ValueError, match="unit must be one of m, cm, mm, inch, foot, cmu, got 'ell'"
     ):
         read_bvh(path, unit="ell")  # type: ignore[arg-type]
 
 
-def test_bones_that_change_their_lengths_are_followed_and_said(tmp_path: Path) -> None:
+def test_bones_that_change_their_lengths_are_followed_and_reported(
+    tmp_path: Path,
+) -> None:
     walk = recorded.clip("16_15").motion().frames(10, 22)
     path = write_rig(tmp_path / "a.bvh", walk, STYLES["lafan1"])
     head, table = path.read_text().split("MOTION\n")
@@ -435,4 +437,4 @@ def test_the_other_people_of_a_file_are_named(tmp_path: Path, below: str) -> Non
     np.testing.assert_allclose(two.joints, one.joints, atol=1e-6)
     assert not any("left out" in note for note in one.notes)
     (note,) = [note for note in two.notes if "left out" in note]
-    assert "the person of 'Hips' is read; 'Partner_Hips' left out" in note
+    assert "the person with the root 'Hips' is read, 'Partner_Hips' left out" in note

@@ -76,7 +76,7 @@ def test_frames_outside_the_clip_are_refused(start: int, stop: int) -> None:
 
 
 @each(("frames", "kept"), [(1, 1), (4, 1), (5, 2), (9, 3), (343, 86)])
-def test_a_whole_ratio_takes_every_kth_frame_as_it_is(frames: int, kept: int) -> None:
+def test_a_whole_ratio_takes_every_kth_frame_unchanged(frames: int, kept: int) -> None:
     motion = clip(frames)
     slow = motion.resampled(30.0)
     assert len(slow) == kept
@@ -152,7 +152,7 @@ def still(frames: int) -> np.ndarray:
 
 
 @each(("fps", "left_out"), [(30.0, 1), (120.0, 4), (25.0, 1)])
-def test_what_falls_accelerates_as_it_does_at_any_rate(
+def test_a_falling_body_has_the_same_acceleration_at_any_rate(
     fps: float, left_out: int
 ) -> None:
     times = np.arange(40) / fps
@@ -163,7 +163,7 @@ def test_what_falls_accelerates_as_it_does_at_any_rate(
     assert np.isnan([accelerations[:left_out], accelerations[-left_out:]]).all()
 
 
-def test_a_foot_that_is_lifted_or_goes_fast_does_not_stand() -> None:
+def test_a_lifted_or_fast_foot_is_not_on_the_ground() -> None:
     joints = still(60)
     joints[20:40, LEFT, 1] = 0.2
     joints[:, RIGHT, 0] += np.arange(60) / 30.0  # a metre a second

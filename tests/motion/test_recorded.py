@@ -51,7 +51,7 @@ def test_people_are_chosen_by_name() -> None:
     assert recorded.leaving_out("library:02,16", ["16"]) == "library:02,16,-16"
 
 
-def test_the_command_lists_what_there_is() -> None:
+def test_the_command_lists_all_motions() -> None:
     first, *others = printed("motions")["recorded"]
     assert (first["name"], first["seconds"]) == (
         "02_01",

@@ -98,7 +98,7 @@ def test_what_the_library_raises_is_raised_where_it_is_asked() -> None:
 
 
 @each("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
-def test_a_copy_goes_on_as_the_original(copied: Any) -> None:
+def test_a_copy_continues_like_the_original(copied: Any) -> None:
     space = Toy(3, ball)
     first = bridge(climbs, space)
     for _ in range(4):
@@ -228,7 +228,7 @@ def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     assert set(threading.enumerate()) <= threads
 
 
-def test_a_library_says_afterwards_what_it_said_before() -> None:
+def test_a_library_behaves_the_same_afterwards() -> None:
     optuna = pytest.importorskip("optuna")
     config = pytest.importorskip("pymoo.config").Config
     before = optuna.logging.get_verbosity(), config.warnings["not_compiled"]

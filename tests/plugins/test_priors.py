@@ -79,7 +79,7 @@ def test_the_same_poses_have_the_same_clusters_and_fewer_than_asked_are_centres_
     assert reach == 0.0
 
 
-def test_a_loose_prior_reaches_what_its_components_do_not() -> None:
+def test_a_loose_prior_reaches_poses_beyond_its_components() -> None:
     walks = angles("walk-a", "walk-b", "walk-c")
     run = angles("run-a")
     prior = Loose().fit(walks, built_in.average_skeleton())

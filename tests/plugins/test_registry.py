@@ -188,7 +188,7 @@ def test_a_taken_name_is_refused_and_its_plugin_left_out_whole() -> None:
     }
 
 
-def test_a_variable_chooses_what_is_left_out() -> None:
+def test_a_variable_chooses_the_plugins_to_leave_out() -> None:
     for variables, loaded in (
         ({}, {"posefit-a", "posefit-b"}),
         ({"POSEFIT_BLOCK_PLUGINS": "b"}, {"posefit-a"}),

@@ -66,7 +66,7 @@ class TakesNonsense(Sound):
         super().__init__(footage)
 
 
-def test_the_kit_fails_what_was_planted() -> None:
+def test_the_kit_fails_planted_faults() -> None:
     for factory, broken in (
         (Sound, set()),
         (spoiled(lambda image, person, shadow: person), {"masks", "overlap"}),

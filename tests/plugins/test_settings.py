@@ -62,7 +62,7 @@ def test_settings_have_a_name_a_type_and_a_default() -> None:
     }
 
 
-def test_texts_become_what_their_types_ask_for() -> None:
+def test_texts_become_values_of_their_types() -> None:
     given = {
         "count": "7",
         "rate": "1",

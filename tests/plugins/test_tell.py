@@ -14,7 +14,7 @@ NAMES = [
 
 
 @each("name", NAMES)
-def test_costs_that_nobody_asked_for_are_refused(name: str) -> None:
+def test_unrequested_costs_are_refused(name: str) -> None:
     space = Toy(5)
     optimiser = registry().optimiser(name)(space, np.random.default_rng(0))
     with pytest.raises(

@@ -179,7 +179,7 @@ def test_the_rules_of_a_frame_look_at_the_joints_detected_in_it(
         assert np.array_equal(points, frame.details["joints"][0])
 
 
-def test_a_setting_counts_whatever_the_variant_is() -> None:
+def test_a_setting_counts_for_every_variant() -> None:
     task, observations = seen(frames=30)
     for k in range(5, 30):
         observations[k] = blank(observations[k])

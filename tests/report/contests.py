@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from posefit.report.kind import Contest, Runs
+from posefit.report.contest import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.runs import runs_of
 from posefit.report.summary import leader_sentences

@@ -32,7 +32,7 @@ class Here(Instant):
         self._run = run
         prepare()
 
-    def submit(self, cell: Any) -> None:
+    def submit(self, cell: Any, tenant: str = "") -> None:
         self.ended.append(Outcome(cell, self._run(cell)))
 
 

@@ -62,7 +62,7 @@ def test_the_leaderboard_has_means_and_baselines_have_skills_too(
     ] == [(4.0, 0.0)] * 3
 
 
-def test_a_skill_is_that_of_the_errors_that_are_shown(tmp_path: Path) -> None:
+def test_a_skill_is_computed_from_the_reported_errors(tmp_path: Path) -> None:
     errors = [1.0, 2.0, 3.0, 10.0]
     trivial = [4.0, 1.0, 16.0, 11.0]
     made = [
@@ -133,7 +133,9 @@ def test_a_lost_frame_counts_as_the_mean_training_poses_at_least() -> None:
     assert np.isnan(error_with_losses(row(None, 0.5, 4.0)))
 
 
-def test_few_lost_tracks_give_no_interval_and_none_or_more_do(tmp_path: Path) -> None:
+def test_one_or_two_lost_tracks_give_no_interval_and_none_or_more_do(
+    tmp_path: Path,
+) -> None:
     for lost, is_shown in ((0, True), (1, False), (2, False), (3, True), (5, True)):
         made = [
             result(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.report.kind import Contest
+from posefit.report.contest import Contest
 from posefit.report.leaderboard import leaderboard
 from posefit.report.summary import leader_sentences
 from posefit.report.tracks import LOSS, error_with_losses

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.report.kind import Runs
+from posefit.report.contest import Runs
 from posefit.report.runs import distinct
 from posefit.report.tracks import TRACKS
 from tests.report.browser import ledger, result
@@ -22,7 +22,7 @@ def read(path: Path, *results: dict[str, Any]) -> Runs:
     return runs_in(ledger(path / "results", results))
 
 
-def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_first(
+def test_methods_of_the_same_name_are_named_by_their_differences_best_first(
     tmp_path: Path,
 ) -> None:
     runs = read(
@@ -40,7 +40,7 @@ def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_firs
         "random@pca (posefit-spiral 1.2)",
         "sapso@pca (cooling 0.9, evaluations 400)",
     )
-    assert runs.variants[1]["settings"] == "sapso.cooling=0.9"
+    assert runs.settings[1] == "sapso.cooling=0.9"
 
 
 def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
@@ -57,7 +57,7 @@ def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
     )
 
 
-def test_names_are_distinct_and_printable_whatever_they_hold() -> None:
+def test_names_are_distinct_and_printable_with_any_content() -> None:
     details = [
         {"version": "1", "evaluations": "2"},
         {"version": "1", "evaluations": "3"},
@@ -93,7 +93,7 @@ def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -
     assert np.bincount(runs.instance).tolist() == [1, 2, 1, 1]
 
 
-def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(
+def test_the_order_follows_the_specs_and_not_the_order_in_which_cells_finish(
     tmp_path: Path,
 ) -> None:
     made = results_of(full({"a": 1.0, "b": 1.0}, instances=3))
@@ -101,8 +101,6 @@ def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(
     mixed = read(tmp_path / "b", *random.Random(0).sample(made, len(made)))
     assert runs.keys == mixed.keys
     assert (runs.scores == mixed.scores).all()
-    assert runs.heads == mixed.heads
-    assert (runs.head == mixed.head).all()
 
 
 def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
@@ -151,7 +149,7 @@ def test_reports_of_some_methods_name_them_as_the_report_of_all_does(
     both = ("sapso@pca (cooling 0.9)", "sapso@pca")
     runs = runs_in(path, "sapso@pca")
     assert runs.methods == both
-    assert runs.failed == (0, 1)
+    assert runs.failed == {"sapso@pca": 1}
     assert runs.instances == ("walk, view 45°, instance 0",)
     assert runs_in(path, both[0]).methods == both[:1]
     assert len(runs_in(path, both[0]).failures) == 0

@@ -30,7 +30,7 @@ def reach_of(differences: list[float], comparisons: int) -> float:
     return float(stats.t.ppf(1.0 - 0.025 / comparisons, count - 1)) * spread
 
 
-def test_what_leads_what_by_how_much_and_how_certain_that_is(tmp_path: Path) -> None:
+def test_the_leader_its_lead_and_how_certain_it_is(tmp_path: Path) -> None:
     contest = contest_of_errors(tmp_path, three_methods())
     first = leaderboard(contest)[0]
     # b is behind by 1, 1.02 and 1.04 in turn: p is below 1e-12
@@ -63,7 +63,7 @@ def test_without_a_difference_no_method_leads_and_the_seeds_needed_are_named(
     ]
 
 
-def test_a_method_that_is_better_but_lost_more_is_said_to_be_no_worse(
+def test_a_better_method_with_more_losses_is_not_called_worse(
     tmp_path: Path,
 ) -> None:
     # b is 0.1 better but in one track of twelve, which it loses

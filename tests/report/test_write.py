@@ -230,7 +230,7 @@ MISTAKES = [
         "NONE",
         "expected a ledger, a folder or .sqlite file that posefit sweep wrote, got none",
     ),
-    ("EMPTY --out OUT.html", "expected a ledger with finished rows, got one with none"),
+    ("EMPTY --out OUT.html", "expected a ledger with finished rows, got none"),
     (
         "OTHER.html",
         "OTHER.html: expected an intact SQLite file, got file is not a database",

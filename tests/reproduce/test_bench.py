@@ -15,7 +15,7 @@ from tests.cases import each
 
 
 @each("stretch", [1.0, 0.6, 1.2])
-def test_opencv_finds_the_same_costs_whatever_the_focal_length(stretch: float) -> None:
+def test_opencv_finds_the_same_costs_at_any_focal_length(stretch: float) -> None:
     usual = bench_cost()
     camera = replace(usual.cameras[0], focal=stretch * usual.cameras[0].focal)
     proposals = np.random.default_rng(0).uniform(

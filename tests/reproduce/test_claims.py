@@ -35,7 +35,7 @@ def test_a_claim_is_judged_by_its_interval() -> None:
         assert tuple(claim.verdict(0.95)[0] for claim in claims) == expected, bound
 
 
-def test_a_single_seed_decides_nothing_and_a_fact_needs_none() -> None:
+def test_a_single_seed_decides_nothing_and_a_fact_needs_no_seeds() -> None:
     assert (
         Claim("", "", "", VALUES[:, :1], bound=100.0).verdict(0.95)[0] == "not decided"
     )

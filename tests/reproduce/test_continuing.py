@@ -74,7 +74,7 @@ def test_another_build_reads_runs_and_adds_none(
         continued(tmp_path / "out", FIRST, SECOND)
 
 
-def test_a_folder_without_a_record_is_read_and_that_is_said(
+def test_a_folder_without_a_record_is_read_with_a_warning(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     continued(tmp_path / "out", FIRST, frames=100)
@@ -100,7 +100,7 @@ def test_a_quick_experiment_is_another_one_and_more_seeds_are_not() -> None:
     assert quick["frames"] == 15
 
 
-def test_clips_are_what_their_files_hold(tmp_path: Path) -> None:
+def test_clips_equal_their_files(tmp_path: Path) -> None:
     def shared(folder: Path) -> Any:
         return paper_experiment(str(folder), Scale(**QUICK)).shared["clips"]
 

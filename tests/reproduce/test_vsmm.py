@@ -106,7 +106,7 @@ def test_tables_and_figures_are_made_of_runs(
     assert found[-1].rows[0][1:3] == ["0.0", "0 of 5"]  # a setting that changes nothing
 
 
-def test_a_number_of_films_that_is_none_is_a_mistake() -> None:
+def test_zero_films_are_a_mistake() -> None:
     wrong = CliRunner().invoke(main, ["reproduce", "vsmm", "--films", "0"])
     assert wrong.exit_code == 2
     assert wrong.output.splitlines()[-1] == "posefit: films must be at least 1, got 0"

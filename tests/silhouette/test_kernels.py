@@ -223,7 +223,7 @@ def test_what_is_no_number_spoils_no_other_pose_and_without_a_place_nothing_is_d
             ]
 
 
-def test_poses_that_are_no_numbers_and_areas_that_are_none_are_refused(
+def test_invalid_poses_and_invalid_areas_are_refused(
     body: Body, camera: Camera
 ) -> None:
     silhouette = Silhouette.of(np.eye(camera.height, camera.width))
@@ -282,7 +282,7 @@ def test_small_images_equal_the_twin_even_uncompiled(body: Body) -> None:
 
 
 @each("threads", [1, 2])
-def test_what_goes_wrong_in_a_part_is_raised(threads: int) -> None:
+def test_an_error_in_a_part_is_raised(threads: int) -> None:
     def work(part: slice) -> None:
         if part.start <= 500 < part.stop:
             raise ValueError("row 500")

@@ -147,7 +147,7 @@ def test_a_body_seen_small_is_the_body_drawn_at_full_size_and_looked_at_there(
                 np.testing.assert_array_equal(coarse.valid, whole.valid[few])
 
 
-def test_the_borders_are_those_at_full_size() -> None:
+def test_the_borders_are_at_full_size() -> None:
     mask = np.zeros((40, 60), dtype=bool)
     mask[10:31, 7:60] = True  # to the right it is cut by the image
     left, top, right, bottom = coarser_silhouette(Silhouette.of(mask), 2).extent

@@ -47,7 +47,7 @@ def test_tests_are_scipys_and_holm_is_over_all_pairs():
 
 
 @pytest.mark.parametrize("blocks", [1, 2, 5, 6, 12])
-def test_p_is_at_least_what_signs_alone_can_give(blocks):
+def test_p_is_at_least_the_p_of_a_sign_test(blocks):
     errors = block([[0.1 * k, 0.1 * k + 1.0] for k in range(blocks)])
     (pair,) = paired_tests(errors)
     assert pair.p_value == min(1.0, 2.0 / 2.0**blocks)

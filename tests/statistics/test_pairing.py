@@ -22,7 +22,7 @@ def of(runs: list[tuple[int, int, int]], errors: list[float] | None = None) -> A
     )
 
 
-def test_runs_are_paired_in_whatever_order_they_come() -> None:
+def test_runs_are_paired_in_any_order() -> None:
     order = np.random.default_rng(0).permutation(len(ALL))
     shared = of([ALL[k] for k in order])
     assert (shared.methods, shared.left_out, shared.missing) == ((0, 1), 0, ())
@@ -30,7 +30,7 @@ def test_runs_are_paired_in_whatever_order_they_come() -> None:
     assert shared.instance.tolist() == [2, 2, 7, 7]
 
 
-def test_instances_may_have_seeds_of_their_own_and_more_or_fewer() -> None:
+def test_instances_may_have_different_seeds_and_numbers_of_seeds() -> None:
     assert of([(0, 0, 5), (0, 1, 6)]).blocks.tolist() == [[0, 1]]
     runs = [run for run in ALL if run != (1, 2, 0)]
     shared = of(runs)

@@ -43,7 +43,7 @@ def test_attained_is_the_share_of_runs_and_targets():
     ]
 
 
-def test_expected_running_time_counts_what_failed_runs_used():
+def test_expected_running_time_counts_the_evaluations_of_failed_runs():
     evaluations = [[10.0, 40.0, np.inf], [20.0, np.inf, np.inf]]
     # 30 / 2; (40 + 60) / 1; never
     assert expected_running_time(evaluations, [50, 60]).tolist() == [

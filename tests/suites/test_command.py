@@ -75,7 +75,7 @@ def test_the_suite_has_the_form_of_iohs_registry() -> None:
         assert problem["optimum"].keys() == bbob["problems"][0]["optimum"].keys()
 
 
-def test_a_run_prints_what_it_reaches() -> None:
+def test_a_run_prints_the_targets_that_it_reaches() -> None:
     words = (
         "run",
         "random",
@@ -138,7 +138,7 @@ def test_scores_follow_from_the_traces() -> None:
     assert score.running_times[16.0] == (pytest.approx(used / count) if count else None)
 
 
-def test_methods_that_look_are_marked_and_stand_after_those_that_search_blind() -> None:
+def test_methods_that_look_are_marked_and_come_after_blind_ones() -> None:
     runs = []
     for function in (2, 3, 4, 5):
         for looks in (True, False):

@@ -38,7 +38,7 @@ def infeasible(posed: Problem) -> np.ndarray:
     return drawn[~posed.space.feasible(drawn)][:20]
 
 
-def test_the_numbers_are_what_they_were_when_the_suite_was_made() -> None:
+def test_the_numbers_have_not_changed_since_the_suite_was_made() -> None:
     assert set(ROWS) == set(addresses())
     for address, (mask, areas) in ROWS.items():
         assert mask_of(*address) == mask, address
@@ -161,7 +161,7 @@ def test_a_proposal_has_a_float_and_several_have_an_array_with_the_same_bits() -
     assert posed.evaluations == 15
 
 
-def test_what_is_not_feasible_costs_what_its_repair_costs() -> None:
+def test_an_infeasible_proposal_costs_as_much_as_its_repair() -> None:
     for posed in (problem(1, 17, 9), problem(1, 10_017, 24), problem(6, 3, 40)):
         bad = infeasible(posed)
         mended = posed.repaired(bad)
@@ -230,7 +230,7 @@ def test_a_rotated_box_has_the_size_of_the_plain_one_and_no_coordinate_is_a_join
     assert not np.array_equal(rotated.components, other.components)
 
 
-def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
+def test_a_suite_iterates_over_its_problems_and_lists_its_functions() -> None:
     suite = posefit.Suite(
         functions=[7, 1], dimensions=[9, 24, 66], instances=[3, 10_003]
     )
@@ -446,7 +446,7 @@ def test_cocos_own_solver_and_printer_run_on_a_suite(capsys) -> None:
     assert "9D" in capsys.readouterr().out
 
 
-def test_each_search_has_random_numbers_of_its_own() -> None:
+def test_each_search_has_separate_random_numbers() -> None:
     first = set()
     for function, instance, seed in ((1, 17, 0), (1, 18, 0), (2, 17, 0), (1, 17, 1)):
         posed = problem(function, instance)

@@ -1,5 +1,7 @@
 """A sweep under sabotage: `python -m tests.sweep.chaos --cells 300 --events 60 --seed 1`.
 
+With `--engine dask` the cells run on two workers of a Dask scheduler, which are killed as well.
+
 Cells take half a second, or `--seconds`, so that there is time for all events; five are bad: they raise, exit, end
 their process, want all memory, or never end. While they run, events come at random moments: a process that runs a cell
 is killed, or the driver, or the driver with its whole group; one is stopped and goes on; a second driver comes. Whenever
@@ -20,10 +22,11 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from unittest.mock import patch
 
 from posefit.sweep.ledger import Ledger
 from tests.sweep.fake import (
@@ -35,6 +38,7 @@ from tests.sweep.fake import (
     quarantined_in,
     result,
     rows_in,
+    scheduler,
     starts,
 )
 
@@ -62,6 +66,7 @@ class Chaos:
     events: int
     seed: int
     seconds: float = 0.5  # that a cell takes
+    engine: str = "pool"
     happened: Counter[str] = field(default_factory=Counter)
     refused: int = 0
     # the rows of each copy, -1 where it does not open
@@ -73,9 +78,17 @@ class Chaos:
         self._ledger = self.folder / "results"
         self._starts = self.folder / "starts"
         self._driver: subprocess.Popen[bytes] | None = None
+        self._address: list[str] = []
 
     def run(self) -> dict[str, object]:
         """Return what happened, and what became of the cells."""
+        own = {STARTS: str(self._starts), SLOW_SECONDS: str(self.seconds)}
+        with patch.dict(os.environ, own), ExitStack() as served:
+            if self.engine == "dask":
+                self._address = [served.enter_context(scheduler(2))]
+            return self._run()
+
+    def _run(self) -> dict[str, object]:
         start = time.monotonic()
         drivers = 0
         status = -1
@@ -106,6 +119,7 @@ class Chaos:
         wanted = {cell.key: _figures(result(cell)) for cell in cells(self.count, SLOW)}
         quarantined = {row["key"] for row in quarantined_in(self._ledger)}
         return {
+            "engine": self.engine,
             "seed": self.seed,
             "cells": self.count,
             "events": dict(sorted(self.happened.items())),
@@ -134,13 +148,9 @@ class Chaos:
             str(self._ledger),
             str(self.count),
             str(LIMIT),
+            *self._address,
         ]
-        own = {
-            STARTS: str(self._starts),
-            SLOW_SECONDS: str(self.seconds),
-            "PYTHONPATH": str(ROOT),
-        }
-        how = {"cwd": ROOT, "env": os.environ | own, "start_new_session": True}
+        how = {"cwd": ROOT, "start_new_session": True}
         with (self.folder / "output.txt").open("ab") as output:
             return subprocess.Popen(
                 words, stdout=output, stderr=subprocess.STDOUT, **how
@@ -211,10 +221,18 @@ class Chaos:
         return True
 
     def _running(self) -> list[int]:
-        """Return the processes of this driver that began a cell and live."""
+        """Return the processes that began a cell and live, and the Dask workers that they belong to."""
         assert self._driver is not None
         known = dict.fromkeys(process for _, process in starts(self._starts)[-8:])
-        return [process for process in known if self._driver.pid in _ancestors(process)]
+        parents = {process: _ancestors(process) for process in known}
+        if self.engine == "dask":
+            running = []
+            for process in known:
+                # the parent of a process that has ended is 0 here, of an orphan 1
+                if parents[process] and parents[process][0] > 1:
+                    running += [process, parents[process][0]]
+            return running
+        return [process for process in known if self._driver.pid in parents[process]]
 
 
 def _figures(row: Mapping[str, object]) -> dict[str, object]:
@@ -252,10 +270,16 @@ def main() -> None:
     for name, default in (("cells", 300), ("events", 60), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--seconds", type=float, default=0.5)
+    parser.add_argument("--engine", choices=("pool", "dask"), default="pool")
     asked = parser.parse_args()
     with TemporaryDirectory() as folder:
         outcome = Chaos(
-            Path(folder), asked.cells, asked.events, asked.seed, asked.seconds
+            Path(folder),
+            asked.cells,
+            asked.events,
+            asked.seed,
+            asked.seconds,
+            asked.engine,
         ).run()
         output = (Path(folder) / "output.txt").read_text(errors="replace")
     print(json.dumps(outcome, indent=1))

@@ -1,6 +1,6 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
-`python -m tests.sweep.fake DIR CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
+`python -m tests.sweep.fake DIR CELLS SECONDS [SCHEDULER]` drives a sweep of such cells and of five bad ones; what a cell
 does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
@@ -8,23 +8,26 @@ import json
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from posefit.sweep.cell import TrackCell
+from posefit.sweep.cell import Cell, TrackCell
 from posefit.sweep.engine import Limits, Outcome
 
 if TYPE_CHECKING:
     from posefit.sweep.drive import Tally
     from posefit.sweep.engine import Engine
 
+ROOT = Path(__file__).parents[2]
 STARTS = "POSEFIT_STARTS"
 LEFT = "POSEFIT_LEFT"
 SLOW_SECONDS = "POSEFIT_SLOW_SECONDS"
@@ -101,7 +104,7 @@ def state() -> list[Any]:
 def leave_behind() -> None:
     """Note the state of this process and the number of another that sleeps, and change all of it."""
     sleeps = [sys.executable, "-c", "import time; time.sleep(600)"]
-    process = subprocess.Popen(sleeps, cwd="/")
+    process = subprocess.Popen(sleeps, cwd="/", start_new_session=True)
     # NumPy draws two of them, and keeps the second
     numbers = random.random(), np.random.standard_normal()  # noqa: NPY002
     with open(os.environ[LEFT], "a", encoding="utf-8") as file:
@@ -143,7 +146,7 @@ def result(cell: TrackCell) -> dict[str, Any]:
     }
 
 
-def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
+def swept(out: Path, chosen: Sequence[Cell], engine: "Engine") -> "Tally":
     """Return how a sweep by an engine ended."""
     from posefit.sweep.drive import drive
     from posefit.sweep.ledger import FILE, Writer
@@ -178,7 +181,7 @@ class Instant:
     def window(self) -> int:
         return 1
 
-    def submit(self, cell: TrackCell) -> None:
+    def submit(self, cell: TrackCell, tenant: str = "") -> None:
         self.ended.append(Outcome(cell, result(cell)))
 
     def wait(self, seconds: float) -> list[Outcome]:
@@ -193,6 +196,59 @@ def filled(folder: Path, count: int = 5, start: int = 0) -> Path:
     """Return a ledger with the rows of so many cells."""
     assert swept(folder, cells(start + count)[start:], Instant()).done == count
     return folder
+
+
+@contextmanager
+def scheduler(workers: int) -> Iterator[str]:
+    """Yield the address of a Dask scheduler with so many workers of one thread."""
+    address = f"tcp://127.0.0.1:{(place := port())}"
+    started = []
+    words = [
+        [
+            "dask_scheduler",
+            "--port",
+            str(place),
+            "--host",
+            "127.0.0.1",
+            "--no-dashboard",
+            "--no-show",
+        ]
+    ]
+    words += [
+        [
+            "dask_worker",
+            address,
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+            "--death-timeout",
+            "300",
+        ]
+    ] * workers
+    try:
+        for name, *more in words:
+            command = [sys.executable, "-m", f"distributed.cli.{name}", *more]
+            quiet = subprocess.DEVNULL
+            started.append(
+                subprocess.Popen(
+                    command,
+                    stdout=quiet,
+                    stderr=quiet,
+                    cwd=ROOT,
+                    start_new_session=True,
+                )
+            )
+        yield address
+    finally:
+        for process in started:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
 
 
 def starts(path: Path) -> list[tuple[str, int]]:
@@ -211,17 +267,22 @@ def bad(seed: int) -> list[TrackCell]:
 
 def main() -> int:
     """Drive a sweep as the command line says, and return its exit status."""
+    from posefit.sweep.cluster import Cluster
     from posefit.sweep.pool import Pool
     from tests.sweep.fake import behave  # by a name that other processes can import
 
-    where, many, seconds = sys.argv[1:4]
+    where, many, seconds, *address = sys.argv[1:]
     limits = Limits(float(seconds), 1.0)
     chosen = cells(int(many), SLOW)
-
+    engine: Engine
+    if address:
+        engine = Cluster(address[0], limits, behave, 300.0)
+    else:
+        engine = Pool(2, limits, behave)
     tally = swept(
         Path(where),
         [*chosen[::2], *bad(len(chosen)), *chosen[1::2]],
-        Pool(2, limits, behave),
+        engine,
     )
     return 1 if tally.quarantined else 130 if tally.stopped else 0
 

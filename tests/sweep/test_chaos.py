@@ -13,6 +13,7 @@ import pytest
 
 from tests.sweep.chaos import LOST, Chaos
 from tests.sweep.fake import STARTS, rows_in, starts
+from tests.sweep.mischief import HARM, run_installed
 
 ROOT = Path(__file__).parents[2]
 
@@ -59,6 +60,21 @@ def test_a_sabotaged_sweep_loses_and_doubles_no_row_and_quarantines_no_healthy_c
     # `python -m tests.sweep.chaos` is the long version
     result = Chaos(tmp_path, 24, 8, 1).run()
     assert [result[name] for name in LOST] == [0] * len(LOST), result
+
+
+@pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(), reason="finds what is left in /proc"
+)
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pool", "dask"])
+def test_plugins_that_misbehave_change_no_cell_of_others_and_leave_no_process(
+    engine: str,
+) -> None:
+    if engine == "dask":
+        pytest.importorskip("distributed")
+    # `python -m tests.sweep.mischief` is the long version
+    outcome = run_installed(engine, 12, 2)
+    assert [outcome[name] for name in HARM] == [0] * len(HARM), outcome
 
 
 @pytest.mark.parametrize(("times", "lost"), [(1, 0), (2, 2)])

@@ -167,7 +167,7 @@ def test_names_of_a_ledger_neither_steer_a_terminal_nor_forge_lines(
     )
 
 
-def test_without_distributed_dask_says_what_to_install(
+def test_without_distributed_the_message_names_the_package_to_install(
     plan: Path, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)

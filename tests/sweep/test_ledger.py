@@ -118,7 +118,7 @@ SPEC = cells(1)[0].spec
         ("spec", {"seed": [0]}, "TypeError"),
     ],
 )
-def test_a_row_that_posefit_did_not_write_is_named_with_what_to_do(
+def test_a_row_that_posefit_did_not_write_is_named_with_advice(
     column, change, reason, tmp_path: Path
 ) -> None:
     folder = filled(tmp_path / "results", 2)
@@ -168,7 +168,7 @@ def test_a_closed_ledger_says_so(tmp_path: Path) -> None:
         list(ledger.rows())
 
 
-def test_a_ledgers_name_may_hold_what_is_a_pattern_elsewhere(tmp_path: Path) -> None:
+def test_a_ledgers_name_may_contain_pattern_characters(tmp_path: Path) -> None:
     folder = filled(tmp_path / "results", 2)
     for name in ("a[1].sqlite", "*.sqlite", "?.sqlite", "{a,b}.sqlite"):
         copy = tmp_path / name
@@ -233,7 +233,7 @@ def test_a_ledger_that_another_program_locks_is_in_use(
 
 
 @each("kind", ["link", "hard link", "file", "pipe", "folder"])
-def test_a_lock_file_that_is_not_posefits_stays_as_it_is(
+def test_a_lock_file_of_another_program_is_not_changed(
     kind: str, tmp_path: Path
 ) -> None:
     mine = tmp_path / "mine.txt"
@@ -252,7 +252,7 @@ def test_a_lock_file_that_is_not_posefits_stays_as_it_is(
     else:
         name.mkdir()
     with pytest.raises(
-        ValueError, match="driver: expected|expected a file that can be"
+        ValueError, match="driver: expected|expected a ledger that can be"
     ):
         Writer(folder / FILE)
     assert mine.read_text() == "mine"
@@ -265,7 +265,7 @@ def test_a_ledger_is_not_made_through_a_link_that_leads_nowhere(tmp_path: Path) 
     folder = tmp_path / "results"
     folder.mkdir()
     (folder / FILE).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(ValueError, match="got a link that leads nowhere"):
+    with pytest.raises(ValueError, match="got a broken link"):
         Writer(folder / FILE)
     assert not (tmp_path / "elsewhere").exists()
 

@@ -310,7 +310,7 @@ def test_a_file_that_changed_after_it_was_planned_is_not_followed(
         run_cell(cell)
 
 
-def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_evaluations() -> (
+def test_a_trace_is_the_mean_best_cost_of_the_frames_after_each_number_of_evaluations() -> (
     None
 ):
     def frame(costs: list[float], step: int) -> Frame:
@@ -390,7 +390,7 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(
         ),
         ("fps = 1e-320", "fps must lie in 0.001 to 1e[+]06, got 1e-320"),
         (f'"{"n" * 300}" = 1', "got 'n{76}[.]{3}$"),
-        ("train = " + "[" * 9000, "not nested so deeply"),
+        ("train = " + "[" * 9000, "less deeply nested"),
     ):
         path.write_text(PLAIN + line)
         with pytest.raises(ValueError, match=message):

@@ -2,22 +2,18 @@
 
 import json
 import os
-import pickle
 import signal
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
-import numpy as np
 import pytest
-from pebble import ProcessExpired, ProcessFuture
 
 from posefit.errors import InputError
 from posefit.suites.functions import SUITE
@@ -28,11 +24,19 @@ from posefit.sweep.engine import Engine, Limits, Outcome
 from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool, cores
-from posefit.sweep.worker import EXIT_ZERO_STATUS, Context, become_worker
+from posefit.sweep.worker import _Process, become_worker
 from posefit.version import posefit_build
 from tests.cases import each
 from tests.sweep import fake
-from tests.sweep.fake import behave, cells, quarantined_in, rows_in, swept
+from tests.sweep.fake import (
+    behave,
+    cells,
+    port,
+    quarantined_in,
+    rows_in,
+    scheduler,
+    swept,
+)
 
 # the figures that two runs of a cell differ by
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
@@ -67,60 +71,6 @@ def cluster(
     from posefit.sweep.cluster import Cluster
 
     return Cluster(address, limits, run, patience)
-
-
-@contextmanager
-def scheduler(workers: int) -> Iterator[str]:
-    """Yield the address of a Dask scheduler with so many workers of one thread, or skip the test."""
-    pytest.importorskip("distributed")
-    address = f"tcp://127.0.0.1:{(place := port())}"
-    started = []
-    words = [
-        [
-            "dask_scheduler",
-            "--port",
-            str(place),
-            "--host",
-            "127.0.0.1",
-            "--no-dashboard",
-            "--no-show",
-        ]
-    ]
-    words += [
-        [
-            "dask_worker",
-            address,
-            "--nthreads",
-            "1",
-            "--no-dashboard",
-            "--death-timeout",
-            "300",
-        ]
-    ] * workers
-    try:
-        for name, *more in words:
-            command = [sys.executable, "-m", f"distributed.cli.{name}", *more]
-            quiet = subprocess.DEVNULL
-            started.append(
-                subprocess.Popen(
-                    command,
-                    stdout=quiet,
-                    stderr=quiet,
-                    cwd=ROOT,
-                    start_new_session=True,
-                )
-            )
-        yield address
-    finally:
-        for process in started:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-
-
-def port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
 
 
 def one_by_one(engine: Engine, chosen: Sequence[TrackCell]) -> list[Outcome]:
@@ -168,27 +118,7 @@ def test_a_process_that_ends_itself_or_dies_is_noticed_at_once_and_a_kill_costs_
     ]
 
 
-@each(
-    ("code", "reason"),
-    [
-        (0, "its process ended itself with status 0"),
-        (EXIT_ZERO_STATUS, "its process ended itself with status 0"),
-        (1, "its process ended itself with status 1"),
-        (EXIT_ZERO_STATUS + 1, f"its process ended itself with status {EXIT_ZERO_STATUS + 1}"),
-        (255, "its process ended itself with status 255"),
-        (-signal.SIGSEGV, "its process died of SIGSEGV"),
-    ],
-)  # fmt: skip
-def test_a_process_that_ended_is_named_by_its_status(code: int, reason: str) -> None:
-    future: ProcessFuture[bytes] = ProcessFuture()
-    future.set_exception(ProcessExpired("gone", code=code))  # type: ignore[no-untyped-call]
-    with closing(Pool(1, LIMITS, behave)) as pool:
-        pool._running[future] = cells(1)[0], time.monotonic()
-        (outcome,) = pool.wait(1.0)
-    assert (outcome.reason, outcome.is_own_fault) == (reason, True)
-
-
-def test_the_processors_counted_are_those_of_this_process(
+def test_the_processors_of_this_process_are_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # 0 is this process; another may have all of the machine
@@ -257,19 +187,45 @@ def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
     wait_until(lambda: not any(is_running(states[0]) for states in found))
 
 
-class Vandal(TrackCell):
-    """A cell whose method replaces functions and a class of libraries, as a careless plugin does."""
+def test_a_process_runs_jobs_of_one_tenant_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("posefit.sweep.pool.SPARE", 1)
+    chosen = cells(5)
+    tenants = ["", "a 1.0", "", "b 1.0", ""]
+    processes: dict[str, set[int]] = {}
+    with closing(Pool(1, LIMITS, process_of)) as pool:
+        for cell, tenant in zip(chosen, tenants, strict=True):
+            pool.submit(cell, tenant)
+            while not (ended := pool.wait(1.0)):
+                pass
+            processes.setdefault(tenant, set()).add(ended[0].result)
+    # the process that was idle for longest made room
+    assert len(processes[""]) == 1
+    assert len(set().union(*processes.values())) == sum(map(len, processes.values()))
 
-    def measure(self) -> dict[str, Any]:
-        np.linalg.norm = json.dumps = np.random.Generator = print  # type: ignore[assignment,misc]
-        return {}
+
+def process_of(_: TrackCell) -> int:
+    return os.getpid()
 
 
-def test_functions_that_a_plugin_from_elsewhere_replaces_are_put_back() -> None:
-    before = np.linalg.norm, json.dumps, np.random.Generator
-    cell = Vandal("random@pca", "walk", ("walk-a",))
-    run_cell(replace(cell, version=f"{cell.version}, elsewhere 1.0 0123abcd"))
-    assert (np.linalg.norm, json.dumps, np.random.Generator) == before
+def fork_or_close(cell: TrackCell) -> int:
+    """Fork this process where the seed is even, else close its connection and go on."""
+    if cell.seed % 2 == 0:
+        os.fork()
+    else:
+        os.closerange(3, 256)
+        time.sleep(60.0)
+    return cell.seed
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks processes")
+def test_a_forked_process_gives_no_second_answer_and_one_that_cannot_answer_ends() -> (
+    None
+):
+    ended = one_by_one(Pool(1, LIMITS, fork_or_close), [cells(4)[k] for k in (0, 2, 1)])
+    assert [outcome.result for outcome in ended] == [0, 2, None]
+    assert ended[-1].reason == "it closed the connection of its process"
 
 
 def wait_until(true: Callable[[], bool]) -> None:
@@ -298,13 +254,13 @@ def interrupts() -> list[Any]:
 def starts_deaf(path: list[str]) -> None:
     """End with status 0 where this process was deaf to Ctrl-C before it became a worker, and is afterwards."""
     before = interrupts()
-    become_worker(os.getppid(), path, pickle.dumps(None))
+    become_worker(os.getppid(), path)
     deaf = before[0] and interrupts() == [False, signal.SIG_IGN]
     sys.exit(not deaf)
 
 
 def test_a_worker_is_deaf_to_ctrl_c_from_its_first_moment() -> None:
-    process = Context().Process(target=starts_deaf, args=(sys.path,))
+    process = _Process(target=starts_deaf, args=(sys.path,))
     process.start()
     process.join(60.0)
     assert process.exitcode == 0
@@ -404,7 +360,7 @@ def test_a_scheduler_that_is_not_there_is_named() -> None:
     address = f"tcp://127.0.0.1:{port()}"
     with pytest.raises(
         InputError,
-        match=f"scheduler must be one with workers that answers, got {address}",
+        match=f"scheduler must answer and have workers, got {address}",
     ):
         cluster(address, LIMITS, patience=1.0)
 
@@ -439,7 +395,7 @@ def test_dask_workers_without_this_posefit_are_refused_before_a_cell_is_lost(
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on(
+def test_a_lost_scheduler_leaves_all_rows_and_the_same_command_continues(
     tmp_path: Path,
 ) -> None:
     with ExitStack() as served, Writer(tmp_path / "results" / FILE) as ledger:

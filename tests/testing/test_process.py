@@ -57,9 +57,7 @@ def test_what_ends_a_process_fails_the_check_that_ran(
 
 
 @pytest.mark.usefixtures("installed")
-def test_the_checks_go_on_after_one_that_ended_the_process_until_another_fails_alike() -> (
-    None
-):
+def test_the_checks_continue_after_a_crash_until_another_fails_alike() -> None:
     report = check_in_process(
         "optimiser", "ends-the-process", only=["shape", "dtype", "dimensions", "speed"]
     )
@@ -139,7 +137,7 @@ def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
 
 
 @pytest.mark.usefixtures("installed")
-def test_the_process_of_a_check_ends_with_the_one_that_started_it(
+def test_the_process_of_a_check_ends_with_its_parent(
     tmp_path: Path,
 ) -> None:
     words = ["check", "optimiser", "never-returns", "--only", "dtype"]
@@ -183,12 +181,12 @@ def test_a_thread_that_a_plugin_leaves_running_does_not_keep_a_track_from_ending
     assert ran.returncode == 0
     assert (
         ran.stderr.splitlines()[-1]
-        == "posefit: not waiting for what a plugin left running: planted"
+        == "posefit: not waiting for threads that a plugin left running: planted"
     )
 
 
 @pytest.mark.usefixtures("installed")
-def test_a_rule_is_checked_alone_and_one_that_is_not_there_is_named() -> None:
+def test_a_rule_is_checked_alone_and_an_unknown_one_is_named() -> None:
     report = check_in_process("optimiser", "sound", only=["speed"])
     assert [result.name for result in report.results] == ["speed"]
     assert report.plugin == "optimiser 'sound' of posefit-sabotage 1.0"

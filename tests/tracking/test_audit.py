@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.fitting.driving import Audit, drive
+from posefit.fitting.driving import UNCOUNTED_POSES, Audit, drive
 from posefit.fitting.validation import BrokenRuleError
 from posefit.progress import Progress
 from posefit.testing.tracker_rules import scene
@@ -99,6 +99,20 @@ def test_wrong_reports_of_a_tracker_are_corrected_with_a_warning(
         np.testing.assert_array_equal(frame.areas, other.areas)
         if kind is planted.SpendsInSecret:
             assert frame.evaluations == 20_001
+
+
+@each("extra", [UNCOUNTED_POSES, UNCOUNTED_POSES + 1])
+def test_a_few_poses_a_frame_need_not_be_counted(extra: int) -> None:
+    too_many = extra > UNCOUNTED_POSES
+
+    class DrawsItsResultAgain(planted.Holds):
+        def frame(self, observation: Any) -> Any:
+            self.draw(observation, extra)
+            return super().frame(observation)
+
+    frames, warnings = audited(DrawsItsResultAgain)
+    assert frames[0].evaluations == (1 + extra if too_many else 1)
+    assert len(warnings) == too_many
 
 
 def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:

@@ -16,8 +16,8 @@ import pytest
 from posefit.errors import InputError
 from posefit.fitting.tracker import SynthesisTracker
 from posefit.footage import live
+from posefit.footage.extraction import Extraction
 from posefit.footage.live import Stream, live_views, netpbm_images
-from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
@@ -276,7 +276,7 @@ def test_what_a_stream_leaves_open_is_logged_and_its_calibrations_unit_counts(
                 message for message in messages if message.startswith("warning: ")
             )
             # in what is learned from
-            assert "z is taken to be up, as the person stands along it" in warning
+            assert "z is taken to be up, because the person stands along it" in warning
             # from 30 cm beside the origin, along -z, the person is 165 pixels x 1.8 m / 109 pixels away
             assert -2.9 < frames[0].frame.translation[2] < -1.9
 

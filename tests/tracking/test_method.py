@@ -12,8 +12,9 @@ import pytest
 import posefit
 from posefit import Problem, minimise
 from posefit.fitting.validation import BrokenRuleError
+from posefit.footage.extraction import Extraction
+from posefit.footage.options import SourceOptions
 from posefit.footage.scene import synthetic
-from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.motion import built_in, recorded
 from posefit.progress import Progress
@@ -454,7 +455,7 @@ def test_a_search_that_ends_long_before_its_budget_says_so(name: str) -> None:
 def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(
     tmp_path: Path,
 ) -> None:
-    scene = scene_of(["09_01"], frames=(0, 8), size=(120, 90))
+    scene = scene_of(["09_01"], SourceOptions(frames=(0, 8), size=(120, 90)))
     log = list[str]()
     np.savez(tmp_path / "masks.npz", masks=masks_of(scene))
     track = posefit.track(
@@ -480,7 +481,10 @@ def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(
 def test_footage_by_several_cameras_is_tracked_again_where_evaluations_are_enough(
     tmp_path: Path,
 ) -> None:
-    scene = scene_of(["09_01"], frames=(0, 6), size=(120, 90), view_degrees=(0.0, 90.0))
+    scene = scene_of(
+        ["09_01"],
+        SourceOptions(frames=(0, 6), size=(120, 90), view_degrees=(0.0, 90.0)),
+    )
     paths = [tmp_path / "0.npz", tmp_path / "1.npz"]
     used = dict[int, int]()
     for v, path in enumerate(paths):

@@ -192,7 +192,9 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
     assert data["others"]["weights"] == pytest.approx([0.3])
     assert data["marks"] == {"held": [], "lost": [], "unknown": [1]}
     assert (
-        data["verdict"] == "Not determined: left and right: unknown in 1 of 4 frames."
+        data["verdict"]
+        == "Not determined: left and right unknown in 1 of 4 frames that show enough of "
+        "the person."
     )
 
 
@@ -426,7 +428,8 @@ def test_doubtful_frames_are_marked(chromium: Any, doubtful: Path) -> None:
         verdict = page.locator("#verdict").inner_text()
         assert (
             verdict
-            == "Not determined: left and right: unknown in 2 of 12 frames; 1 frame lost."
+            == "Not determined: left and right unknown in 2 of 12, lost in 1 of 12 frames "
+            "that show enough of the person."
         )
         assert (
             page.locator("#notes")

@@ -17,7 +17,7 @@ from posefit.evaluation.trust import (
     covered_pixels,
     depth_scatter,
     grade_of,
-    held_share,
+    hidden_share,
     longer_side,
     sentence,
     signs_against,
@@ -77,7 +77,7 @@ def test_stances_at_two_heights_are_half_of_that_apart() -> None:
 
 
 @each(
-    ("usable", "cut", "held"),
+    ("usable", "cut", "hidden"),
     [
         # nobody is missed before the person comes and after they have gone
         ("00101100", "00000000", 0.25),
@@ -87,10 +87,13 @@ def test_stances_at_two_heights_are_half_of_that_apart() -> None:
         ("1100011011", "0011000000", 0.1),  # they are out of the picture
     ],
 )
-def test_frames_between_others_that_show_too_little_are_held(
-    usable: str, cut: str, held: float
+def test_frames_between_others_that_show_too_little_are_hidden(
+    usable: str, cut: str, hidden: float
 ) -> None:
-    assert held_share(*(np.array([*digits]) == "1" for digits in (usable, cut))) == held
+    assert (
+        hidden_share(*(np.array([*digits]) == "1" for digits in (usable, cut)))
+        == hidden
+    )
 
 
 def test_a_body_covers_half_of_what_moves() -> None:
@@ -121,8 +124,9 @@ def test_a_body_covers_half_of_what_moves() -> None:
         ),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         (
-            {"held": 0.4},
-            "doubtful: the person is mostly hidden in 40% of the frames",
+            {"hidden": 0.4},
+            "doubtful: the person is mostly hidden in 40% of the frames between the "
+            "first and the last that show them",
         ),
         (
             {"cropped": 1.0, "training_mm": 218.0},
@@ -169,7 +173,7 @@ LIMITS: dict[str, tuple[tuple[float, float | None], ...]] = {
     "training_mm": ((60.0, 200.0),),
     "cropped": ((0.25, 0.60),),
     "frontal": ((0.50, None),),
-    "held": ((0.25, 0.60),),
+    "hidden": ((0.25, 0.60),),
     "iou": ((0.65, 0.45),),
     "acceleration": ((14.0, 60.0),),
 }

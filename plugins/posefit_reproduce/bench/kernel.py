@@ -87,21 +87,20 @@ def bench_cost(
     prior = PCA(components=components).fit(walking_angles())
     joints = motion.skeleton.joints(motion.poses, motion.translations)[0]
     yaws = motion.poses[0, 0] + np.radians(45.0 + 360.0 / views * np.arange(views))
-    cameras = [
-        Camera.framing(joints, body.joint_radii(), yaw, (width, 3 * width // 4))
-        for yaw in yaws
-    ]
+    cameras = []
+    for yaw in yaws:
+        size = (width, 3 * width // 4)
+        cameras.append(Camera.framing(joints, body.joint_radii(), yaw, size))
     space = SearchSpace(
         prior,
         np.array([motion.poses[0, 0], 0.0, 0.0]),
         np.radians([45.0, 15.0, 15.0]),
         motion.translations[0],
     )
-    masks = [
-        project(body, camera, motion.poses[0], motion.translations[0])
-        for camera in cameras
-    ]
-    silhouettes = [Silhouette.of(mask) for mask in masks]
+    silhouettes = []
+    for camera in cameras:
+        mask = project(body, camera, motion.poses[0], motion.translations[0])
+        silhouettes.append(Silhouette.of(mask))
     return SilhouetteCost(body, cameras, silhouettes, space, threads=threads)
 
 

@@ -1,6 +1,6 @@
 """The experiments of the SAPSO paper's section 5: all runs.
 
-| kind | what is run |
+| kind | runs |
 |---|---|
 | track | 100 frames, the first yaw known to 45 degrees. Table 2, figure 9 |
 | unknown | the same with the first yaw unknown. Interpretation S17 |
@@ -82,17 +82,13 @@ class Scale:
             for view, method in product(self.views, (*COMPARED[motion], *BASELINES)):
                 yield Run("track", motion, method, view, seed)
             if motion != "turn":
-                yield from (
-                    Run("first", motion, method, view, seed)
-                    for view, method in product(self.views, BOTH)
-                )
+                for view, method in product(self.views, BOTH):
+                    yield Run("first", motion, method, view, seed)
             if seed % 2:
                 continue
             methods = (OURS,) if seed else BOTH
-            yield from (
-                Run("image", motion, method, view, seed)
-                for view, method in product(self.around, methods)
-            )
+            for view, method in product(self.around, methods):
+                yield Run("image", motion, method, view, seed)
             for kind, view, method in product(
                 ("hidden", "unknown"), self.views, methods
             ):
@@ -113,9 +109,9 @@ def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
     """
     motion = loaded(clips, scale.frames)[run.subject]
     if run.kind == "first":
-        histories = [
-            first_history(motion, scale.iterations, count, run) for count in SWARMS
-        ]
+        histories = []
+        for count in SWARMS:
+            histories.append(first_history(motion, scale.iterations, count, run))
         return {"history": np.array(histories)}
     scene = paper_scene(motion, run.view)
     if run.method in BASELINES:
@@ -211,12 +207,10 @@ def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
     if name == "persistence":
         return np.tile(truth[0], (len(truth), 1))
     if name == "nearest":
-        return np.array(
-            [
-                nearest(scene, angles, k, image)
-                for k, image in enumerate(scene.observations)
-            ]
-        )
+        poses = []
+        for k, image in enumerate(scene.observations):
+            poses.append(nearest(scene, angles, k, image))
+        return np.array(poses)
     return np.column_stack(
         [truth[:, :3], np.tile(angles.mean(axis=0), (len(truth), 1))]
     )

@@ -22,7 +22,7 @@ REDRAWS = 100
 
 
 class LetterSAPSO(SAPSO):
-    """Algorithm 1 to the letter. Positions and velocities are those of the unit box.
+    """Algorithm 1 to the letter. Positions and velocities are in the unit box.
 
     Settings:
         population_size (N): size of the swarm, 1 or more. Section 5.2.

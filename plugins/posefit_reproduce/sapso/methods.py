@@ -71,9 +71,9 @@ def _search(
 
 # constraint 1 on all angles: the files' joint limits alone are far wider
 _FULL = DRIVEN | {"full.limits": "training"}
-_ALWAYS, _NEVER = (
-    {"sapso.temperature": value, "sapso.cooling": 1.0} for value in (1e9, 1e-9)
-)
+# a temperature at which every move is accepted, and one at which no worse one is
+_ALWAYS = {"sapso.temperature": 1e9, "sapso.cooling": 1.0}
+_NEVER = {"sapso.temperature": 1e-9, "sapso.cooling": 1.0}
 PAPER = {
     "particle@full": _search("PF", "particle@full", _FULL),
     "sapso@full": _search("SAPSO", "sapso@full", _FULL),

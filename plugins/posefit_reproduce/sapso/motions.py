@@ -75,11 +75,11 @@ def digests(clips: str | Path | None) -> str | list[str]:
     if clips is None:
         return "library"
     paths = [Path(clips) / f"{clip}.amc" for clip in ALL_CLIPS]
-    return [
-        digest_of(file)[:8]
-        for path in paths
-        for file in (path, *sorted(path.parent.glob("*.asf")))
-    ]
+    identities = []
+    for path in paths:
+        for file in (path, *sorted(path.parent.glob("*.asf"))):
+            identities.append(digest_of(file)[:8])
+    return identities
 
 
 def _clip(folder: str | Path | None, clip: str) -> Motion:

@@ -98,33 +98,27 @@ class Analysis:
 
 def paper_tables(analysis: Analysis) -> list[Table]:
     """Return all tables."""
-    return [
-        section(analysis)
-        for section in (
-            motions_table,
-            verdicts_table,
-            parts_table,
-            table_2,
-            flaws_table,
-            turn_table,
-            views_table,
-            table_1,
-        )
-    ]
+    sections = (
+        motions_table,
+        verdicts_table,
+        parts_table,
+        table_2,
+        flaws_table,
+        turn_table,
+        views_table,
+        table_1,
+    )
+    return [section(analysis) for section in sections]
 
 
 def verdicts_table(analysis: Analysis) -> Table:
     """Return the paper's claims with their verdicts, each on one motion."""
-    sections = (track_claims, ("walk", "run")), (image_claims, analysis.motions)
-    return claims_table(
-        "claims",
-        [
-            claim
-            for section, on in sections
-            for name in on
-            for claim in section(analysis, name)
-        ],
-    )
+    claims: list[Claim] = []
+    for name in ("walk", "run"):
+        claims += track_claims(analysis, name)
+    for name in analysis.motions:
+        claims += image_claims(analysis, name)
+    return claims_table("claims", claims)
 
 
 def motions_table(analysis: Analysis) -> Table:
@@ -138,10 +132,10 @@ def motions_table(analysis: Analysis) -> Table:
             paper.TRAINING_FRAMES[name],
         )
         turned = f"{yaw[-1] - yaw[0]:.0f}"
-        seeds = [
-            analysis.results.of("poses", kind, name, OURS).shape[1]
-            for kind in ("track", "image")
-        ]
+        seeds = []
+        for kind in ("track", "image"):
+            poses = analysis.results.of("poses", kind, name, OURS)
+            seeds.append(poses.shape[1])
         row = [
             MOTIONS[name],
             motion.test.name,
@@ -175,14 +169,11 @@ def table_1(analysis: Analysis) -> Table:
         test = analysis.motions[motion].test.poses
         frame = len(test) // 2
         images = analysis.results.of("poses", "image", motion, OURS)
-        ours = [
-            np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3)
-            for pose in (test[frame], images[1, 0, frame])
-        ]
-        mean, letter = (
-            interval(table_1_angles(analysis, motion, name, "image"))
-            for name in (OURS, LETTER)
-        )
+        ours = []
+        for pose in (test[frame], images[1, 0, frame]):
+            ours.append(np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3))
+        mean = interval(table_1_angles(analysis, motion, OURS, "image"))
+        letter = interval(table_1_angles(analysis, motion, LETTER, "image"))
         pose = table_1_angles(analysis, motion, "mean_pose", "track").mean()
         labels = [
             "paper, truth",
@@ -214,9 +205,10 @@ def table_2(analysis: Analysis) -> Table:
         cells = [LABELS[name]]
         for motion in paper.TABLE_2:
             cell = paper.TABLE_2[motion].get(name)
-            cells.append(
-                "" if cell is None else " / ".join(f"{value:.2f}" for value in cell)
-            )
+            text = ""
+            if cell is not None:
+                text = " / ".join(f"{value:.2f}" for value in cell)
+            cells.append(text)
             figures = [
                 bounded(interval(analysis.errors(motion, name))),
                 f"{analysis.spread(motion, name).mean():.2f}",
@@ -226,11 +218,9 @@ def table_2(analysis: Analysis) -> Table:
                 figures.append(f"{seconds.mean():.4f}")
             cells.append(" / ".join(figures))
         rows.append(cells)
-    heads = [
-        f"{motion}, {origin}"
-        for motion in paper.TABLE_2
-        for origin in ("the paper", "here")
-    ]
+    heads = []
+    for motion in paper.TABLE_2:
+        heads += [f"{motion}, the paper", f"{motion}, here"]
     return Table("table-2", ["(9) / (10) / seconds", *heads], rows)
 
 
@@ -265,13 +255,12 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
     """Return the claims about tracks, by (8), the compact space, and first frames."""
     results = analysis.results
     label = MOTIONS[motion]
-    ours, full, particle = (
-        analysis.errors(motion, name) for name in (OURS, "sapso@full", "particle@full")
-    )
-    seconds = [
-        results.of("cpu_seconds", "track", motion, name)
-        for name in (OURS, "sapso@full")
-    ]
+    ours = analysis.errors(motion, OURS)
+    full = analysis.errors(motion, "sapso@full")
+    particle = analysis.errors(motion, "particle@full")
+    seconds = []
+    for name in (OURS, "sapso@full"):
+        seconds.append(results.of("cpu_seconds", "track", motion, name))
     # the walk with a turn is tracked in the space of the straight walk
     space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
     explained = np.asarray(100.0 * space.explained[: paper.ENOUGH_COMPONENTS].sum())
@@ -352,9 +341,8 @@ def image_claims(analysis: Analysis, motion: str) -> list[Claim]:
     ).mean(axis=2)
     chosen = table_1_angles(analysis, motion, OURS, "image")
     theirs = np.abs(np.subtract(*paper.TABLE_1[motion])).mean()
-    images, hidden = (
-        analysis.errors(motion, OURS, kind, free=True) for kind in ("image", "hidden")
-    )
+    images = analysis.errors(motion, OURS, "image", free=True)
+    hidden = analysis.errors(motion, OURS, "hidden", free=True)
     # compare with the same views of the images
     worse = hidden - images[: len(hidden)]
     around = np.ptp(images, axis=0)[None]
@@ -412,7 +400,7 @@ def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> A
 def few_joints(analysis: Analysis, motion: str) -> Array:
     """Return the share (views, seeds) of the three worst joints in high errors.
 
-    High errors are those of the worst tenth of a run's frames.
+    High errors are the errors of the worst tenth of a run's frames.
     """
     away = analysis.away(motion)
     # the root and 21 inner joints
@@ -456,41 +444,28 @@ def parts_table(analysis: Analysis) -> Table:
 
     Differences are paired by view and seed.
     """
-    labels = {"sapso@full": "no PCA space: all angles"} | {
-        name: LABELS[name] for name in (*PARTS, *OTHERS)
-    }
-    rows = [
-        [
-            "PCA + SAPSO itself",
-            *(
-                bounded(interval(analysis.errors(motion)))
-                for motion in analysis.motions
-            ),
-        ]
-    ]
+    labels = {"sapso@full": "no PCA space: all angles"}
+    labels |= {name: LABELS[name] for name in (*PARTS, *OTHERS)}
+    itself = ["PCA + SAPSO itself"]
+    for motion in analysis.motions:
+        itself.append(bounded(interval(analysis.errors(motion))))
+    rows = [itself]
     for name, label in labels.items():
-        differences = [
-            analysis.errors(motion, name) - analysis.errors(motion)
-            for motion in analysis.motions
-        ]
-        rows.append(
-            [label, *(bounded(interval(difference)) for difference in differences)]
-        )
-    return Table(
-        "parts",
-        ["without, or instead", *(MOTIONS[motion] for motion in analysis.motions)],
-        rows,
-    )
+        row = [label]
+        for motion in analysis.motions:
+            difference = analysis.errors(motion, name) - analysis.errors(motion)
+            row.append(bounded(interval(difference)))
+        rows.append(row)
+    motions = [MOTIONS[motion] for motion in analysis.motions]
+    return Table("parts", ["without, or instead", *motions], rows)
 
 
 def turn_table(analysis: Analysis) -> Table:
     """Return the errors on the walk with a turn, by view."""
     views = sorted({run.view for run in analysis.results.runs if run.kind == "track"})
     rows = []
-    for name in (
-        *(name for name in COMPARED["turn"] if name not in PARTS),
-        "mean_pose",
-    ):
+    whole_methods = [name for name in COMPARED["turn"] if name not in PARTS]
+    for name in (*whole_methods, "mean_pose"):
         errors = analysis.errors("turn", name)
         worst = analysis.away("turn", name)[..., 0].mean(axis=2)
         cells = [f"{value:.2f}" for value in errors.mean(axis=1)]

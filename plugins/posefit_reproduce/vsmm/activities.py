@@ -8,6 +8,7 @@ frames blend one activity into the next.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -77,27 +78,27 @@ class Film:
     @property
     def switches(self) -> list[int]:
         """The frames in which a new activity begins."""
-        return [
-            k
-            for k in range(1, len(self.labels))
-            if self.labels[k] != self.labels[k - 1]
-        ]
+        switches = []
+        for frame, (before, after) in enumerate(pairwise(self.labels), 1):
+            if after != before:
+                switches.append(frame)
+        return switches
 
 
 @lru_cache(maxsize=1)  # all methods track the film of one seed before the next
 def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
     """Return the film for a seed."""
     rng = np.random.default_rng(seed)
-    parts = [
-        built_in.motion(
+    parts = []
+    for activity in activities:
+        part = built_in.motion(
             activity.motion,
             frames=activity.frames,
             fps=FPS,
             speed=rng.uniform(*SPEEDS),
             phase=rng.random(),
         )
-        for activity in activities
-    ]
+        parts.append(part)
     poses = np.concatenate([part.poses for part in parts])
     # striding, but on the spot
     places = np.concatenate([part.translations * [1.0, 1.0, 0.0] for part in parts])

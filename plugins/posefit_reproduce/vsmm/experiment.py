@@ -58,14 +58,11 @@ class Scale:
         if self.films < 1:
             raise InputError(f"films must be at least 1, got {self.films}")
         for seed in range(TUNED, TUNED + self.films):
-            yield from (
-                Run("reported", "film", method, seed=seed) for method in METHODS
-            )
+            for method in METHODS:
+                yield Run("reported", "film", method, seed=seed)
         for seed in range(TUNED):
-            yield from (
-                Run("tuned", "film", method, seed=seed)
-                for method in ("default", UNRECOVERED)
-            )
+            for method in ("default", UNRECOVERED):
+                yield Run("tuned", "film", method, seed=seed)
 
 
 def film_task(film: Film, evaluations: int) -> Task:
@@ -117,12 +114,11 @@ def arrays_of(frames: list[Frame]) -> Arrays:
         "areas": [frame.areas[0] for frame in frames],
         "cpu_seconds": [frame.cpu_seconds for frame in frames],
         "label": [[None, *LABELS].index(frame.activity) - 1 for frame in frames],
-        **{
-            name: [groups.index(frame.details[name]) - 1 for frame in frames]
-            for name in ("group", "candidate_group")
-        },
-        **{name: [frame.details[name] for frame in frames] for name in DETAILS},
     }
+    for name in ("group", "candidate_group"):
+        series[name] = [groups.index(frame.details[name]) - 1 for frame in frames]
+    for name in DETAILS:
+        series[name] = [frame.details[name] for frame in frames]
     return {
         "probabilities": probabilities,
         **{name: np.array(values) for name, values in series.items()},

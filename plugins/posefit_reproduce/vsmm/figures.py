@@ -127,16 +127,20 @@ def film_stills(film: Film, arrays: Arrays) -> Image:
 
     Joints are filled unless they are hidden.
     """
-    stills = [
-        _still(
-            film, {name: value[k] for name, value in arrays.items() if value.ndim}, k
-        )
-        for k in STILLS
-    ]
+    by_frame = {name: values for name, values in arrays.items() if values.ndim}
+    stills = []
+    for k in STILLS:
+        frame = {name: values[k] for name, values in by_frame.items()}
+        stills.append(_still(film, frame, k))
     rows = [np.hstack(stills[k : k + len(stills) // 2]) for k in (0, len(stills) // 2)]
     return np.asarray(
         cv2.resize(np.vstack(rows), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     )
+
+
+def _enlarged(image: Image) -> Image:
+    larger = cv2.resize(image, None, fx=LARGER, fy=LARGER)
+    return np.asarray(larger, dtype=np.uint8)
 
 
 def _still(film: Film, frame: Arrays, k: int) -> Image:
@@ -146,10 +150,8 @@ def _still(film: Film, frame: Arrays, k: int) -> Image:
     )
     drawn = grey.copy()
     draw_body(drawn, film.body, film.camera, frame["poses"], frame["translations"])
-    marked, drawn = (
-        np.asarray(cv2.resize(i, None, fx=LARGER, fy=LARGER), dtype=np.uint8)
-        for i in (grey, drawn)
-    )
+    marked = _enlarged(grey)
+    drawn = _enlarged(drawn)
     for point, confidence in zip(
         LARGER * frame["joints"][0], frame["confidence"][0], strict=True
     ):

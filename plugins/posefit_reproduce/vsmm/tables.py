@@ -138,28 +138,24 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     candidates = arrays["candidate_group"]
     likeliest = probabilities.argmax(axis=1)
     # by group number + 1
-    models_of = [
-        set(),
-        *({MODELS.index(name) for name in names} for _, names in GROUPS),
-    ]
-    in_force = [
-        models_of[group + 1] | models_of[candidate + 1]
-        for group, candidate in zip(arrays["group"], candidates, strict=True)
-    ]
+    models_of: list[set[int]] = [set()]
+    for _, names in GROUPS:
+        models_of.append({MODELS.index(name) for name in names})
+    in_force = []
+    for group, candidate in zip(arrays["group"], candidates, strict=True):
+        in_force.append(models_of[group + 1] | models_of[candidate + 1])
     right = [set(RIGHT[label]) for label in labels]
     right_group = np.array(
         [bool(models & wanted) for models, wanted in zip(in_force, right, strict=True)]
     )
     delays = _delays(labels, right_group)
-    activated = [
-        models_of[now + 1] & wanted
-        for (before, now), wanted in zip(pairwise(candidates), right[1:], strict=True)
-        if now not in (-1, before)
-    ]
-    terminated = [
-        bool(before & wanted) and not now & wanted
-        for (before, now), wanted in zip(pairwise(in_force), right[1:], strict=True)
-    ]
+    activated = []  # the right models of each group that is activated
+    for (before, now), wanted in zip(pairwise(candidates), right[1:], strict=True):
+        if now not in (-1, before):
+            activated.append(models_of[now + 1] & wanted)
+    terminated = []  # whether the right models went out of force
+    for (before, now), wanted in zip(pairwise(in_force), right[1:], strict=True):
+        terminated.append(bool(before & wanted) and not now & wanted)
     return {
         "dominant": 100.0 * np.mean(probabilities.max(axis=1) > 0.5),
         "model": 100.0
@@ -198,10 +194,13 @@ def patent_tables(results: Results) -> Iterator[Table]:
         rows.setdefault(f"{run.kind} {run.method}", []).append(
             film_figures(run.seed, results.runs[run])
         )
-    films: dict[str, Films] = {
-        name: {figure: np.array([[row[figure] for row in each]]) for figure in each[0]}
-        for name, each in rows.items()
-    }
+    films: dict[str, Films] = {}
+    for name, figures_of_films in rows.items():
+        columns = {}
+        for figure in figures_of_films[0]:
+            values = [figures[figure] for figures in figures_of_films]
+            columns[figure] = np.array([values])  # (1, films)
+        films[name] = columns
     methods = {name: films[f"reported {name}"] for name in METHODS}
     yield claims_table("claims", list(claims(methods)))
     yield means_table("compared", methods)
@@ -244,10 +243,9 @@ def claims(methods: Mapping[str, Films]) -> Iterator[Claim]:
     """Yield the patent's claims on its experiment, for our default and the letter."""
     for name, other in (("default", "all six models"), ("patent", "patent, all six")):
         figures = methods[name]
-        less = {
-            figure: figures[figure] - methods[other][figure]
-            for figure in ("frame", "mpjpe")
-        }
+        less = {}
+        for figure in ("frame", "mpjpe"):
+            less[figure] = figures[figure] - methods[other][figure]
         for text, source, values, unit, bound, above in (
             (
                 "the elbow is near the detected one",
@@ -335,10 +333,9 @@ def labels_table(name: str, results: Results, method: str) -> Table:
         if (run.kind, run.method) == ("reported", method):
             np.add.at(counts, (np.array(film_of(run.seed).labels), arrays["label"]), 1)
     shares = 100.0 * counts / counts.sum(axis=1, keepdims=True)
-    rows = [
-        [activity.label, *(f"{share:.0f}" for share in row)]
-        for activity, row in zip(ACTIVITIES, shares, strict=True)
-    ]
+    rows = []
+    for activity, row in zip(ACTIVITIES, shares, strict=True):
+        rows.append([activity.label, *(f"{share:.0f}" for share in row)])
     chance = 100.0 * counts.sum(axis=1).max() / counts.sum()
     return Table(name, [f"% (by chance {chance:.0f})", *LABELS, "none"], rows)
 

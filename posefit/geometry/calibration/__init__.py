@@ -15,7 +15,7 @@ cameras become camera_from_world in OpenCV's frame: x right, y down and z forwar
 The up direction of the file's world is turned to +y. It is `up` if that is given, or
 else the axis that points up in the images of all cameras. Lengths are metres if the
 program always writes one unit, and in the file's own unit otherwise; see
-`footage/cameras.py`.
+`footage/world.py`.
 
 An unknown key is an error that names the key. Messages of errors complete `expected a
 calibration ..., got ...`.

@@ -1,6 +1,8 @@
 """EasyMocap's intri.yml and extri.yml.
 
-Either may be given; the other is read from the same folder. Lengths are metres.
+Either may be given; the other is read from the same folder. Lengths are in the unit in
+which the user gave the size of the chessboard's squares. EasyMocap does not say which
+unit that should be, so it is guessed.
 """
 
 from collections.abc import Mapping

@@ -1,7 +1,7 @@
 """Kalibr's camchain.yaml.
 
-Each camera's place is relative to the previous camera, or to the IMU. Lengths are
-metres.
+Each camera's place is relative to the previous camera, or to the IMU, in metres. A
+place that a user added as rvec and tvec may be in any unit.
 """
 
 from collections.abc import Mapping
@@ -49,23 +49,23 @@ def _read(stored: Stored) -> list[Calibration]:
     tables = {
         name: table for name, table in stored.values.items() if isinstance(table, dict)
     }
-    places = _places(tables)
+    if all({"rvec", "tvec"} <= table.keys() for table in tables.values()):
+        return [
+            _camera(name, table, (matrix_of(table["rvec"]), matrix_of(table["tvec"])))
+            for name, table in tables.items()
+        ]
     return [
-        _camera(name, table, place)
-        for (name, table), place in zip(tables.items(), places, strict=True)
+        _camera(name, table, place).of_unit("m")
+        for (name, table), place in zip(tables.items(), _chained(tables), strict=True)
     ]
 
 
-def _places(tables: Mapping[str, Any]) -> list[Place | None]:
+def _chained(tables: Mapping[str, Any]) -> list[Place | None]:
     """Return the cameras' places, or None for each if the file has none.
 
     They are relative to the first camera of a chain, or to the IMU if every camera
-    states its place from there. If every camera has rvec and tvec, these are used.
+    states its place from there.
     """
-    if all({"rvec", "tvec"} <= table.keys() for table in tables.values()):
-        return [
-            (matrix_of(one["rvec"]), matrix_of(one["tvec"])) for one in tables.values()
-        ]
     if not any(CHAINED in table for table in tables.values()):
         if not all(FROM_IMU in table for table in tables.values()):
             return [None] * len(tables)

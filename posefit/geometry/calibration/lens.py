@@ -11,6 +11,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.camera import Camera, check_focal, is_focal
+from posefit.geometry.units import METRES, Unit
 from posefit.reading import quoted
 
 # The unit of the lengths in a file. "metres": metres. "open": a unit that is recognised
@@ -85,6 +86,10 @@ class Calibration:
             upright=True,
             scale="metres",
         )
+
+    def of_unit(self, unit: Unit) -> "Calibration":
+        """Return the calibration of a file whose lengths are known to be in a unit."""
+        return replace(self.in_metres(METRES[unit]), scale="metres")
 
     def in_metres(self, metres: float) -> "Calibration":
         """Return the calibration in metres.

@@ -1,4 +1,4 @@
-"""OpenCap's cameraIntrinsicsExtrinsics, converted to JSON; lengths in millimetres.
+"""OpenCap's cameraIntrinsicsExtrinsics, converted to JSON; lengths are millimetres.
 
 OpenCap writes a pickle. Reading a pickle may run any code, so that posefit refuses it
 with a message that says how to convert it.
@@ -38,15 +38,14 @@ def _read(stored: Stored) -> list[Calibration]:
     place: Place | None = None
     if "rotation" in values and "translation" in values:
         place = matrix_of(values["rotation"]), matrix_of(values["translation"])
-    return [
-        stated(
-            name,
-            size if off[0] <= off[1] else size[::-1],
-            matrix,
-            matrix_of(values.get("distortion", [0.0] * 5)),
-            place,
-        )
-    ]
+    calibration = stated(
+        name,
+        size if off[0] <= off[1] else size[::-1],
+        matrix,
+        matrix_of(values.get("distortion", [0.0] * 5)),
+        place,
+    )
+    return [calibration.of_unit("mm")]
 
 
 OPENCAP = Dialect("OpenCap", lambda stored: stored.values.keys() >= REQUIRED, _read)

@@ -1,4 +1,4 @@
-"""CMU Panoptic's calibration_*.json: lengths in centimetres, and -y is up."""
+"""CMU Panoptic's calibration_*.json: lengths are centimetres, and -y is up."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -28,13 +28,14 @@ def _read(stored: Stored) -> list[Calibration]:
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
     check_keys(table, KEYS, name, "CMU Panoptic")
-    return stated(
+    calibration = stated(
         name,
         matrix_of(table["resolution"]).tolist(),
         numbers_of(matrix_of(table["K"]), (3, 3)),
         matrix_of(table["distCoef"]),
         (matrix_of(table["R"]), matrix_of(table["t"])),
     )
+    return calibration.of_unit("cm")
 
 
 PANOPTIC = Dialect("CMU Panoptic", _recognises, _read)

@@ -46,13 +46,14 @@ def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
     radial = np.ravel(matrix_of(table["k"]))
     tangential = np.ravel(matrix_of(table["p"]))
     rotation = numbers_of(matrix_of(table["R"]), (3, 3))
-    return stated(
+    calibration = stated(
         name,
         None,
         pinhole_matrix(focal, centre),
         [*radial[:2], *tangential, *radial[2:]],
         placed_at(rotation, matrix_of(table["T"])),
     )
+    return calibration.of_unit("mm")
 
 
 VOXELPOSE = Dialect("VoxelPose", _recognises, _read)

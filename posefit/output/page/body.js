@@ -1,10 +1,10 @@
-// Bodies on a canvas: joints in metres from the scene's origin, by a camera of the scene or by one that turns.
+// Bodies on a canvas: joints in metres from the scene's origin, by a camera of the scene or by a turning one.
 const BONES = D.parents.map((parent, joint) => [parent, joint]).slice(1);
 const NEAR = 0.05; // metres before a camera: nearer parts are not drawn
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--middle") });
 
-// Numbers of 16 bits in base 64: a function from the place to the number, null where there is none.
+// Numbers of 16 bits in base 64: a function from the place to the number, or null if it is missing.
 function unpacked(text) {
   const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
   const view = new DataView(bytes.buffer);
@@ -47,7 +47,7 @@ const projected = (camera, points) =>
     return [(x / z) * camera.focal[0] + camera.centre[0], (y / z) * camera.focal[1] + camera.centre[1], z];
   });
 
-// Bones as lines, in one colour or in those of their sides.
+// Bones as lines, in one colour or in a colour for each side.
 function sticks(pen, pixels, colours, width) {
   for (const [parent, joint] of BONES) {
     if (pixels[parent][2] <= NEAR || pixels[joint][2] <= NEAR) continue;

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evaluation.errors import FRAME, LOST, Table
+from posefit.evaluation.errors import FRAME, Table, flagged
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
@@ -47,17 +47,25 @@ CURVES = (
 )
 MARKS: dict[str, Callable[[Table], NDArray[np.bool_]]] = {
     "held": lambda table: table["usable"] == 0.0,
-    "lost": lambda table: table["lost"] >= LOST,
-    "unknown": lambda table: table["unknown_sides"] == 1.0,
+    "lost": lambda table: _flags(table, "lost"),
+    "unknown": lambda table: _flags(table, "unknown_sides"),
 }
-ANGLE_NAMES = (
-    *("root yaw", "root pitch", "root roll"),
-    *(
-        f"{JOINTS[k]} {axis} (bone to the {PLACES[k].replace('_', ' ')})"
-        for k in INNER
-        for axis in "xyz"
-    ),
-)
+
+
+def _angle_names() -> list[str]:
+    names = ["root yaw", "root pitch", "root roll"]
+    for k in INNER:
+        bone = f"bone to the {PLACES[k].replace('_', ' ')}"
+        names += [f"{JOINTS[k]} {axis} ({bone})" for axis in "xyz"]
+    return names
+
+
+ANGLE_NAMES = tuple(_angle_names())
+
+
+def _flags(table: Table, name: str) -> NDArray[np.bool_]:
+    frames = flagged(table, name)
+    return np.zeros(len(table["frame"]), bool) if frames is None else frames.frames
 
 
 def track_data(content: Content, stills: Stills) -> dict[str, Any]:
@@ -97,7 +105,21 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         }
     quality = "" if truth is None else f": {brief(content)[0]}"
     day = time.strftime("%d %B %Y")
-    curves = [name for name in CURVES if name in table]
+    columns = {}
+    rows = {}
+    for name in CURVES:
+        if name in table:
+            columns[name] = {key: getattr(FRAME[name], key) for key in COLUMN}
+            rows[name] = table[name][::step].tolist()
+    marks = {}
+    for name, marked in MARKS.items():
+        # the number of a picture, as the page has one of every `step` frames
+        pictures = np.flatnonzero(marked(table)) // step
+        marks[name] = np.unique(pictures).tolist()
+    free_names = []
+    for name, is_free in zip(ANGLE_NAMES, free, strict=True):
+        if is_free:
+            free_names.append(name)
     return {
         "version": __version__,
         "title": setup.motion,
@@ -119,19 +141,12 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         "estimate": in_16_bits(joints - origin),
         "truth": true_joints,
         "others": _others(scene, frames[::step], origin),
-        "columns": {
-            name: {key: getattr(FRAME[name], key) for key in COLUMN} for name in curves
-        },
+        "columns": columns,
         "gait": _gait(content) if len(frames) > 1 else None,
-        "rows": {name: table[name][::step].tolist() for name in curves},
-        "marks": {
-            name: np.unique(np.flatnonzero(marked(table)) // step).tolist()
-            for name, marked in MARKS.items()
-        },
+        "rows": rows,
+        "marks": marks,
         "angles": {
-            "names": [
-                name for name, is_free in zip(ANGLE_NAMES, free, strict=True) if is_free
-            ],
+            "names": free_names,
             "values": in_16_bits(angles[:, free], UNIT),
             "truth": true_angles,
         },
@@ -145,7 +160,7 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
 
 
 def _verdict(content: Content) -> str:
-    """Return what was not determined, preceded by the trust in the track.
+    """Return the trust in the track, and everything undetermined.
 
     If the truth is known, no trust is reported.
     """
@@ -188,18 +203,19 @@ def _facts(content: Content) -> list[list[str]]:
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
     """Return the other likely poses: numbers of frames, weights and joints."""
     skeleton = scene.body.skeleton
-    modes = [
-        other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
-        for frame in frames
-    ]
-    likely = {k: mode for k, mode in enumerate(modes) if mode is not None}
-    joints = [
-        skeleton.joints(mode.pose, mode.translation) - origin
-        for mode in likely.values()
-    ]
+    places = []  # of the frames that have another likely pose
+    weights = []
+    joints = []
+    for k, frame in enumerate(frames):
+        mode = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
+        if mode is None:
+            continue
+        places.append(k)
+        weights.append(mode.weight)
+        joints.append(skeleton.joints(mode.pose, mode.translation) - origin)
     return {
-        "at": list(likely),
-        "weights": [mode.weight for mode in likely.values()],
+        "at": places,
+        "weights": weights,
         "joints": in_16_bits(np.array(joints)),
     }
 

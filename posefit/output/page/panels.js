@@ -82,7 +82,7 @@ function part(which, frame) {
   return { left: within(mean("x"), wide), top: within(mean("y"), high), zoom };
 }
 
-// A body of tapered cones, far ones first; those that are not solid are transparent.
+// A body of tapered cones, far ones first. Cones are transparent unless they are solid.
 function cones(pen, camera, pixels, solid, width) {
   const colours = limbs();
   const edge = ink("--back");
@@ -112,7 +112,7 @@ function cutOut(image) {
   return cut.canvas;
 }
 
-// The parts of mask and body in common, and those of one alone, each in its colour.
+// Pixels of both mask and body, of the mask alone and of the body alone, each in its colour.
 function agreement(pen, size, [box, uri], body) {
   const mask = pictureOf(uri);
   if (mask) {
@@ -143,7 +143,7 @@ function paintPicture(canvas, which) {
   const body = $("with-body").checked;
   const masked = $("with-mask").checked;
   const every = Math.max(film ? film.every : 1, masked || !film ? masks.every : 1);
-  const frame = Math.floor((show.frame * D.step) / every) * (every / D.step); // the body is that of the picture
+  const frame = Math.floor((show.frame * D.step) / every) * (every / D.step); // of the body, as in the picture
   const { left, top, zoom } = part(which, frame);
   const factor = zoom * scale;
   pen.scale(factor, factor);
@@ -240,7 +240,7 @@ function paintBody() {
   if (other) sticks(pen, projected(camera, other.joints), ink("--other"), 2.5);
 }
 
-// Looks from where the first camera stands, turned by some radians to its right, and from so high up.
+// Looks from the first camera's direction, turned right and up by some radians.
 function look(right, up) {
   const [x, , z] = D.cameras[0].rotation[2];
   gaze.yaw = Math.atan2(-x, -z) + right;
@@ -248,7 +248,7 @@ function look(right, up) {
   paint();
 }
 
-// An entry of a legend: a patch of a colour, or a line, and what it means.
+// An entry of a legend: a patch of a colour, or a line, and its meaning.
 function entry(colour, words, thin) {
   const patch = draw(
     "svg",

@@ -87,18 +87,18 @@ class Stills:
         self._cameras = scene.cameras
         self._wanted = -(-scene.count // self.step)
         self._fineness: Fineness | None = None  # unknown before the first frame
-        self._film = Strip(MAX_FILM, self.step) if scene.pictures is not None else None
-        self._masks = [
-            Strip(MAX_MASKS // len(scene.cameras), self.step) for _ in scene.cameras
-        ]
+        self._film: Strip | None = None
+        if scene.pictures is not None:
+            self._film = Strip(MAX_FILM, self.step)
+        room = MAX_MASKS // len(scene.cameras)
+        self._masks = [Strip(room, self.step) for _ in scene.cameras]
 
     def add(self, frame: Frame, observation: Observation, filmed: Image | None) -> None:
         """Take the next frame."""
         masks = [silhouette.mask for silhouette in observation.silhouettes]
-        boxes = [
-            _box(mask, self._body, camera, frame)
-            for mask, camera in zip(masks, self._cameras, strict=True)
-        ]
+        boxes = []
+        for mask, camera in zip(masks, self._cameras, strict=True):
+            boxes.append(_box(mask, self._body, camera, frame))
         if self._film is not None and filmed is not None:
             if self._fineness is None:
                 each = int((1.0 - SPARE) * MAX_FILM / self._wanted)

@@ -7,7 +7,7 @@ const logSteps = (low, high) =>
     .map((k) => [1, 2, 5][k % 3] * 10 ** (Math.floor(k / 3) - 4))
     .filter((value) => value >= low && value <= high);
 
-// Those of rising values that lie at least a gap apart, from the first place on.
+// The rising values that lie at least a gap apart, from the first on.
 function spaced(values, of, gap, first = -Infinity) {
   let free = first;
   return values.filter((value) => {
@@ -86,7 +86,10 @@ function chart(width, lines, { x_label, y_label, most, log }) {
       14,
       30,
       height - 42,
-    ).forEach((place, k) => svg.append(drawText(width - longest - 8, place + 4, METHODS[lines[k].m])));
+    ).forEach((place, k) => {
+      const style = `fill: ${colour(lines[k].m)}`;
+      svg.append(drawText(width - longest - 8, place + 4, METHODS[lines[k].m], { style }));
+    });
   return svg;
 }
 
@@ -118,7 +121,7 @@ function drawnLine({ at, up }, { m, x, y, low, high }, order, last) {
   );
 }
 
-// A horizontal interval; an arrow says that it goes on beyond an end of the axis.
+// A horizontal interval; an arrow means that it continues beyond an end of the axis.
 function interval({ at, left, right }, y, low, high, about) {
   const [from, to] = [at(low), at(high)];
   const ends = [between(left, right, from), between(left, right, to)];
@@ -187,13 +190,13 @@ function certainty() {
   const { levels, methods } = D.certainty;
   const share = (value) => `${number(100 * value, 1)} %`;
   const percents = (value) => `${whole(100 * value)} %`;
-  const within = (level) => `Share of joints whose truth lies in the ball that should hold ${percents(level)} of them`;
+  const within = (level) => `Share of true joints inside the balls that should hold ${percents(level)} of them`;
   const columns = levels.flatMap((level, k) => [
     column(`within ${percents(level)}`, ({ coverage }) => coverage[k], share, { about: within(level) }),
     column("mm", ({ width }) => width[k], whole, { about: "Mean radius of these balls" }),
   ]);
   const about =
-    "Expected calibration error of the likeliest mode's probability: the mean distance from how often it is right";
+    "Expected calibration error: how far the likeliest mode's probability is from its share of right frames";
   const error = column("calibration error", "ece", (value) => number(value, 3), { about });
   const rows = D.taking_part.flatMap((m, place) => (methods[place] ? [{ m, ...methods[place] }] : []));
   table($("sure"), [methodColumn("m"), ...columns, error], rows, { name: "Uncertainty" });

@@ -1,7 +1,7 @@
 // The first screen: all methods with their intervals, and failures.
 const MAX_METHODS = 12; // of the figure
 
-// The lines of a text, each at most so many pixels wide where it can be broken.
+// The lines of a text, broken at spaces to a width in pixels.
 function wrapped(text, room, weight) {
   const lines = [""];
   for (const word of text.match(/\S{1,36}\s*/g)) {
@@ -18,8 +18,8 @@ function firstScreen() {
   const notes = [D.score.caption];
   if (rows.some((row) => given(row.p)))
     notes.push(
-      "Below a name: how far it is behind the first method, the mean of paired runs, with its 95 % interval and p by a " +
-        "paired t test, both after Holm: where p is below 0.05 a difference is shown.",
+      "Below a name: its mean difference from the first method in paired runs, with the 95 % interval and p of a " +
+        "paired t test, both after Holm's correction; below 0.05 a difference is shown.",
     );
   if (rows.length > MAX_METHODS) notes.push(`The table has ${counted(rows.length - MAX_METHODS, "more method")}.`);
   $("standing-note").textContent = notes.join(" ");
@@ -70,7 +70,7 @@ function forest(width, rows, bases) {
   const { svg, at } = axes({ width, height: bottom + 40, left, right, top, bottom: 40, name }, x);
   // not clamped, so that an interval may go beyond the axis
   const free = (value) => (value < from ? left - 9 : at(value));
-  // a baseline's name stands to the right of its line, in a row of its own
+  // a baseline's name is to the right of its line, in a separate row
   bases.forEach((row, k) => {
     const [text, y] = [`${row.name} ${scored(row[of])}`, 16 * (bases.length - 1 - k)];
     const place = Math.min(at(row[of]) + 5, width - textWidth(text) - 4);
@@ -87,7 +87,7 @@ function forest(width, rows, bases) {
   return svg;
 }
 
-// What failed and what is left out, with the reasons.
+// Failures and left-out runs, with the reasons.
 function trouble() {
   for (const [text, items] of D.header.problems) {
     const list = make("ul", {}, ...items.map((item) => make("li", {}, item)));

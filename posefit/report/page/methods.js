@@ -52,7 +52,7 @@ const swatch = (m) =>
     mark(m, 10, 6, 4),
   );
 
-// The methods of the charts, with their places among those that take part.
+// The methods of the charts, with their places among the methods that take part.
 const visible = () => D.taking_part.map((m, place) => [m, place]).filter(([m]) => !hidden.has(m));
 
 function legend() {

@@ -1,0 +1,590 @@
+"""How time, memory and disk grow with the work, in rows of doubled sizes.
+
+    python docs/studies/growth.py measure frames --seconds 120 --out growth.jsonl
+    python docs/studies/growth.py table growth.jsonl
+    python docs/studies/growth.py pose
+
+`measure` doubles the work of a row until a size takes longer than the limit. Each size
+is measured in a process of its own, which another process prepares, so that the peak of
+memory is that of the work alone. A size that is in the file is not measured again.
+
+`table` prints a line a row. Its exponent p is of the fit `a + b n^p`, where a is what
+starting takes.
+
+`pose` prints the microseconds of a pose by picture, views, dimensions and population:
+the benchmark's problem with one number changed, in the fastest run on one thread.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import click
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.cli.output import Command
+from table import markdown
+
+FPS = 30.0
+FILM_SIZE = (320, 240)  # width and height of most films
+# of a method that is cheap, so that what surrounds a search shows
+CHEAP: dict[str, Any] = {"method": "sapso@pca", "evaluations": 40}
+STREAM_FPS = 100.0
+ENVIRONMENT = "posefit_envs:posefit/FitImage-v1"
+ENVIRONMENT_STEPS = 64
+STEPPED_ENVIRONMENTS = 4096
+# a report compares this many methods
+METHODS = 10
+POSES = 400
+WIDTHS = (80, 160, 320, 640, 1280)
+VIEWS = (1, 2, 4, 8)
+COMPONENTS = (3, 6, 12, 24, 48)
+POPULATIONS = (1, 4, 10, 40, 400)
+
+
+def film(frames: int, size: tuple[int, int] = FILM_SIZE) -> Iterator[Array]:
+    """Yield the masks of a person who walks to and fro for a number of frames."""
+    from posefit.footage.source import resolve, scene_of
+
+    scene = scene_of(resolve("walk"), size=size)
+    masks = [each.silhouettes[0].mask for each in scene.observations]
+    there_and_back = [*range(len(masks)), *range(len(masks) - 2, 0, -1)]
+    for k in range(frames):
+        yield masks[there_and_back[k % len(there_and_back)]]
+
+
+def in_memory(frames: int, _: Path) -> None:
+    """Track masks that an array holds."""
+    import posefit
+
+    masks = np.empty((frames, *FILM_SIZE[::-1]), dtype=bool)
+    for k, mask in enumerate(film(frames)):
+        masks[k] = mask
+    posefit.track(masks, fps=FPS, **CHEAP)
+
+
+def write_array(frames: int, folder: Path) -> None:
+    """Write masks as an .npy file."""
+    shape = (frames, *FILM_SIZE[::-1])
+    masks = np.lib.format.open_memmap(folder / "masks.npy", "w+", bool, shape)
+    for k, mask in enumerate(film(frames)):
+        masks[k] = mask
+    masks.flush()
+
+
+def write_images(frames: int, folder: Path) -> None:
+    """Write masks as a folder of pictures."""
+    import cv2
+
+    (folder / "masks").mkdir()
+    for k, mask in enumerate(film(frames)):
+        picture = 255 * mask.astype(np.uint8)
+        cv2.imwrite(str(folder / "masks" / f"{k:06d}.png"), picture)
+
+
+def track_file(name: str, options: Mapping[str, Any], _: int, folder: Path) -> None:
+    """Track a film on the disk."""
+    import posefit
+
+    posefit.track(folder / name, fps=FPS, **options)
+
+
+def track_and_write(frames: int, folder: Path) -> None:
+    """Track a film on the disk, and write every file."""
+    track_file("masks", {**CHEAP, "out": folder / "track"}, frames, folder)
+
+
+def track_stream(frames: int, folder: Path) -> None:
+    """Track a stream of masks, of which those that come too early are skipped."""
+    feeder = [sys.executable, __file__, "feed", str(frames)]
+    words = ["track", "--live", "-", "--evaluations", str(CHEAP["evaluations"])]
+    words += ["--fps", f"{STREAM_FPS:g}", "--out", str(folder / "live")]
+    with subprocess.Popen(feeder, stdout=subprocess.PIPE) as fed:
+        assert fed.stdout is not None
+        os.dup2(fed.stdout.fileno(), 0)
+        from posefit.cli import main as posefit_main
+
+        with suppress(SystemExit):
+            posefit_main(words)
+
+
+def track_known(
+    options: Callable[[int], Mapping[str, Any]], size: int, folder: Path
+) -> None:
+    """Track a known motion of twelve frames, and write every file."""
+    import posefit
+
+    posefit.track(
+        "walk", frames=(0, 12), out=folder / "track", **CHEAP, **options(size)
+    )
+
+
+def cameras_around(cameras: int) -> dict[str, Any]:
+    """Return the options of a track by cameras evenly around the person."""
+    return {"view_degrees": [360.0 * k / cameras for k in range(cameras)]}
+
+
+def pixels_high(height: int) -> dict[str, Any]:
+    """Return the options of a track of pictures so many pixels high."""
+    width = 64 if height == 48 else round(height * 16 / 9)
+    return {"size": (width, height)}
+
+
+def cost_of(proposals: int, _: Path) -> None:
+    """Compute the costs of many proposals in one call."""
+    from posefit.fitting.box import draw_population
+    from posefit_reproduce.bench.kernel import bench_cost
+
+    cost = bench_cost()
+    cost(draw_population(cost.space, np.random.default_rng(0), proposals))
+
+
+def step_environments(environments: int, steps: int) -> None:
+    """Step environments side by side with random actions."""
+    import gymnasium as gym
+
+    env: Any = gym.make_vec(ENVIRONMENT, environments, errors=False)
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(steps):
+        actions = rng.uniform(-1.0, 1.0, env.action_space.shape)
+        env.step(actions.astype(np.float32))
+
+
+def environments_side_by_side(environments: int, _: Path) -> None:
+    step_environments(environments, ENVIRONMENT_STEPS)
+
+
+def steps_in_a_row(steps: int, _: Path) -> None:
+    step_environments(STEPPED_ENVIRONMENTS, steps // STEPPED_ENVIRONMENTS)
+
+
+def plan_of(cells: int) -> Any:
+    """Return a plan of tracks by ten methods."""
+    from posefit.sweep.plan import Plan
+
+    seeds = min(10, cells // METHODS)
+    populations = list(range(10, 10 + METHODS))
+    return Plan.of(
+        {
+            "defaults": {"evaluations": 40, "frames": 60},
+            "product": {
+                "methods": ["sapso@pca"],
+                "motions": ["walk"],
+                "instances": cells // METHODS // seeds,
+                "seeds": seeds,
+            },
+            "grid": {"sapso.population_size": populations},
+        }
+    )
+
+
+def plan_cells(cells: int, folder: Path) -> None:
+    """Plan a sweep, and write its cells to a ledger."""
+    from posefit.sweep.ledger import FILE, Writer
+
+    with Writer(folder / "ledger" / FILE) as ledger:
+        ledger.plan(plan_of(cells))
+
+
+class Instant:
+    """An engine whose cells take no time: the rest is what a sweep itself takes."""
+
+    def __init__(self, row: Callable[[Any, float], dict[str, Any]]) -> None:
+        self._row = row
+        self._jobs: list[Any] = []
+        self._errors = np.random.default_rng(0)
+
+    def window(self) -> int:
+        """Return how many cells may run at a time."""
+        return 64
+
+    def submit(self, job: Any, tenant: str = "") -> None:
+        """Take a cell."""
+        self._jobs.append(job)
+
+    def wait(self, _: float) -> list[Any]:
+        """Return the outcomes of all cells that were taken."""
+        from posefit.sweep.engine import Outcome
+
+        jobs = self._jobs
+        self._jobs = []
+        errors = self._errors.gamma(2.0, 1.0, len(jobs)).tolist()
+        return [
+            Outcome(job, self._row(job, error))
+            for job, error in zip(jobs, errors, strict=True)
+        ]
+
+    def close(self) -> None:
+        """Close nothing."""
+
+
+def row_maker() -> Callable[[Any, float], dict[str, Any]]:
+    """Return a function that makes a cell's row with an error: a real row, changed."""
+    from posefit.sweep.cell import run_cell
+
+    model = run_cell(replace(next(iter(plan_of(METHODS))), frames=3))
+
+    def row(cell: Any, error: float) -> dict[str, Any]:
+        joints = [error * joint for joint in range(len(model["joint_errors_mm"]))]
+        return {
+            **model,
+            "key": cell.key,
+            "spec": cell.spec,
+            "error_degrees": {**model["error_degrees"], "mean": error},
+            "joint_errors_mm": joints,
+            "warnings": [],
+        }
+
+    return row
+
+
+def run_cells(cells: int, folder: Path) -> None:
+    """Run a sweep whose cells take no time."""
+    from posefit.sweep.command import swept
+
+    engine = Instant(row_maker())
+    swept(plan_of(cells), folder / "ledger", engine, print, quiet=True)
+
+
+def report_cells(_: int, folder: Path) -> None:
+    """Write the page about all runs of a ledger."""
+    from posefit.report.write import write_report
+
+    write_report(str(folder / "ledger"), str(folder / "report.html"))
+
+
+def write_long_track(frames: int, folder: Path) -> None:
+    """Write every file of a track that repeats a short one."""
+    from posefit.output.files import write_files
+
+    (folder / "track").mkdir()
+    write_files(folder / "track", long_track(frames))
+
+
+def long_track(frames: int) -> Any:
+    """Return the content of a track that repeats a track of footage."""
+    import posefit
+    from posefit.footage.scene import LazyObservations
+    from posefit.output.content import Content
+
+    short = posefit.track(np.array([*film(60)]), fps=FPS, **CHEAP).content
+    rows = np.arange(frames) % len(short.frames)
+    observations = short.scene.observations
+    scene = replace(
+        short.scene,
+        count=frames,
+        observations=LazyObservations(frames, lambda k: observations[k % 60]),
+    )
+    table = {name: values[rows] for name, values in short.table.items()}
+    table["frame"] = np.arange(frames)
+    table["seconds"] = np.arange(frames) / FPS
+    return Content(
+        scene=scene,
+        frames=[short.frames[k] for k in rows.tolist()],
+        table=table,
+        gait=short.gait,
+        setup=replace(short.setup, frames=frames),
+        measures=short.measures,
+        log=short.log,
+        trust=short.trust,
+    )
+
+
+def nothing(_: int, folder: Path) -> None:
+    """Prepare nothing."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A kind of work that grows.
+
+    Attributes:
+        unit: What its sizes count.
+        sizes: The sizes, each about twice the one before.
+        work: Does the work of a size in a folder.
+        prepare: Prepares the folder before.
+        of: An extrapolated size, and what it is called.
+    """
+
+    unit: str
+    sizes: Sequence[int]
+    work: Callable[[int, Path], None]
+    prepare: Callable[[int, Path], None] = nothing
+    of: tuple[int, str] | None = None
+
+
+def doubled(first: int, last: int) -> list[int]:
+    """Return sizes from the first one to the last one, each twice the one before."""
+    sizes = [first]
+    while 2 * sizes[-1] < last:
+        sizes.append(2 * sizes[-1])
+    return [*sizes, last]
+
+
+HOUR = (108_000, "an hour of film")
+MILLION = (1_000_000, "a million cells")
+ROWS = {
+    "memory": Row("frames", doubled(125, 108_000), in_memory, of=HOUR),
+    "array": Row(
+        "frames",
+        doubled(125, 108_000),
+        partial(track_file, "masks.npy", CHEAP),
+        write_array,
+        HOUR,
+    ),
+    "images": Row(
+        "frames",
+        doubled(125, 108_000),
+        partial(track_file, "masks", CHEAP),
+        write_images,
+        HOUR,
+    ),
+    "rough": Row(
+        "frames",
+        doubled(125, 108_000),
+        partial(track_file, "masks", {**CHEAP, "smooth": False}),
+        write_images,
+        HOUR,
+    ),
+    "default": Row(
+        "frames",
+        doubled(125, 108_000),
+        partial(track_file, "masks", {}),
+        write_images,
+        HOUR,
+    ),
+    "outputs": Row(
+        "frames", doubled(125, 108_000), track_and_write, write_images, HOUR
+    ),
+    "files": Row("frames", doubled(125, 108_000), write_long_track, of=HOUR),
+    "stream": Row("frames", doubled(250, 108_000), track_stream, of=HOUR),
+    "cameras": Row("cameras", doubled(1, 32), partial(track_known, cameras_around)),
+    "pixels": Row(
+        "pixels high",
+        (48, 90, 180, 360, 720, 1440, 2160),
+        partial(track_known, pixels_high),
+    ),
+    "proposals": Row("proposals", doubled(1, 1_000_000), cost_of),
+    "environments": Row("environments", doubled(1, 16_384), environments_side_by_side),
+    "steps": Row("steps", (100_000, 1_000_000, 4_000_000, 10_000_000), steps_in_a_row),
+    "plan": Row("cells", doubled(1_000, 1_000_000), plan_cells, of=MILLION),
+    "run": Row("cells", doubled(1_000, 1_000_000), run_cells, of=MILLION),
+    "resume": Row("cells", doubled(1_000, 1_000_000), run_cells, run_cells, MILLION),
+    "report": Row("cells", doubled(1_000, 1_000_000), report_cells, run_cells, MILLION),
+}
+
+
+def measured(name: str, size: int, folder: Path) -> dict[str, Any]:
+    """Return the CPU seconds, seconds, peak of memory and disk that a size takes."""
+    words = [sys.executable, __file__, "work", name, str(size), str(folder)]
+    subprocess.run([*words, "--prepare"], check=True, stdout=subprocess.DEVNULL)
+    before = on_disk(folder)
+    start = time.perf_counter()
+    child = subprocess.run(words, check=True, stdout=subprocess.PIPE)
+    figures = json.loads(child.stdout.splitlines()[-1])
+    return {
+        "row": name,
+        "size": size,
+        "seconds": time.perf_counter() - start,
+        **figures,
+        "bytes": on_disk(folder) - before,
+    }
+
+
+def on_disk(folder: Path) -> int:
+    """Return the bytes of all files of a folder."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+
+
+def fitted_exponent(sizes: Array, values: Array) -> tuple[float, float, float]:
+    """Return a, b and p of the fit a + b n^p with the least relative squares.
+
+    a and b are not negative. p is one of the multiples of 0.01 up to 3.
+    """
+    best = (np.inf, 0.0, 0.0, 0.0)
+    for p in np.arange(0.0, 3.0, 0.01).tolist():
+        # a constant and a power of 0 would be one term twice
+        powers = sizes**p if p else np.zeros(len(sizes))
+        columns = np.column_stack([np.ones(len(sizes)), powers]) / values[:, None]
+        from scipy.optimize import nnls
+
+        terms, residual = nnls(columns, np.ones(len(sizes)))
+        best = min(best, (residual, float(terms[0]), float(terms[1]), p))
+    return best[1:]
+
+
+@click.group(help=__doc__)
+def main() -> None:
+    """Measure how work grows."""
+
+
+@main.command(cls=Command)
+@click.argument("names", nargs=-1, type=click.Choice(list(ROWS)))
+@click.option("--seconds", default=60.0, help="The longest that a size may take.")
+@click.option("--gigabytes", default=8.0, help="The most memory of a size.")
+@click.option("--most", type=int, help="The largest size.")
+@click.option("--least", default=0, help="The smallest size.")
+@click.option("--out", required=True, help="A file of rows, which is continued.")
+def measure(
+    names: Sequence[str],
+    seconds: float,
+    gigabytes: float,
+    most: int | None,
+    least: int,
+    out: str,
+) -> None:
+    """Measure rows, all by default."""
+    path = Path(out)
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    known = {(row["row"], row["size"]): row for row in map(json.loads, lines)}
+    for name in names or ROWS:
+        for size in ROWS[name].sizes:
+            if size < least or (most is not None and size > most):
+                continue
+            figures = known.get((name, size))
+            if figures is None:
+                with TemporaryDirectory() as folder:
+                    figures = measured(name, size, Path(folder))
+                with path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(figures) + "\n")
+            click.echo(json.dumps(figures))
+            # the next size is about twice as large
+            if 2.0 * figures["cpu_seconds"] > seconds:
+                break
+            if 2.0 * figures["peak"] > 1e9 * gigabytes:
+                break
+
+
+@main.command(cls=Command, hidden=True)
+@click.argument("name", type=click.Choice(list(ROWS)))
+@click.argument("size", type=int)
+@click.argument("folder")
+@click.option("--prepare", is_flag=True)
+def work(name: str, size: int, folder: str, prepare: bool) -> None:
+    """Do the work of a size, and print what it took."""
+    if prepare:
+        ROWS[name].prepare(size, Path(folder))
+        return
+    start = time.perf_counter()
+    ROWS[name].work(size, Path(folder))
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    figures = {
+        "cpu_seconds": own.ru_utime + own.ru_stime,
+        "work_seconds": time.perf_counter() - start,
+        # Linux counts in kilobytes
+        "peak": 1024 * own.ru_maxrss,
+    }
+    click.echo("\n" + json.dumps(figures))
+
+
+@main.command(cls=Command, hidden=True)
+@click.argument("frames", type=int)
+def feed(frames: int) -> None:
+    """Write a film's masks to standard output, as a camera would."""
+    start = time.perf_counter()
+    with suppress(BrokenPipeError):
+        for k, mask in enumerate(film(frames)):
+            time.sleep(max(start + k / STREAM_FPS - time.perf_counter(), 0.0))
+            height, width = mask.shape
+            sys.stdout.buffer.write(b"P5 %d %d 255\n" % (width, height))
+            sys.stdout.buffer.write((255 * mask.astype(np.uint8)).tobytes())
+            sys.stdout.buffer.flush()
+
+
+@main.command("table", cls=Command)
+@click.argument("path")
+def print_table(path: str) -> None:
+    """Print a line a row: its largest size, the exponents, and what is extrapolated."""
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for line in Path(path).read_text("utf-8").splitlines():
+        figures = json.loads(line)
+        rows.setdefault(figures["row"], []).append(figures)
+    lines = []
+    sentences = []
+    for name, each in rows.items():
+        each.sort(key=lambda figures: figures["size"])
+        sizes = np.array([figures["size"] for figures in each], dtype=float)
+        cpu = np.array([figures["cpu_seconds"] for figures in each])
+        peak = np.array([figures["peak"] for figures in each], dtype=float)
+        _, _, exponent = fitted_exponent(sizes, cpu)
+        a, b, memory = fitted_exponent(sizes, peak)
+        last = each[-1]
+        lines.append(
+            [
+                name,
+                f"{each[0]['size']:,} to {last['size']:,} {ROWS[name].unit}",
+                f"{last['cpu_seconds']:.1f}",
+                f"{exponent:.2f}",
+                f"{last['peak'] / 1e6:,.0f}",
+                f"{memory:.2f}" if b * sizes[-1] ** memory > 0.05 * a else "flat",
+                f"{last['bytes'] / 1e6:,.1f}",
+            ]
+        )
+        goal = ROWS[name].of
+        if goal is not None and last["size"] < goal[0]:
+            sentences.append(extrapolated(name, goal, sizes, cpu, peak))
+    head = ["row", "sizes", "CPU s", "exponent", "MB", "exponent", "MB on disk"]
+    for line in markdown(head, lines, 2):
+        click.echo(line)
+    click.echo("\n" + "\n".join(sentences))
+
+
+def extrapolated(
+    name: str, goal: tuple[int, str], sizes: Array, cpu: Array, peak: Array
+) -> str:
+    """Return a sentence about a size that was not measured."""
+    values = []
+    for known in (cpu, peak):
+        a, b, p = fitted_exponent(sizes, known)
+        values.append(a + b * goal[0] ** p)
+    return (
+        f"{name}: {goal[1]} takes {values[0]:,.0f} CPU s and "
+        f"{values[1] / 1e9:.2f} GB, extrapolated from {sizes[-1]:,.0f}."
+    )
+
+
+@main.command(cls=Command)
+def pose() -> None:
+    """Print the four curves of a pose's cost."""
+    from posefit.fitting.box import draw_population
+    from posefit_reproduce.bench.kernel import bench_cost, fastest
+
+    usual = bench_cost()
+    curves = {
+        "width, pixels": {width: bench_cost(width=width) for width in WIDTHS},
+        "views": {views: bench_cost(views=views) for views in VIEWS},
+        "dimensions": {m + 3: bench_cost(components=m) for m in COMPONENTS},
+        "population": dict.fromkeys(POPULATIONS, usual),
+    }
+    for name, costs_of in curves.items():
+        counts = {x: x if name == "population" else POSES for x in costs_of}
+        jobs = {
+            str(x): partial(
+                own,
+                draw_population(own.space, np.random.default_rng(0), counts[x]),
+            )
+            for x, own in costs_of.items()
+        }
+        took = fastest(jobs)
+        costs = {x: 1e6 * took[str(x)] / counts[x] for x in costs_of}
+        click.echo(
+            f"| {name} | "
+            + " | ".join(f"{x}: {cost:.3g}" for x, cost in costs.items())
+            + " |"
+        )
+
+
+if __name__ == "__main__":
+    main()

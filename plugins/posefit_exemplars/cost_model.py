@@ -1,0 +1,379 @@
+"""The cost model: what a pose costs in a frame, and what a step between frames costs.
+
+A cost is the negative logarithm of a likelihood, up to a constant. The tracker first
+finds a path through the poses of clips, and then the likeliest sequence of fitted
+hypotheses. Both are cheapest paths, with these costs:
+
+| stage | a pose in a frame | a step to the next frame |
+|---|---|---|
+| path | its silhouette, landmarks and `yaw_costs` | `ClipSteps.costs` |
+| hypotheses | `HypothesisCosts.of_poses`, landmarks | `HypothesisCosts.of_steps` |
+
+`frame_costs` compares poses with silhouettes and landmarks. What each cost is worth is
+measured by docs/studies/ablate.py.
+"""
+
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Task
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import JOINTS, LIMBS
+from posefit_exemplars.beam import Beam
+from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
+from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.hypotheses import Hypotheses
+
+# Of the path.
+
+JUMP_COST = 12.0  # cost of a jump to any other pose; costs are over the temperature
+# Standard deviation of turns away from the clip, for a thirtieth of a second.
+TURN_SPREAD = np.radians(4.0)
+# Metres between an aligned root and where its clip continues, to the side or up.
+ROOT_SPREAD = 0.01
+# Metres, the same along the line of sight of a single camera. It is larger because one
+# silhouette says little about the distance from the camera.
+DEPTH_SPREAD = 0.03
+# Metres between a known root and where its clip continues, for a thirtieth of a second.
+KNOWN_ROOT_SPREAD = 0.008
+FAST_TURN_COST = 100.0  # cost of each radian beyond the fastest possible turn
+YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
+# Cost, over the temperature, of a yaw off by twice the tolerance or more, for a
+# thirtieth of a second.
+WRONG_YAW_COST = 4.0
+
+# Of the hypotheses.
+
+# Silhouettes cost this times as much as on the path, because fitted poses are nearer.
+SHARPNESS = 2.0
+STEP_SPREAD = 4.0 / 3.0  # times the spread of the path's steps
+# A distance from the clips of d LIBRARY_DISTANCE costs LIBRARY_COST log(1 + d^2 / 2).
+LIBRARY_DISTANCE = 0.05  # metres
+LIBRARY_COST = 4.0  # for a thirtieth of a second
+# The same in the only frame of a track, where hypotheses are fitted longer.
+ALONE_LIBRARY_COST = 1.0
+_LIMBS = [np.array([JOINTS.index(bone) for bone in bones]) for bones in LIMBS.values()]
+_TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
+PARTS: Sequence[Rows] = [_TRUNK, *_LIMBS]  # the joints of each part
+# Costs of the speeds at which a part may continue, as multiples of its speed before.
+SPEED_COSTS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}
+MAX_PART_COST = 4.0  # cost of a step of one part, at most, between clean masks
+# Noisy masks multiply it by the square of their noise, at most by this.
+MAX_JUMP_FACTOR = 3.0
+# The cost of a pose fitted to clean masks. If even the best frames cost more, masks or
+# the body are less precise.
+CLEAN_COST = 3.0
+BEST_SHARE = 0.2  # the quantile of costs that stands for the best frames
+MEMORY_SECONDS = 10.0  # frames longer ago are forgotten
+FITTED_COST_SHARE = 0.4  # estimate of the cost after a fit, before the first one
+
+
+def squared_distances(codes: Codes, others: Codes) -> Codes:
+    """Return the squared distances (n, m) of codes."""
+    squares = (
+        (codes**2).sum(axis=1)[:, None]
+        - 2.0 * (codes @ others.T)
+        + (others**2).sum(axis=1)
+    )
+    return np.asarray(np.maximum(squares, 0.0))
+
+
+class Step(NamedTuple):
+    """The time from one frame to the next, and the usual differences between them."""
+
+    seconds: float  # negative in a track that runs backwards in time
+    # metres, root mean square over joints, between a pose and where its clip continues
+    pose: float
+    turn: float = TURN_SPREAD
+    known_root: float = KNOWN_ROOT_SPREAD
+    max_turn: float = math.inf  # radians: the fastest possible turn
+
+    @classmethod
+    def of(cls, task: Task, spread: float) -> Self:
+        """Return the step of a task; `spread` is for a thirtieth of a second."""
+        seconds = (-1.0 if task.backwards else 1.0) / task.fps
+        intervals = 30.0 / task.fps
+        max_turn = math.inf
+        if task.fastest_turn is not None:
+            max_turn = task.fastest_turn / task.fps
+        slack = math.sqrt(intervals)
+        return cls(
+            seconds,
+            spread * slack,
+            TURN_SPREAD * slack,
+            KNOWN_ROOT_SPREAD * intervals,
+            max_turn,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ClipSteps:
+    """The steps from the states of a beam to the next frame, along their clips."""
+
+    beam: Beam
+    step: Step
+    root: Array | None  # (3,) metres, in the next frame, or None if it is unknown
+    # where the clips of the n states continue
+    codes: Codes  # (n, D)
+    yaws: Array  # (n,)
+    places: Array  # (n, 3)
+    root_costs: Array  # (n,) of missing the known root
+
+    @classmethod
+    def of(
+        cls, exemplars: Exemplars, beam: Beam, step: Step, root: Array | None = None
+    ) -> Self:
+        """Return where clips are a step later, and the costs of missing a known root.
+
+        If the root is known, its distance d from where the clip leads costs
+        log(1 + d^2 / 2 / spread^2). This grows slowly with d, because a person may be
+        faster than all clips.
+        """
+        codes, turns, displacements = exemplars.continuation(beam.states, step.seconds)
+        places = beam.places + about_vertical(displacements, beam.yaws)
+        costs = np.zeros(len(beam))
+        if root is not None:
+            squares = ((places - root) ** 2).sum(axis=1) / (2.0 * step.known_root**2)
+            # if the root leaps away, steps must still cost less than a jump
+            costs = np.minimum(np.log1p(squares), 0.5 * JUMP_COST)
+        return cls(beam, step, root, codes, beam.yaws + turns, places, costs)
+
+    def costs(
+        self, exemplars: Exemplars, after: Beam, camera: Array | None = None
+    ) -> Array:
+        """Return the costs (n, m) of steps to the states of the next frame.
+
+        A pose costs half the square of its distance, in spreads, from where the clip
+        continues. A yaw costs half the square of its turn away
+        from the clip's yaw, in spreads. A step costs at most as much as a jump, unless
+        it turns faster than possible.
+
+        Args:
+            exemplars: The poses of the clips.
+            after: The m states of the next frame.
+            camera: (3,) metres, the position of the only camera, or None for several.
+
+        """
+        step = self.step
+        codes = exemplars.codes[after.states]
+        squares = squared_distances(self.codes, codes)
+        # TOYAMA2001 (dynamics)
+        costs: Array = squares / (2.0 * step.pose**2) + self.root_costs[:, None]
+        # Most steps cost more than a jump by their poses alone, and need no more. Flat
+        # indices of the others take a tenth of the time of a mask.
+        near = np.flatnonzero(costs < JUMP_COST)
+        rows, columns = np.divmod(near, len(after))
+        turns = wrapped(after.yaws[columns] - self.yaws[rows])
+        cheap = costs.take(near) + 0.5 * (turns / step.turn) ** 2
+        if self.root is None:
+            missed = after.places.take(columns, 0) - self.places.take(rows, 0)
+            sights = lines_of_sight(after.places, camera)
+            if sights is not None:
+                sights = sights.take(columns, 0)
+            cheap += root_deviation_costs(missed, sights)
+        costs = np.full(costs.shape, JUMP_COST)
+        costs.ravel()[near] = np.minimum(cheap, JUMP_COST)
+        if step.max_turn < np.pi:
+            turned = np.abs(wrapped(after.yaws - self.beam.yaws[:, None]))
+            costs += FAST_TURN_COST * np.maximum(turned - step.max_turn, 0.0)
+        return costs
+
+
+def lines_of_sight(places: Array, camera: Array | None) -> Array | None:
+    """Return the directions (n, 3) from the only camera to places (n, 3).
+
+    None without a `camera` (3,), if several show the person.
+    """
+    if camera is None:
+        return None
+    sights = places - camera
+    lengths = np.linalg.norm(sights, axis=1, keepdims=True)
+    return np.asarray(sights / np.maximum(lengths, np.finfo(np.float64).tiny))
+
+
+def root_deviation_costs(missed: Array, sights: Array | None) -> Array:
+    """Return the costs of aligned roots that were expected elsewhere.
+
+    Args:
+        missed: (..., n, 3) metres, from where the roots were expected to where they
+            are.
+        sights: (n, 3) the `lines_of_sight`. Differences along the line of sight of a
+            single camera cost less, because one silhouette says little about how far
+            away a body is.
+
+    Returns:
+        The costs (..., n).
+
+    """
+    # axis by axis, because NumPy's sums over an axis of length 3 take far longer
+    x, y, z = (missed[..., axis] for axis in range(3))
+    along: Array | float = 0.0
+    if sights is not None:
+        along = (x * sights[:, 0] + y * sights[:, 1] + z * sights[:, 2]) ** 2
+    across = x**2 + y**2 + z**2 - along
+    return np.asarray(
+        np.log1p(0.5 * (across / ROOT_SPREAD**2 + along / DEPTH_SPREAD**2))
+    )
+
+
+def yaw_costs(yaws: Array, known: float | None) -> Array:
+    """Return the costs (n,) of yaws (n,) in a frame with a yaw of about `known`.
+
+    A yaw within the tolerance costs nothing. Without a known yaw all are free.
+    """
+    if known is None:
+        return np.zeros(len(yaws))
+    excess = np.abs(wrapped(yaws - known)) / YAW_TOLERANCE - 1.0
+    return np.asarray(WRONG_YAW_COST * np.clip(excess, 0.0, 1.0))
+
+
+class HypothesisCosts:
+    """The costs of fitted hypotheses, and of the steps between them.
+
+    Args:
+        exemplars: The poses of clips.
+        fps: Frames a second.
+        temperature: Divides silhouette costs on the path.
+        spread: Metres, the usual difference from where a pose leads on the path.
+
+    """
+
+    def __init__(
+        self, exemplars: Exemplars, fps: float, temperature: float, spread: float
+    ) -> None:
+        self._exemplars = exemplars
+        self._temperature = temperature / SHARPNESS
+        self._spread = STEP_SPREAD * spread
+        self._library_cost = LIBRARY_COST * 30.0 / fps
+
+    def of_poses(
+        self, frame_costs: FrameCosts, poses: Array, places: Array, noise: float
+    ) -> tuple[Array, float]:
+        """Return what poses cost: their silhouettes, and their distance from the clips.
+
+        Args:
+            frame_costs: The costs of the frame.
+            poses: (n, 66).
+            places: (n, 3) metres.
+            noise: How many times less precise the masks are than clean ones.
+
+        Returns:
+            The costs (n,), and the least cost of a silhouette, per cent.
+
+        """
+        squares = self._exemplars.nearest(poses, 1)[1][:, 0]
+        silhouette_costs = frame_costs.full(poses, places)
+        # hypotheses of a second pass have limbs that no clip combines, so that each
+        # view counts as much as the clips do
+        first_pass = frame_costs.observation.estimate is None
+        views = 1 if first_pass else frame_costs.camera_count
+        distances = np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
+        library_cost = ALONE_LIBRARY_COST if frame_costs.alone else self._library_cost
+        scaled_costs = silhouette_costs / (noise * self._temperature)
+        costs = np.asarray(scaled_costs + library_cost / views * distances)
+        return costs, float(silhouette_costs.min())
+
+    def of_steps(
+        self,
+        frame_costs: FrameCosts,
+        before: Hypotheses,
+        after: Hypotheses,
+        noise: float,
+    ) -> Array:
+        """Return the costs (n, m) of steps to the m hypotheses of a frame.
+
+        The distances of the trunk and of each limb from where their motion leads cost
+        something, and so does that of an unknown root.
+        """
+        costs = part_step_costs(self._spread, max_part_cost(noise), before, after)
+        if frame_costs.root is None:
+            expected = before.places + before.shifts
+            sights = lines_of_sight(after.places, frame_costs.camera_position)
+            costs += root_deviation_costs(after.places - expected[:, None], sights)
+        return costs
+
+
+def part_step_costs(
+    spread: float, limit: float, before: Hypotheses, after: Hypotheses
+) -> Array:
+    """Return the costs (n, m) of steps between hypotheses of successive frames.
+
+    A step costs the sum over the trunk and the limbs. The cost of a part is half the
+    sum of two squares: the distance of its joints from where the mean of both rates
+    leads, and the difference of the rates. Both are in spreads, root mean square over
+    all joints. A part takes the cheapest of a few speeds.
+
+    Args:
+        spread: Standard deviation of a step, metres.
+        limit: The cost of one part, at most.
+        before: The n hypotheses of one frame.
+        after: The m hypotheses of the next frame.
+
+    """
+    scale = 0.5 / (spread**2 * len(JOINTS))
+    total = np.zeros((len(before.joints), len(after.joints)))
+    for part in PARTS:
+        joints, rates, later, later_rates = (
+            array[:, part].reshape(len(array), -1).astype(np.float32)
+            for array in (before.joints, before.rates, after.joints, after.rates)
+        )
+        changes = squared_distances(rates, later_rates)
+        costs = np.full(changes.shape, limit)
+        for speed, cost in SPEED_COSTS.items():
+            half = np.float32(0.5 * speed)
+            # half a frame after the one and half a frame before the other
+            squares = squared_distances(
+                joints + half * rates, later - half * later_rates
+            )
+            speed_costs = scale * (squares + speed**2 * changes) + cost  # (n, m)
+            np.minimum(costs, speed_costs, out=costs)
+        total += costs
+    return total
+
+
+def max_part_cost(noise: float) -> float:
+    """Return the greatest cost of a step of one part, for masks with this noise.
+
+    A noise of 2 means masks half as precise as clean ones. With noisy masks a wrong
+    pose may fit some frames much better than the right one, and a jump to it must still
+    not pay.
+    """
+    return MAX_PART_COST * min(noise**2, MAX_JUMP_FACTOR)
+
+
+class MaskNoise:
+    """How precise the masks of one camera are, judged by the best frames so far."""
+
+    def __init__(self, fps: float) -> None:
+        # the costs of the best hypotheses of the latest frames
+        remembered = max(round(MEMORY_SECONDS * fps), 1)
+        self._costs: deque[float] = deque(maxlen=remembered)
+
+    def add(self, cost: float) -> None:
+        """Take the least cost of a silhouette in the next frame, per cent."""
+        self._costs.append(cost)
+
+    def of(
+        self, frame_costs: FrameCosts, poses: Array, places: Array
+    ) -> tuple[float, float]:
+        """Return the noise of the masks, and the evaluations that this took.
+
+        The noise tells how many times less precise the masks of one camera are than
+        clean masks. It is 1 with several cameras. Before the first frame is fitted, the
+        costs of poses (n, 66) at places (n, 3) tell it.
+        """
+        if frame_costs.camera_count > 1:
+            return 1.0, 0.0
+        evaluations = 0.0
+        if frame_costs.usable and not self._costs:
+            least = float(frame_costs.full(poses, places).min())
+            self._costs.append(FITTED_COST_SHARE * least)
+            evaluations = float(len(poses))
+        typical = float(np.quantile(self._costs or [0.0], BEST_SHARE))
+        return max(typical / CLEAN_COST, 1.0), evaluations

@@ -1,0 +1,124 @@
+"""Fits of hypotheses to the contours of the masks, by Gauss-Newton steps.
+
+A fit may turn every joint. It is pulled to where it began and, if the hypothesis
+continues one of the frame before, to similar poses of clips.
+
+Real masks and fitted bodies are less precise than clean ones. The noisier the masks of
+a single camera are, the less the contours count beside these pulls. Nothing else keeps
+a body from leaning to where the mask is wrong.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.contours import MaskContours, contour_race, fitted, precisions
+from posefit.fitting.tracker import Task
+from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.proposals import CONTINUED_REACHES, FRESH_REACHES
+
+# Standard deviations of an angle from the start of a fit, and from similar clips.
+START_TURN = np.radians(8.0)
+LIBRARY_TURN = np.radians(15.0)
+# Standard deviations of the root from its start, metres.
+KNOWN_SHIFT = 0.003
+ALIGNED_SHIFT = 0.05
+# The mean of the nearest poses of clips pulls a hypothesis that continues. A pose gets
+# less weight the farther it is away, compared to the nearest one.
+SIMILAR_POSES = 8
+SIMILAR_SPREAD = 0.03  # metres, standard deviation of these weights
+
+PosesAndPlaces = tuple[Array, Array]  # (n, 66), and (n, 3) metres
+
+
+class FrameFits:
+    """Fits poses to the contours of one frame.
+
+    Args:
+        task: The task.
+        exemplars: The poses of clips.
+        frame_costs: The costs of the frame.
+        place: (3,) metres, about where the person is.
+        noise: How many times less precise the masks are than clean ones.
+
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        exemplars: Exemplars,
+        frame_costs: FrameCosts,
+        place: Array,
+        noise: float,
+    ) -> None:
+        self._task = task
+        self._exemplars = exemplars
+        self._frame_costs = frame_costs
+        self._contours: list[MaskContours] = frame_costs.contours(place)
+        self._noise = noise
+        shift = ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT
+        self._weights = precisions(START_TURN / noise, shift)  # (69,)
+
+    def fresh(self, start: PosesAndPlaces) -> PosesAndPlaces:
+        """Return poses fitted from a start that is only near the person's pose."""
+        return fitted(
+            self._task.body,
+            self._contours,
+            start,
+            start[0],
+            self._weights,
+            FRESH_REACHES,
+            self._task.threads,
+        )
+
+    def race(
+        self, start: PosesAndPlaces, costs: Callable[[Array, Array], Array]
+    ) -> tuple[Array, Array, int]:
+        """Return poses and places fitted in rounds, the cheapest ones longest.
+
+        With them come the evaluations that this took. `costs` returns the costs (n,) of
+        poses at places.
+        """
+        return contour_race(
+            self._task.body, self._contours, start, self._weights, costs
+        )
+
+    def continued(self, start: PosesAndPlaces) -> PosesAndPlaces:
+        """Return poses fitted from where hypotheses of the frame before lead."""
+        poses, places = start
+        places = self._cheaper_places(poses, places)
+        means, pulls = self._pulls(poses)
+        return fitted(
+            self._task.body,
+            self._contours,
+            (poses, places),
+            means,
+            pulls,
+            CONTINUED_REACHES,
+            self._task.threads,
+        )
+
+    def _cheaper_places(self, poses: Array, places: Array) -> Array:
+        """Return the cheaper place (n, 3) of each pose: its own or the aligned one.
+
+        A known root is returned as it is.
+        """
+        frame_costs = self._frame_costs
+        if frame_costs.root is not None:
+            return frame_costs.at_root(places)
+        aligned = frame_costs.aligned(poses, places)
+        cheaper = frame_costs.full(poses, aligned) < frame_costs.full(poses, places)
+        return np.where(cheaper[:, None], aligned, places)
+
+    def _pulls(self, poses: Array) -> tuple[Array, Array]:
+        """Return what a fit pulls poses (n, 66) to, and the weights of its pulls (69,).
+
+        They lie between the poses themselves and the mean of similar poses of clips.
+        """
+        pulls = precisions(LIBRARY_TURN / self._noise, np.inf)
+        pulls[3] = 0.0  # the yaws of clips are free
+        means = self._exemplars.nearby_mean(poses, SIMILAR_POSES, SIMILAR_SPREAD)
+        sums = self._weights + pulls
+        return poses + (pulls / sums)[3:] * (means - poses), sums

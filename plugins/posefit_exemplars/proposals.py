@@ -1,0 +1,401 @@
+"""Proposals: the states that the path may be in, and where hypotheses begin.
+
+The states of a frame are where the clips of the frame before continue; a few times a
+second they are also states from anywhere, which a look-up of the silhouette suggests.
+Hypotheses begin at the pose of the path, at diverse states, and at reflections of the
+likeliest ones.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.contours import STEP_EVALUATIONS, race_count
+from posefit.fitting.tracker import Task
+from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
+from posefit.geometry.symmetry import exchanged_limbs
+from posefit_exemplars import kernels
+from posefit_exemplars.beam import Beam, diverse_best, joined, yaw_bins
+from posefit_exemplars.cost_model import (
+    JUMP_COST,
+    YAW_TOLERANCE,
+    ClipSteps,
+    lines_of_sight,
+    root_deviation_costs,
+    squared_distances,
+)
+from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.lookup import YAW_STEP, Lookup
+from posefit_exemplars.smoothing import Estimate
+
+BEAM_STATES = 400  # states that a frame keeps
+# Each candidate is also tried with this turn away from its clip, to either side.
+CANDIDATE_TURN = np.radians(7.0)
+YAW_SHARES = 4  # candidates in one yaw bin: at most 1 / YAW_SHARES of all
+# Share of the proposed states for where clips continue. The others are for a search
+# everywhere.
+CONTINUED_SHARE = 0.25
+SEARCHED_GROUPS = 200  # best groups of a search everywhere, at most
+GROUP_POSES = 20  # poses of each such group that are evaluated, drawn at random
+
+# Metres, for each step of a fit. Contours that are farther away count less.
+FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)
+CONTINUED_REACHES = (0.15, 0.09, 0.065, 0.045, 0.033)
+FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
+# Two of the evaluations compare the places to start at.
+CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
+# Evaluations per frame, at least: two fresh hypotheses and one that continues.
+MIN_FIT_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS
+FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
+REFLECTED_SHARE = 0.25  # share of reflections among the fresh hypotheses
+ALONE_REFLECTED_SHARE = 0.5  # the same in the only frame of a track
+LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
+LIMB_ROUNDS = 2  # how often each limb is tried
+LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
+LIMB_EVALUATIONS = LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
+# Metres. Hypotheses nearer than this continue as one. It is also the standard deviation
+# of the mean that is reported.
+SAME_DISTANCE = 0.03
+
+
+def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
+    """Return at most `count` states that a beam reaches in one step, at least cost.
+
+    The costs are those of `ClipSteps.costs`, without that of an aligned root. Steps
+    that cost as much as a jump are left out. Each pose that is reached gets the yaw at
+    which its parent's clip continues, and one a little to either side.
+    """
+    beam = steps.beam
+    sources = kernels.Sources(
+        beam.totals,
+        steps.codes,
+        steps.root_costs,
+        exemplars.near_groups(steps.codes),
+    )
+    least = beam.totals.min()
+    share = max(count // YAW_SHARES, 1)
+    scale = 1.0 / (2.0 * steps.step.pose**2)
+    bounds = kernels.Bounds(scale, least, least + JUMP_COST, share)
+    places = len(exemplars.tiles.states)
+    room = kernels.Room(
+        np.full(places, np.inf),
+        np.empty(places, np.int64),
+        np.empty(places, np.int64),
+    )
+    bins = yaw_bins(steps.yaws)
+    cheapest_first = np.argsort(beam.totals, kind="stable")
+    by_bin: list[tuple[Rows, Rows, Array]] = []
+    for number in np.unique(bins):
+        rows = cheapest_first[bins[cheapest_first] == number]
+        states, parents, totals = kernels.cheapest_steps(
+            sources, rows, exemplars.tiles, room, bounds
+        )
+        best = np.argsort(totals, kind="stable")[:share]
+        by_bin.append((states[best], parents[best], totals[best]))
+    states, parents, totals = (
+        np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True)
+    )
+    turns = np.repeat([0.0, -CANDIDATE_TURN, CANDIDATE_TURN], len(states) // 3)
+    totals = totals + 0.5 * (turns / steps.step.turn) ** 2
+    reached = Beam(states, steps.yaws[parents] + turns, totals, steps.places[parents])
+    return reached.rows(diverse_best(exemplars, reached, totals, count))
+
+
+class StateProposals:
+    """Proposes the states that a frame may be in."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self._lookup = Lookup(task)
+        self.exemplars = self._lookup.exemplars
+
+    def first(
+        self, frame_costs: FrameCosts, count: int, rng: np.random.Generator
+    ) -> tuple[Beam, int]:
+        """Return at most `count` states of the first frame.
+
+        They are near the first pose of the track, if one is known, and from anywhere.
+
+        Returns:
+            The states, and the number of small pictures that the search used.
+
+        """
+        if self._task.first_pose is None:
+            beam, used = self._anywhere(frame_costs, None, count, rng)
+        else:
+            room = int(CONTINUED_SHARE * count)
+            near = self._near_first_pose(self._task.first_pose, room)
+            beam, used = self._anywhere(frame_costs, None, count - room, rng)
+            beam = joined(replace(beam, totals=beam.totals + JUMP_COST), near)
+        return self._placed(frame_costs, beam), used
+
+    def next(
+        self,
+        frame_costs: FrameCosts,
+        steps: ClipSteps,
+        count: int,
+        everywhere: bool,
+        rng: np.random.Generator,
+    ) -> tuple[Beam, int]:
+        """Return at most `count` states of a frame after the first one.
+
+        They are where clips continue and, if `everywhere`, states from anywhere.
+
+        Returns:
+            The states, and the number of small pictures that the search used.
+
+        """
+        room = int(CONTINUED_SHARE * count)
+        beam = next_states(self.exemplars, steps, room)
+        used = 0
+        if everywhere:
+            other, used = self._anywhere(frame_costs, steps.beam, count - room, rng)
+            beam = joined(other, beam)
+        expected = beam.places
+        beam = self._placed(frame_costs, beam)
+        if self._task.translation != "known":
+            sights = lines_of_sight(beam.places, frame_costs.camera_position)
+            costs = root_deviation_costs(beam.places - expected, sights)
+            beam = replace(beam, totals=beam.totals + costs)
+        return beam, used
+
+    def _anywhere(
+        self,
+        frame_costs: FrameCosts,
+        before: Beam | None,
+        count: int,
+        rng: np.random.Generator,
+    ) -> tuple[Beam, int]:
+        """Return at most `count` states from anywhere that fit.
+
+        A look-up of the silhouette suggests poses and yaws. They are random if no
+        camera shows the whole person. Poses similar to the cheapest ones are returned.
+
+        Returns:
+            The states, and the number of small pictures that were evaluated.
+
+        """
+        group_count = min(SEARCHED_GROUPS, max(count // (4 * GROUP_POSES), 1))
+        tried = max(count - group_count * GROUP_POSES, 1)
+        known = frame_costs.yaw
+        if before is None and known is None:
+            known = self._task.yaw
+        nearest = self._lookup.nearest(frame_costs.observation, tried, known)
+        if nearest is not None:
+            states = np.resize(nearest[0], tried)
+            yaws = np.resize(nearest[1], tried)
+            yaws += YAW_STEP * rng.uniform(-0.5, 0.5, tried)
+        else:
+            middle = 0.0 if known is None else known
+            reach = np.pi if known is None else YAW_TOLERANCE
+            states = self.exemplars.draw(tried, rng)
+            yaws = middle + rng.uniform(-reach, reach, tried)
+        beam = self._placed(frame_costs, self._after_jump(states, yaws, before))
+        costs = frame_costs.small(poses_of(self.exemplars, beam), beam.places)
+        cheapest = np.argsort(costs, kind="stable")
+        states, rows = self._similar(states[cheapest], count - tried, rng)
+        yaws = yaws[cheapest[rows]]
+        return self._after_jump(states, yaws, before), len(beam)
+
+    def _similar(
+        self, states: Rows, count: int, rng: np.random.Generator
+    ) -> tuple[Rows, Rows]:
+        """Return `count` states similar to the first of some states.
+
+        Of the group of each state at most a few poses are drawn.
+
+        Returns:
+            The states (count,), and the rows (count,) of `states` that they are
+            similar to.
+
+        """
+        members = self.exemplars.members
+        starts = self.exemplars.starts
+        drawn = list[Rows]()
+        found = 0
+        for group in self.exemplars.groups[states]:
+            similar = members[starts[group] : starts[group + 1]]
+            if len(similar) > GROUP_POSES:
+                similar = rng.choice(similar, GROUP_POSES, replace=False)
+            drawn.append(similar[: count - found])
+            found += len(drawn[-1])
+            if found == count:
+                break
+        rows = np.repeat(np.arange(len(drawn)), [len(similar) for similar in drawn])
+        return np.concatenate(drawn), rows
+
+    def _near_first_pose(self, angles: Array, count: int) -> Beam:
+        """Return at most `count` states nearest to a first pose with angles (63,)."""
+        yaw = self._task.yaw or 0.0
+        codes = self.exemplars.codes
+        code = self.exemplars.coding.of_poses(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
+        # squared distances up to a constant, which does not change their order
+        squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)
+        turns = [-CANDIDATE_TURN, 0.0, CANDIDATE_TURN]
+        room = min(count // len(turns), BEAM_STATES)
+        nearest = np.argsort(squares, kind="stable")[:room]
+        states = np.tile(nearest, len(turns))
+        yaws = yaw + np.repeat(turns, len(nearest))
+        return self._after_jump(states, yaws, None)
+
+    def _after_jump(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:
+        """Return states that a jump from `before` reaches, or that start a track."""
+        total = 0.0
+        place = self._task.anchor
+        if before is not None:
+            best = int(before.totals.argmin())
+            total = before.totals[best] + JUMP_COST
+            place = before.places[best]
+        return Beam(
+            states,
+            yaws,
+            np.full(len(states), total),
+            np.repeat(place[None], len(states), axis=0),
+        )
+
+    def _placed(self, frame_costs: FrameCosts, beam: Beam) -> Beam:
+        """Return states with aligned roots."""
+        places = frame_costs.aligned(poses_of(self.exemplars, beam), beam.places)
+        return replace(beam, places=places)
+
+
+def poses_of(exemplars: Exemplars, beam: Beam) -> Array:
+    """Return the poses (n, 66) of a beam's states."""
+    return exemplars.with_yaws(beam.states, beam.yaws)
+
+
+class Counts(NamedTuple):
+    """The numbers of hypotheses of a frame."""
+
+    fresh: int
+    diverse: int  # fresh ones from diverse states; others: the path and reflections
+    continued: int
+
+
+class HypothesisProposals:
+    """Proposes where the hypotheses of a frame begin.
+
+    Args:
+        task: The task.
+        exemplars: The poses of clips.
+        evaluations: The budget of the fits in each frame.
+
+    """
+
+    def __init__(self, task: Task, exemplars: Exemplars, evaluations: float) -> None:
+        self._task = task
+        self._exemplars = exemplars
+        self._evaluations = evaluations
+
+    def counts(self, frame_costs: FrameCosts) -> Counts:
+        """Return the numbers of hypotheses of a frame.
+
+        There are fewer if several cameras show the person, because they leave less
+        open. In the only frame of a track nothing continues, so all evaluations are for
+        fresh hypotheses.
+        """
+        evaluations = self._evaluations / frame_costs.camera_count
+        evaluations = max(evaluations, MIN_FIT_EVALUATIONS)
+        if frame_costs.alone:
+            fresh = race_count(evaluations)
+            return Counts(fresh, fresh - 1 - int(ALONE_REFLECTED_SHARE * fresh), 0)
+        fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
+        continued = int(
+            (evaluations - fresh * FRESH_EVALUATIONS) / CONTINUED_EVALUATIONS
+        )
+        return Counts(fresh, fresh - 1 - int(REFLECTED_SHARE * fresh), continued)
+
+    def continuing(
+        self, hypotheses: Hypotheses, totals: Array, frame_costs: FrameCosts
+    ) -> Rows:
+        """Return the hypotheses that continue: the cheapest, without duplicates.
+
+        Args:
+            hypotheses: The n hypotheses of the frame before.
+            totals: (n,) the costs of the likeliest sequences to them.
+            frame_costs: The costs of the frame.
+
+        """
+        count = self.counts(frame_costs).continued
+        flat = hypotheses.joints.reshape(len(hypotheses.joints), -1)  # (n, 81)
+        joints = flat.astype(np.float32)
+        same = squared_distances(joints, joints) < SAME_DISTANCE**2 * len(JOINTS)
+        rows: list[int] = []
+        for row in np.argsort(totals, kind="stable"):
+            if not same[row, rows].any():
+                rows.append(int(row))
+                if len(rows) == count:
+                    break
+        return np.array(rows)
+
+    def fresh(
+        self,
+        estimate: Estimate,
+        latest: Hypotheses,
+        rows: Rows,
+        rng: np.random.Generator,
+    ) -> tuple[Array, Array]:
+        """Return the poses (n, 66) and places (n, 3) that fresh hypotheses begin at.
+
+        They are the path, diverse states, and reflections of the likeliest hypotheses.
+        If there is an earlier track, its pose is added: as it is, with exchanged legs,
+        with exchanged arms, and with limbs of clips.
+
+        Args:
+            estimate: The estimate of the frame on the path.
+            latest: The hypotheses of the frame before.
+            rows: The rows of `latest` that continue.
+            rng: The random numbers.
+
+        """
+        frame_costs = estimate.frame_costs
+        other_poses, other_places = estimate.alternatives
+        poses = np.concatenate([estimate.pose[None], other_poses])
+        places = np.concatenate([estimate.place[None], other_places])
+        if not frame_costs.usable:
+            return poses, places
+        tried = [(poses, places)]
+        likeliest = latest.continued(rows) if len(rows) else (poses, places)
+        count = self.counts(frame_costs).fresh - len(poses)  # of reflections
+        if count > 0:
+            # each pose has one reflection per camera
+            reflectable, place = (
+                array[: -(-count // frame_costs.camera_count)] for array in likeliest
+            )
+            reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
+            tried.append((reflected, np.resize(place, (len(reflected), 3))))
+        if frame_costs.observation.estimate is not None:
+            pose, place = (array[None] for array in frame_costs.observation.estimate)
+            exchanged = [
+                exchanged_limbs(self._task.body.skeleton, pose, limbs)
+                for limbs in ("legs", "arms")
+            ]
+            tried += [(pose, place), *((other, place) for other in exchanged)]
+            tried.append(self._with_other_limbs(frame_costs, pose, place, rng))
+        poses, places = (np.concatenate(arrays) for arrays in zip(*tried, strict=True))
+        return poses, places
+
+    def _with_other_limbs(
+        self,
+        frame_costs: FrameCosts,
+        pose: Array,
+        place: Array,
+        rng: np.random.Generator,
+    ) -> tuple[Array, Array]:
+        """Return a pose (1, 66) with the cheapest limbs, at its place (1, 3).
+
+        Each limb is the cheapest of its own and those of a few random poses of clips.
+        The motion of one arm says little about the other, so a few clips combine to
+        many gestures, as in the crossover of Deutscher and Reid (2005).
+        """
+        places = np.repeat(place, LIMB_POSES + 1, axis=0)
+        for limb in LIMB_ANGLES * LIMB_ROUNDS:
+            poses = np.repeat(pose, LIMB_POSES + 1, axis=0)
+            drawn = self._exemplars.draw(LIMB_POSES, rng)
+            poses[1:, limb] = self._exemplars.poses[drawn][:, limb]
+            pose = poses[frame_costs.full(poses, places).argmin()][None]
+        return pose, place

@@ -1,0 +1,233 @@
+"""The image files of a camera's frames, by the numbers in their names."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.footage.images import IMAGES
+
+_FORMATS = {".jpeg": ".jpg", ".tiff": ".tif"}  # two suffixes of one format
+# missing numbers per image: with more, the numbers do not count frames but something
+# else, such as a date
+MOST_MISSING = 9.0
+# digits of a number that still fits in 64 bits
+DIGITS = 18
+
+
+class Images(NamedTuple):
+    """Image files of one camera: one file per frame, or one file of several pages."""
+
+    name: str  # what messages call them
+    files: tuple[Path, ...]
+    # the files in the order of their numbers; None before `numbered_together`
+    numbered: "Numbered | None" = None
+
+
+class Numbered(NamedTuple):
+    """The images of successive frames, and the numbers in their names."""
+
+    files: list[Path | None]  # None for a missing number
+    guesses: list[str]
+    # the frames' numbers; None if the names do not count frames
+    numbers: range | None = None
+
+
+def images_in(folder: Path) -> list[Path]:
+    """Return the images of a folder in the natural order of their names."""
+    files = list[Path]()
+    for file in folder.iterdir():
+        # some systems copy each image together with a hidden file of its attributes
+        hidden = file.name.startswith(".")
+        if file.suffix.lower() in IMAGES and not hidden:
+            files.append(file)
+    return sorted(files, key=_natural)
+
+
+def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
+    """Return a sorting key by which 2 comes before 10, and numbers after text."""
+    key = list[tuple[int, str]]()
+    for part in re.findall(r"[0-9]+|[^0-9]+", file.name):
+        key.append((int(part), "") if part.isdigit() else (-1, part))
+    return key, file.name
+
+
+def numbered(images: Sequence[Path], name: str) -> Numbered:
+    """Return the images of successive frames, by the numbers in their names.
+
+    If only one number in the names changes, it counts the frames; otherwise the last
+    number does.
+
+    Args:
+        images: The files as listed.
+        name: What messages call them.
+
+    Raises:
+        InputError: Files have several formats, or two files have the same number. Some
+            of them are probably not masks.
+
+    """
+    _check_one_kind(images, name)
+    # text, number, text, number, ..., text
+    parts = [re.split(r"([0-9]+)", file.stem) for file in images]
+    column = _counting_column(parts)
+    if len(images) < 2 or not all(
+        len(part) >= 3 and len(part[column]) <= DIGITS for part in parts
+    ):
+        return Numbered(list(images), [])
+    numbers = [int(part[column]) for part in parts]
+    if _texts_differ(parts):
+        _check_each_once(images, numbers, name)
+    steps = np.diff(numbers)
+    rising = bool((steps > 0).all())
+    others = {(*part[:column], *part[column:][1:]) for part in parts}
+    if len(others) > 1 or not rising:
+        listed = f"{name}: the frames come as listed, not as numbered"
+        return Numbered(list(images), [] if rising else [listed])
+    step = int(np.gcd.reduce(steps))
+    missing = int((steps // step - 1).sum())
+    if missing > MOST_MISSING * len(images):
+        ends = f"{numbers[0]} to {numbers[-1]}"
+        uncounted = f"{name}: the numbers from {ends} do not count frames"
+        return Numbered(list(images), [uncounted])
+    counted = range(numbers[0], numbers[-1] + 1, step)
+    return _spread(dict(zip(numbers, images, strict=True)), counted, name)
+
+
+def _check_one_kind(images: Sequence[Path], name: str) -> None:
+    """Raise InputError if images have several formats, by their suffixes."""
+    kinds = Counter[str]()
+    for file in images:
+        suffix = file.suffix.lower()
+        kinds[_FORMATS.get(suffix, suffix)] += 1
+    if len(kinds) > 1:
+        came = " and ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+        raise InputError(
+            f"{name}: expected images of one kind, got {came}; "
+            "name the files, such as masks/*.png"
+        )
+
+
+def _check_each_once(images: Sequence[Path], numbers: Sequence[int], name: str) -> None:
+    """Raise InputError if two images have the same number."""
+    first = dict[int, Path]()
+    for number, image in zip(numbers, images, strict=True):
+        if number in first:
+            raise InputError(
+                f"{name}: expected one image a frame, got {first[number].name} and "
+                f"{image.name}; name the files, such as masks/*.png"
+            )
+        first[number] = image
+
+
+def _texts_differ(parts: Sequence[Sequence[str]]) -> bool:
+    """Return whether names, split into text and numbers, differ in their text."""
+    return len({tuple(part[::2]) for part in parts}) > 1
+
+
+def _counting_column(parts: Sequence[Sequence[str]]) -> int:
+    """Return which part of names counts: the only number that changes, or the last one.
+
+    `parts` are the names, split into text and numbers in turn.
+    """
+    last_number = -2
+    if _texts_differ(parts):
+        return last_number
+    changing = list[int]()
+    for column, texts in enumerate(zip(*parts, strict=True)):
+        # 7 and 007 are the same number
+        if len({text.lstrip("0") for text in texts}) > 1:
+            changing.append(column)
+    return changing[0] if len(changing) == 1 else last_number
+
+
+def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:
+    """Return the image of each number; None for numbers without one."""
+    files = [places.get(number) for number in numbers]
+    missing = files.count(None)
+    guesses = []
+    if numbers.step > 1:
+        guesses.append(f"{name}: the numbers of frames rise by {numbers.step}")
+    if missing:
+        guesses.append(
+            f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are "
+            "missing, and are held"
+        )
+    return Numbered(files, guesses, numbers)
+
+
+def numbered_together(cameras: Sequence[Images]) -> list[Images]:
+    """Return the images of cameras, numbered so that one number is one moment.
+
+    The lowest number of all cameras is frame 0. A number that a camera lacks is missing
+    for that camera. If names do not count frames, cameras are paired in the order of
+    their files, which is a guess.
+
+    Raises:
+        InputError: The cameras have no number in common.
+
+    """
+    names = [camera.name for camera in cameras]
+    listed = [numbered(camera.files, camera.name) for camera in cameras]
+    known = [view.numbers for view in listed if view.numbers is not None]
+    if len(cameras) > 1 and len(known) == len(listed):
+        listed = _paired(listed, known, names)
+    elif len(cameras) > 1:
+        _guess_order(listed, names)
+    return [
+        camera._replace(numbered=view)
+        for camera, view in zip(cameras, listed, strict=True)
+    ]
+
+
+def _guess_order(listed: list[Numbered], names: Sequence[str]) -> None:
+    """Add the guess that images are paired in their order, if there are several."""
+    for k, view in enumerate(listed):
+        if len(view.files) > 1:
+            in_order = (
+                f"images of {' and '.join(names)} are of one moment in the order in "
+                "which they come, as not all of their names count frames"
+            )
+            listed[k] = view._replace(guesses=[*view.guesses, in_order])
+            return
+
+
+def _paired(
+    listed: Sequence[Numbered], known: Sequence[range], names: Sequence[str]
+) -> list[Numbered]:
+    """Return the images of cameras, each at the place of its number.
+
+    `known` are the numbers of each camera. Raises InputError if they share none.
+    """
+    shared = set.intersection(*(set(_by_number(view)) for view in listed))
+    if not shared:
+        came = " and ".join(
+            f"{numbers[0]} to {numbers[-1]} of {name}"
+            for numbers, name in zip(known, names, strict=True)
+        )
+        raise InputError(
+            "images of one moment must have one number in the names of all cameras, "
+            f"got {came}"
+        )
+    lowest = min(numbers[0] for numbers in known)
+    highest = max(numbers[-1] for numbers in known)
+    # one spacing on which the numbers of every camera lie
+    steps = [numbers.step for numbers in known]
+    offsets = [numbers[0] - lowest for numbers in known]
+    every = range(lowest, highest + 1, math.gcd(*steps, *offsets))
+    return [
+        _spread(_by_number(view), every, name)
+        for view, name in zip(listed, names, strict=True)
+    ]
+
+
+def _by_number(view: Numbered) -> dict[int, Path]:
+    """Return the images of a camera by their numbers."""
+    assert view.numbers is not None
+    numbers = zip(view.numbers, view.files, strict=True)
+    return {number: file for number, file in numbers if file is not None}

@@ -1,0 +1,154 @@
+"""Find the people in one frame of a video after the other."""
+
+import math
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.fitting.validation import BrokenRuleError, plugin_errors
+from posefit.footage.extraction import Box, Extraction
+from posefit.footage.images import read_image
+from posefit.footage.quality import FrameQuality
+from posefit.footage.scaled import PartOfVideo, ScaledVideo
+from posefit.geometry.skeleton import JOINTS
+from posefit.registry import registry
+from posefit.silhouette.foreground import BRIGHT, Image, Person, Segmenter, people
+from posefit.silhouette.mask import Mask
+
+
+class SegmentedFrame(NamedTuple):
+    """What a segmenter finds in a frame, in pixels of the working size."""
+
+    people: list[Person]  # the largest first
+    facing: float  # as `Segmenter.facing`; NaN if unknown
+    # (27, 3) as `Segmenter.landmarks`; 0 if the segmenter reports none
+    landmarks: Array
+
+
+class PersonSegmenter:
+    """Segments the person in a video, frame after frame.
+
+    It learns the background from the whole video before the first frame.
+    """
+
+    def __init__(self, video: ScaledVideo, how: Extraction) -> None:
+        """Prepare a video. Raises InputError if the extraction does not fit it."""
+        self.learned = "background" not in how.settings
+        self._roi = _scaled_roi(how.roi, video)
+        self._ignored = _ignored(how.ignore, video.size)
+        self._film = PartOfVideo(video, self._roi or (0, 0, *video.size))
+        self._how = how
+        # the user's background is read now, so that a mistake in it shows at once
+        if not self.learned:
+            _ = self._segmenter
+
+    @cached_property
+    def _segmenter(self) -> Segmenter:
+        """The segmenter, trained on the video."""
+        return self._how.segmenter(self._film)
+
+    def frame(self, image: Image) -> SegmentedFrame:
+        """Return who is in the next frame, which has the working size."""
+        result = people(*self._segmented(image), self._roi, self._ignored)
+        facing = float(getattr(self._segmenter, "facing", math.nan))
+        return SegmentedFrame(result, facing, self._landmarks())
+
+    def without(self, image: Image, mask: Mask) -> Image:
+        """Return a frame of the working size with background pasted over a mask."""
+        x, y, wide, tall = self._film.part
+        result = image.copy()
+        part = result[y : y + tall, x : x + wide]
+        covered = self._film.cut(mask)
+        part[covered] = getattr(self._segmenter, "background", part)[covered]
+        return result
+
+    def quality(self) -> FrameQuality:
+        """Return a new comparison of a person's masks with the pictures."""
+        background = getattr(self._segmenter, "background", None)
+        still = registry().offer("segmenter", self._how.name).still_background
+        return FrameQuality(self._film.scaled.video.fps, background, still=still)
+
+    def row(
+        self, quality: FrameQuality, image: Image, person: Person, number: int
+    ) -> dict[str, Any]:
+        """Return the row of quality.csv for a person in the next frame."""
+        part = replace(
+            person, mask=self._film.cut(person.mask), valid=self._film.cut(person.valid)
+        )
+        return quality.row(self._film.cut(image), part, number)
+
+    def _segmented(self, image: Image) -> tuple[Mask, Mask]:
+        """Return the segmenter's two masks of its part, pasted into the whole frame."""
+        x, y, wide, tall = self._film.part
+        with plugin_errors(f"segmenter {self._how.name!r}", "segment"):
+            planes = [
+                np.asarray(plane)
+                for plane in self._segmenter.segment(self._film.cut(image))
+            ]
+        if len(planes) != 2 or any(
+            plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes
+        ):
+            came = ", ".join(f"{plane.shape} {plane.dtype}" for plane in planes)
+            raise BrokenRuleError(
+                f"segmenter {self._how.name!r}: segment must return two boolean masks "
+                f"of shape {tall, wide}, got {came}"
+            )
+        whole = np.zeros((2, *image.shape[:2]), dtype=bool)
+        whole[:, y : y + tall, x : x + wide] = planes
+        return whole[0], whole[1]
+
+    def _landmarks(self) -> Array:
+        """Return the segmenter's landmarks (27, 3), placed in the whole frame."""
+        shape = (len(JOINTS), 3)
+        landmarks = getattr(self._segmenter, "landmarks", None)
+        if landmarks is None:
+            landmarks = np.zeros(shape)
+        points = np.array(landmarks, dtype=np.float64)
+        if (
+            points.shape != shape
+            or not np.isfinite(points).all()
+            or points[:, 2].min() < 0.0
+        ):
+            raise BrokenRuleError(
+                f"segmenter {self._how.name!r}: landmarks must be finite numbers of "
+                f"shape {shape}, their confidence 0 or more, got shape {points.shape}"
+            )
+        points[:, :2] += self._film.part[:2]
+        return points
+
+
+def _scaled_roi(roi: Box | None, video: ScaledVideo) -> Box | None:
+    """Return a region in scaled pixels. Raises InputError if it leaves the video."""
+    if roi is None:
+        return None
+    x, y, wide, tall = roi
+    scale = video.scale
+    width, height = video.video.size
+    if min(x, y) < 0 or min(wide, tall) < 1 or x + wide > width or y + tall > height:
+        raise InputError(
+            f"roi must lie within the video's {width}x{height} pixels, got {roi}"
+        )
+    left = round(x * scale)
+    top = round(y * scale)
+    right = round((x + wide) * scale)
+    bottom = round((y + tall) * scale)
+    return left, top, max(1, right - left), max(1, bottom - top)
+
+
+def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
+    """Return the bright pixels of an image, scaled. Raises InputError if unreadable."""
+    if path is None:
+        return None
+    image = read_image(path, grey=True)
+    if image is None:
+        raise InputError(
+            f"{path}: expected an image of what to ignore, got another or a damaged "
+            "file"
+        )
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > BRIGHT)

@@ -1,0 +1,131 @@
+"""Remove lens distortion from views, and make their pixels square."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.footage.views import View, undistorted
+from posefit.geometry.calibration import Calibration
+from posefit.geometry.camera import Camera
+from posefit.reading import quoted
+from posefit.silhouette.foreground import Image
+
+SAME_SHAPE = 0.01  # share by which aspect ratios of masks and calibration may differ
+
+
+@dataclass(frozen=True, eq=False)
+class Straightening:
+    """Turns a camera's views into those of a camera without distortion.
+
+    That camera has square pixels, which the rasteriser needs.
+    """
+
+    camera: Camera  # the camera without distortion
+    lens: Calibration  # the real camera
+    maps: tuple[Any, Any]  # OpenCV's maps from the one to the other
+
+    def of(self, view: View) -> View:
+        """Return what the camera without distortion would have seen."""
+        pictures = view.pictures and partial(self._pictures, view.pictures)
+        straight = undistorted(view, self.lens, self.maps, self.camera)
+        return replace(straight, pictures=pictures)
+
+    def _pictures(self, pictures: Callable[[], Iterator[Image]]) -> Iterator[Image]:
+        for image in pictures():
+            straight = cv2.remap(image, *self.maps, cv2.INTER_LINEAR)
+            yield np.asarray(straight, dtype=np.uint8)
+
+
+def straightening(
+    known: Camera | Calibration,
+    size: tuple[int, int],
+    filmed: tuple[int, int] | None = None,
+    world: Array | None = None,
+    metres: float = 1.0,
+) -> tuple[Camera, Straightening | None, list[str]]:
+    """Return a camera without distortion, and how to turn masks into what it sees.
+
+    This is the only place that removes distortion and makes pixels square.
+
+    Args:
+        known: The camera, or its calibration.
+        size: Width and height of the masks.
+        filmed: Width and height of the video that they were segmented from.
+        world: Rotation (3, 3) that turns the calibration's world so that +y is up.
+        metres: The calibration's unit in metres.
+
+    Returns:
+        The camera without distortion, with square pixels; the straightening, or None if
+        the masks fit this camera already; sentences for the user.
+
+    Raises:
+        InputError: The masks are not from this camera.
+
+    """
+    said = list[str]()
+    lens = Calibration.of(known, "") if isinstance(known, Camera) else known
+    if isinstance(known, Camera) and (known.width, known.height) == size:
+        camera = known
+    else:
+        stated = lens.size
+        lens = fitting(lens, filmed or size, scaled=filmed is None)
+        # the world of a `Camera` is upright already
+        if world is None or isinstance(known, Camera):
+            world = np.eye(3)
+        camera = lens.in_metres(metres).camera(size, world)
+        if stated not in (None, filmed or size):
+            said.append(_resized(known, filmed or size))
+    square = camera.squared()
+    if square is not camera:
+        ratio = camera.focal[0] / camera.focal[1]
+        said.append(
+            f"pixels are not square, fx is {ratio:.3g} fy: {size[0]}x{size[1]} becomes "
+            f"{square.width}x{square.height}"
+        )
+    if square is camera and not lens.distorted:
+        return camera, None, said
+    return square, Straightening(square, lens, lens.maps(size, square)), said
+
+
+def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:
+    """Return the sentence about pictures that differ in size from their calibration."""
+    calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
+    width, height = calibration.size or size
+    came = f"{size[0]}x{size[1]}"
+    change = f"is scaled to {came}"
+    if calibration.padded(size) is not None:
+        change = f"holds for {came}, with rows or columns more or less at the end"
+    name = f" {quoted(calibration.name)}" if calibration.name else ""
+    return f"the calibration{name} of {width}x{height} {change}"
+
+
+def fitting(
+    calibration: Calibration, size: tuple[int, int], *, scaled: bool
+) -> Calibration:
+    """Return the calibration for pictures of a size.
+
+    `scaled` pictures may have another size of the same shape. Raises InputError for any
+    other size, because cameras often film with only a part of the sensor then, and it
+    is not known which.
+    """
+    padded = calibration.padded(size)
+    if padded is not None:
+        return padded
+    name = f" {quoted(calibration.name)}" if calibration.name else ""
+    if calibration.size is None:
+        middle = "x".join(f"{value:g}" for value in calibration.matrix[:2, 2])
+        raise InputError(
+            f"camera{name} must be of {size[0]}x{size[1]}, got a centre of {middle}"
+        )
+    width, height = calibration.size
+    if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
+        return calibration
+    raise InputError(
+        f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
+    )

@@ -1,0 +1,143 @@
+"""The axes and the unit of the cameras' world."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.footage.quality import disagreement
+from posefit.geometry.calibration import Calibration, Up, guessed_up, upright
+from posefit.geometry.camera import Camera
+from posefit.geometry.units import METRES, UNIT_NAMES, Unit
+from posefit.reading import quoted
+
+GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
+# distance of a camera from its world's origin, in the calibration's unit. Above FAR the
+# unit cannot be metres, and above FARTHER not even centimetres
+FAR = 100.0
+FARTHER = 1000.0
+# metres: a camera lower than this is probably a mistake, because the world's origin is
+# usually on the floor or in the first camera
+BELOW = 1.0
+
+
+def world_of(
+    known: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
+) -> tuple[Array, float, dict[str, str]]:
+    """Return the axes and the unit of the cameras' world.
+
+    Args:
+        known: The cameras. A `Camera` is upright and in metres already.
+        up: Which axis of the calibrations points up; None to guess it.
+        unit: The calibrations' unit; None to guess it from their distances.
+
+    Returns:
+        The rotation (3, 3) that turns calibrations upright, their unit in metres, and
+        the guesses by what they are about.
+
+    Raises:
+        InputError: A unit is given for a file that states another one.
+
+    """
+    calibrations = [camera for camera in known if isinstance(camera, Calibration)]
+    guesses = dict[str, str]()
+    if up is None and (guess := guessed_up(calibrations)):
+        guesses["up"] = guess
+    distances = list[float]()
+    for calibration in calibrations:
+        if calibration.scale == "metres":
+            if unit not in (None, "m"):
+                raise InputError(
+                    f"unit must be left out for {quoted(calibration.name)}, whose unit "
+                    f"is known, got {quoted(unit)}"
+                )
+        elif calibration.translation is not None:
+            distances.append(float(np.linalg.norm(calibration.translation)))
+    if unit is None and distances:
+        unit = _unit_of_distances(distances)
+        guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
+    for calibration in calibrations:
+        if calibration.rotation is None:
+            guesses["place"] = (
+                "the camera stands level, which its calibration does not state"
+            )
+        if calibration.size is None:
+            guesses["size"] = (
+                "the calibration is for pictures of this size, which it does not state"
+            )
+    world = upright(calibrations, up)
+    metres = METRES[unit or "m"]
+    lowest = 0.0
+    for calibration in calibrations:
+        place = calibration.in_metres(metres).position
+        if place is not None:
+            lowest = min(lowest, float(world[1] @ place))
+    if lowest < -BELOW:
+        guesses["below"] = (
+            f"a camera stands {-lowest:.1f} m below its world's origin: is its "
+            "translation its place?"
+        )
+    return world, metres, guesses
+
+
+def _unit_of_distances(distances: Sequence[float]) -> Unit:
+    """Return the likely unit of the cameras' distances from their world's origin."""
+    farthest = max(distances)
+    if farthest <= FAR:
+        return "m"
+    return "cm" if farthest <= FARTHER else "mm"
+
+
+def unit_of_heights(ratio: float) -> Unit:
+    """Return the likely unit of calibrations.
+
+    Args:
+        ratio: The person's height in that unit, over their height in metres.
+
+    """
+    return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
+
+
+class _Fitted(NamedTuple):
+    """The unit of calibrations that fits the person's height."""
+
+    factor: float  # to multiply lengths with
+    guess: str  # what to say about it; "" if the unit guessed before fits
+
+
+def unit_by_height(
+    miss: float,
+    tall: Array,
+    known: Sequence[Camera | Calibration],
+    metres: float,
+    stature: float,
+) -> _Fitted:
+    """Return the unit in which the person's height is about right.
+
+    Args:
+        miss: By how much rays miss each other, see `apparent_sizes`.
+        tall: The person's height in each view, in the unit guessed before.
+        known: The cameras. A calibration may state that it is in metres, or that its
+            unit may be any length if no usual one fits.
+        metres: The unit guessed before, in metres.
+        stature: The person's height in metres.
+
+    """
+    scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
+    height = float(np.median(tall))
+    # a person behind the cameras says nothing about the unit
+    unit_is_open = bool(scales - {"metres"})
+    if not (unit_is_open and height > 0.0):
+        return _Fitted(1.0, "")
+    unit = unit_of_heights(height / metres / stature)
+    factor = METRES[unit] / metres
+    if "free" in scales and disagreement(factor * miss, factor * tall, stature):
+        factor = stature / height
+        length = f"{factor * metres:.4g} m"
+        guess = f"the calibration's unit is {length}, by the person's height"
+        return _Fitted(factor, guess)
+    if METRES[unit] == metres:
+        return _Fitted(factor, "")
+    return _Fitted(factor, f"the calibration is in {UNIT_NAMES[unit]}")
