@@ -235,7 +235,8 @@ class Shot(NamedTuple):
 def shots_with_legs() -> list[Shot]:
     """Return the films of people with legs of published shapes.
 
-    Those who stand upright are filmed by one camera, the others by one, two and four.
+    Those who stand upright are filmed by one camera, with landmarks, which show whether
+    they face it; the others are filmed by one, two and four.
     """
     several = [
         Shot(situation, number, views, body, legs=True)
@@ -243,7 +244,7 @@ def shots_with_legs() -> list[Shot]:
         for body, (situation, number) in enumerate(WITH_LEGS)
     ]
     upright = [
-        Shot("upright", body % len(UPRIGHT), 1, body, legs=True)
+        Shot("upright", body, 1, body, landmarks=True, legs=True)
         for body in range(len(UPRIGHT))
     ]
     return [*several, *upright]

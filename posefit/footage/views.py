@@ -1,8 +1,9 @@
 """The `View`: what one camera saw. Readers return one, and later steps take one.
 
-from posefit.footage.source import resolve, views_of
+from posefit.footage.kinds import resolve
+from posefit.footage.source import views_of_masks
 
-(view,) = views_of(resolve("masks.npz"))
+(view,) = views_of_masks(resolve("masks.npz"))
 print(view.numbers[view.usable], view.silhouette(0).mask.shape)
 """
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from posefit.fitting.prior import Prior
     from posefit.fitting.space import Translation
     from posefit.fitting.tracker import TrackerFactory
+    from posefit.footage.extraction import Extraction
     from posefit.footage.people import Choice
-    from posefit.footage.segmentation import Extraction
     from posefit.footage.views import Range
     from posefit.geometry.calibration import Up
     from posefit.geometry.camera import Camera

@@ -5,6 +5,8 @@ options, or an InputError.
 """
 
 import json
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -144,14 +146,14 @@ def test_what_is_no_source_is_refused_before_any_work(
 
 
 def test_type_checkers_know_every_option_with_its_type() -> None:
-    def names_and_types(keywords: Any) -> dict[str, str]:
+    def names_and_types(hints: Mapping[str, Any]) -> dict[str, str]:
         types = {}
-        for name, hint in keywords.__annotations__.items():
+        for name, hint in hints.items():
             types[name] = str(getattr(hint, "__forward_arg__", hint)).strip("'\"")
         return types
 
-    options = names_and_types(TrackOptions)
-    assert names_and_types(TrackKeywords) == options
-    of_fit = names_and_types(FitKeywords)
+    options = names_and_types({each.name: each.type for each in fields(TrackOptions)})
+    assert names_and_types(TrackKeywords.__annotations__) == options
+    of_fit = names_and_types(FitKeywords.__annotations__)
     assert of_fit.keys() - options.keys() == set(_ARGUMENTS)
     assert options.keys() - of_fit.keys() == {"frames"}
