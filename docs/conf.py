@@ -1,5 +1,6 @@
 """How the handbook is built: `sphinx-build -W -b html docs docs/_build`."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,8 @@ python_maximum_signature_line_length = 90
 copybutton_exclude = ".linenos, .gp, .go"
 
 html_theme = "furo"
+# where the site is published, for search engines
+html_baseurl = os.environ.get("HANDBOOK_URL", "")
 html_title = "posefit"
 html_static_path = ["static"]
 html_css_files = ["handbook.css"]

@@ -26,7 +26,7 @@ SOON = 1e-6
 EARLY = 1e-3
 # environment variable that `check_decoded` reads, and its default
 DECODED = "POSEFIT_DECODED_GIGABYTES"
-DECODED_GIGABYTES = 4.0
+DECODED_GIGABYTES = 20.0
 # files of Linux with a container's memory limit, by version 2 and 1 of control groups
 _CONTAINER = (
     Path("/sys/fs/cgroup/memory.max"),

@@ -87,6 +87,7 @@ SPENT = {
         "training pose: e + s max(0, b - e) with the error e, `lost_rate` s and "
         "`baselines_degrees.mean_pose` b",
     ),
+    "command": ("", "repeats the cell, without the ledger"),
 }
 SEARCHED = {
     "cost": ("", "the lowest cost"),
@@ -196,7 +197,7 @@ def page() -> str:
         ),
         "## Columns of a sweep's CSV",
         "`posefit report DIR --csv FILE.csv` writes one row per cell. "
-        "`Ledger.frame()` gives the same as a table of pandas, except the last column. "
+        "`Ledger.frame()` gives the same as a table of pandas, except the last two columns. "
         "The report's page and its data have every figure under the same name.",
         _table("column", [*_described(CELL), *_row_measures(), *_described(SPENT)]),
         "A single search has `instance`, `evaluations`, `seed`, `name` and the last "

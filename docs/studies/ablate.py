@@ -48,22 +48,47 @@ from table import WORKERS, Row, earlier, keyed, markdown, measured
 PACKAGE = "posefit_exemplars"
 MODULES = (
     "beam",
-    "calibration",
     "cost_model",
     "exemplars",
     "fits",
     "frame_costs",
     "kernels",
     "lookup",
-    "lost_model",
     "markov",
-    "path",
     "proposals",
+    "path",
     "smoothing",
     "tracker",
 )
 CELL = "cell"  # a change of `cell.FIELD` is one of the cell's fields
 AS_IT_IS = "as it is"
+# Constants that are no choice of their own: they follow from others, fix the layout of
+# arrays, or are in arrays that are learned once and kept on disk.
+FIXED = (
+    "COARSE_GROUPS",
+    "CONTINUED_EVALUATIONS",
+    "DIMENSIONS",
+    "DISTANCE",
+    "ELEVATION",
+    "FIELD_OF_VIEW",
+    "FIRST_DIMENSIONS",
+    "FRESH_EVALUATIONS",
+    "GROUPS",
+    "LANES",
+    "LIMB_EVALUATIONS",
+    "MIN_EVALUATIONS",
+    "MIN_FIT_EVALUATIONS",
+    "MIN_FRAME_DISTANCE",
+    "MIN_SMALL_SIDE",
+    "PICTURE",
+    "POSES",
+    "RNG_STREAM_TABLE",
+    "SIDE",
+    "STEP_EVALUATIONS",
+    "TOTAL_BINS",
+    "YAWS",
+    "YAW_STEP",
+)
 OFF = 1e9  # of a spread or a cost: so large that what depends on it says nothing
 TINY = 1e-9  # of a share or a cost
 FRAMES = 24  # of a clip, at most
@@ -80,10 +105,6 @@ MECHANISMS: Mapping[str, Change] = {
     "no diverse states": {"beam.BEAM_SHARES": 1},
     "no shares of yaws": {"proposals.YAW_SHARES": 1},
     "parts continue at their speed alone": {"cost_model.SPEED_COSTS": {1.0: 0.0}},
-    "clips are followed at their speed alone": {
-        "cost_model.CLIP_SPEEDS": (1.0,),
-        "cost_model.RECORDED_SPEED": 0,
-    },
     "no limit to the cost of a part's step": {"cost_model.MAX_PART_COST": OFF},
     "noise raises no limit": {"cost_model.MAX_JUMP_FACTOR": 1.0},
     "masks are never taken for noisy": {"cost_model.CLEAN_COST": OFF},
@@ -104,6 +125,8 @@ MECHANISMS: Mapping[str, Change] = {
         "path.SIMILAR_YAW": 1e-6,
     },
     "half as many states": {"proposals.BEAM_STATES": 200},
+    "a yaw bin has a sixteenth of the candidates": {"proposals.YAW_SHARES": 16},
+    "half as many searches everywhere": {"path.SEARCHES_PER_SECOND": 5.0},
     "only the nearest group is searched": {"exemplars.NEAR_GROUPS": 1},
     "half of the evaluations": {f"{CELL}.evaluations": EVALUATIONS // 2},
 }
@@ -134,31 +157,22 @@ class Run(NamedTuple):
 
 def constants() -> dict[str, Change]:
     """Return each numeric constant of the tracker halved, and doubled."""
-    changes: dict[str, Change] = {}
+    owners: dict[str, tuple[str, float]] = {}
     for module in MODULES:
         for name, value in vars(importlib.import_module(f"{PACKAGE}.{module}")).items():
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not name.isupper() or not is_number or value == 0:
-                continue
-            place = f"{module}.{name}"
-            # one imported from another module is changed with that one
-            if any(
-                place.endswith(f".{known.split('.')[1]}") for known in _seen(changes)
-            ):
-                continue
-            for factor in (0.5, 2.0):
-                changed = (
-                    type(value)(round(value * factor))
-                    if isinstance(value, int)
-                    else value * factor
-                )
-                if changed != value and changed != 0:
-                    changes[f"{place} = {changed:.3g}"] = {place: changed}
+            if name.isupper() and is_number and value != 0 and name not in FIXED:
+                # one imported from another module is changed with that one
+                owners.setdefault(name, (module, value))
+    changes: dict[str, Change] = {}
+    for name, (module, value) in owners.items():
+        for factor in (0.5, 2.0):
+            changed: float = value * factor
+            if isinstance(value, int):
+                changed = round(changed)
+            if changed not in (value, 0):
+                changes[f"{name} = {changed:.3g}"] = {f"{module}.{name}": changed}
     return changes
-
-
-def _seen(changes: Mapping[str, Change]) -> set[str]:
-    return {place for change in changes.values() for place in change}
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
     python docs/studies/bodies.py films
     python docs/studies/bodies.py films --report
+    python docs/studies/bodies.py films --legs
 
 The motions are those of the library's people, who are each left out of it. Their bodies
 get other proportions, drawn with the spreads and correlations of adults, other girths,
@@ -12,7 +13,8 @@ films are tracked with five seeds.
 
 Each track is stored in the folder, and the same command continues there. The report
 says what intervals lack, learned from all bodies; each body is judged by what the
-others teach.
+others teach. With `--legs`, thighs and shanks have the girths and lengths of a
+published survey, and their flesh is behind the bones, as it is; others stand upright.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -233,7 +235,8 @@ class Shot(NamedTuple):
 def shots_with_legs() -> list[Shot]:
     """Return the films of people with legs of published shapes.
 
-    Those who stand upright are filmed by one camera, the others by one, two and four.
+    Those who stand upright are filmed by one camera, with landmarks, which show whether
+    they face it; the others are filmed by one, two and four.
     """
     several = [
         Shot(situation, number, views, body, legs=True)
@@ -241,7 +244,7 @@ def shots_with_legs() -> list[Shot]:
         for body, (situation, number) in enumerate(WITH_LEGS)
     ]
     upright = [
-        Shot("upright", body % len(UPRIGHT), 1, body, legs=True)
+        Shot("upright", body, 1, body, landmarks=True, legs=True)
         for body in range(len(UPRIGHT))
     ]
     return [*several, *upright]
@@ -855,25 +858,72 @@ def limps_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     yield from markdown(heads, cells, 2)
 
 
+def legs_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield errors of the legs, of walks and others and of people who stand upright.
+
+    Beside the mean errors of lengths are those without sign. Of knees bent beyond the
+    truth there are the median and the 90th percentile of a film's frames, the medians
+    of the films, and those of the worst film in ten.
+    """
+    heads = ["films", "cameras", "number", "MPJPE mm", "thigh, shank, ratio %"]
+    heads += ["without sign %", "knees beyond the truth, degrees", "of the worst"]
+    cells = []
+    for upright, views in [*product((False,), PLACES), (True, 1)]:
+        some = [
+            row
+            for row in rows
+            if (row["situation"] == "upright", row["views"]) == (upright, views)
+        ]
+        if not some:
+            continue
+        off = 100.0 * np.log1p(
+            [[row["lengths"][name] for name in ("thigh", "shank")] for row in some]
+        )
+        off = np.column_stack([off, off[:, 0] - off[:, 1]])
+        bent = np.array([row["bent"] for row in some])
+        middle, worst = np.quantile(bent, (0.5, 0.9), axis=0)
+        cells.append(
+            [
+                "upright" if upright else "others",
+                str(views),
+                str(len(some)),
+                f"{np.median([row['mpjpe_mm'] for row in some]):.0f}",
+                ", ".join(f"{x:.1f}" for x in off.mean(axis=0)),
+                ", ".join(f"{x:.1f}" for x in np.abs(off).mean(axis=0)),
+                ", ".join(f"{x:.0f}" for x in middle),
+                ", ".join(f"{x:.0f}" for x in worst),
+            ]
+        )
+    yield from markdown(heads, cells, 2)
+
+
 @click.command(help=__doc__)
 @click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--legs", is_flag=True, help="Film people with legs of published shapes instead."
+)
 @click.option(
     "--report", is_flag=True, help="Print the report of the folder; track nothing."
 )
 @WORKERS
-def main(folder: Path, report: bool, workers: int | None) -> None:
+def main(folder: Path, legs: bool, report: bool, workers: int | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    rows = folder / "rows.jsonl"
+    rows = folder / ("legs.jsonl" if legs else "rows.jsonl")
+    wanted = shots_with_legs() if legs else shots()
     done = earlier(str(rows), lambda row: row["name"])
     if not report:
         jobs = {
             shot.name: partial(measured, folder, shot)
-            for shot in shots()
+            for shot in wanted
             if shot.name not in done
         }
         done |= each(jobs, workers, partial(kept, str(rows))) if jobs else {}
     tracked = [row for row in done.values() if "refused" not in row]
     films = [row for row in tracked if not row["seed"]]
+    if legs:
+        for line in legs_lines(films):
+            click.echo(line)
+        return
     click.echo(
         f"{len(films)} of {len(shots()) - SEVERAL * (SEEDS - 1)} films were tracked"
     )

@@ -43,7 +43,7 @@ CHEAP: dict[str, Any] = {"method": "sapso@pca", "evaluations": 40}
 STREAM_FPS = 100.0
 ENVIRONMENT = "posefit_envs:posefit/FitImage-v0"
 ENVIRONMENT_STEPS = 64
-STEPPED_ENVIRONMENTS = 64
+STEPPED_ENVIRONMENTS = 4096
 # a report compares this many methods
 METHODS = 10
 POSES = 400
@@ -55,10 +55,9 @@ POPULATIONS = (1, 4, 10, 40, 400)
 
 def film(frames: int, size: tuple[int, int] = FILM_SIZE) -> Iterator[Array]:
     """Yield the masks of a person who walks to and fro for a number of frames."""
-    from posefit.footage.options import SourceOptions
-    from posefit.footage.source import scene_of
+    from posefit.footage.source import resolve, scene_of
 
-    scene = scene_of("walk", SourceOptions(size=size))
+    scene = scene_of(resolve("walk"), size=size)
     masks = [each.silhouettes[0].mask for each in scene.observations]
     there_and_back = [*range(len(masks)), *range(len(masks) - 2, 0, -1)]
     for k in range(frames):
@@ -168,7 +167,7 @@ def environments_side_by_side(environments: int, _: Path) -> None:
 
 
 def steps_in_a_row(steps: int, _: Path) -> None:
-    step_environments(STEPPED_ENVIRONMENTS, steps)
+    step_environments(STEPPED_ENVIRONMENTS, steps // STEPPED_ENVIRONMENTS)
 
 
 def plan_of(cells: int) -> Any:
@@ -208,12 +207,15 @@ class Instant:
         self._errors = np.random.default_rng(0)
 
     def window(self) -> int:
+        """Return how many cells may run at a time."""
         return 64
 
-    def submit(self, job: Any) -> None:
+    def submit(self, job: Any, tenant: str = "") -> None:
+        """Take a cell."""
         self._jobs.append(job)
 
     def wait(self, _: float) -> list[Any]:
+        """Return the outcomes of all cells that were taken."""
         from posefit.sweep.engine import Outcome
 
         jobs = self._jobs
@@ -376,7 +378,7 @@ ROWS = {
     ),
     "proposals": Row("proposals", doubled(1, 1_000_000), cost_of),
     "environments": Row("environments", doubled(1, 16_384), environments_side_by_side),
-    "steps": Row("steps", doubled(250, 10_000_000), steps_in_a_row),
+    "steps": Row("steps", (100_000, 1_000_000, 4_000_000, 10_000_000), steps_in_a_row),
     "plan": Row("cells", doubled(1_000, 1_000_000), plan_cells, of=MILLION),
     "run": Row("cells", doubled(1_000, 1_000_000), run_cells, of=MILLION),
     "resume": Row("cells", doubled(1_000, 1_000_000), run_cells, run_cells, MILLION),

@@ -2,8 +2,9 @@
 
 `optimisers` gives the optimisers of Nevergrad, Optuna, pycma, pymoo and SciPy an ask
 and a tell. `problems` gives the problems of posefit's suites to IOHexperimenter,
-Nevergrad, OptunaHub and pymoo. A library is imported when it is used;
-`pip install posefit[NAME]` installs it.
+Nevergrad, OptunaHub and pymoo. `coco` tells COCO's post-processing about the suite. A
+library is imported when it is used; `pip install posefit[NAME]` installs it, but for
+COCO's, which is `cocopp`.
 """
 
 from posefit import hookimpl

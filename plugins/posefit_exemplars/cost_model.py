@@ -32,8 +32,6 @@ from posefit_exemplars.hypotheses import Hypotheses
 
 # Of the path.
 
-CLIP_SPEEDS = (0.8, 1.0, 1.25)  # multiples of a clip's recorded speed
-RECORDED_SPEED = CLIP_SPEEDS.index(1.0)
 JUMP_COST = 12.0  # cost of a jump to any other pose; costs are over the temperature
 # Standard deviation of turns away from the clip, for a thirtieth of a second.
 TURN_SPREAD = np.radians(4.0)
@@ -122,10 +120,10 @@ class ClipSteps:
     step: Step
     root: Array | None  # (3,) metres, in the next frame, or None if it is unknown
     # where the clips of the n states continue
-    codes: Codes  # (speeds, n, D) at each of the speeds
-    root_costs: Array  # (speeds, n) of missing the known root
-    yaws: Array  # (n,) at the recorded speed
-    places: Array  # (n, 3) at the recorded speed
+    codes: Codes  # (n, D)
+    yaws: Array  # (n,)
+    places: Array  # (n, 3)
+    root_costs: Array  # (n,) of missing the known root
 
     @classmethod
     def of(
@@ -137,33 +135,14 @@ class ClipSteps:
         log(1 + d^2 / 2 / spread^2). This grows slowly with d, because a person may be
         faster than all clips.
         """
-        codes, turns, displacements = zip(
-            *(
-                exemplars.continuation(beam.states, step.seconds * speed)
-                for speed in CLIP_SPEEDS
-            ),
-            strict=True,
-        )
-        places = [
-            beam.places + about_vertical(displacement, beam.yaws)
-            for displacement in displacements
-        ]
-        costs = np.zeros((len(CLIP_SPEEDS), len(beam)))
+        codes, turns, displacements = exemplars.continuation(beam.states, step.seconds)
+        places = beam.places + about_vertical(displacements, beam.yaws)
+        costs = np.zeros(len(beam))
         if root is not None:
-            squares = ((np.array(places) - root) ** 2).sum(axis=2) / (
-                2.0 * step.known_root**2
-            )
-            # without a limit no step might be cheap enough
-            costs = np.minimum(np.log1p(squares), JUMP_COST)
-        return cls(
-            beam,
-            step,
-            root,
-            np.stack(codes),
-            costs,
-            beam.yaws + turns[RECORDED_SPEED],
-            places[RECORDED_SPEED],
-        )
+            squares = ((places - root) ** 2).sum(axis=1) / (2.0 * step.known_root**2)
+            # if the root leaps away, steps must still cost less than a jump
+            costs = np.minimum(np.log1p(squares), 0.5 * JUMP_COST)
+        return cls(beam, step, root, codes, beam.yaws + turns, places, costs)
 
     def costs(
         self, exemplars: Exemplars, after: Beam, camera: Array | None = None
@@ -171,7 +150,7 @@ class ClipSteps:
         """Return the costs (n, m) of steps to the states of the next frame.
 
         A pose costs half the square of its distance, in spreads, from where the clip
-        continues at the cheapest speed. A yaw costs half the square of its turn away
+        continues. A yaw costs half the square of its turn away
         from the clip's yaw, in spreads. A step costs at most as much as a jump, unless
         it turns faster than possible.
 
@@ -183,13 +162,9 @@ class ClipSteps:
         """
         step = self.step
         codes = exemplars.codes[after.states]
-        double = 2.0 * step.pose**2
-        speeds = zip(self.codes, self.root_costs, strict=True)
-        squares = [
-            squared_distances(code, codes) / double + cost[:, None]
-            for code, cost in speeds
-        ]
-        costs: Array = np.minimum.reduce(squares)  # TOYAMA2001 (dynamics)
+        squares = squared_distances(self.codes, codes)
+        # TOYAMA2001 (dynamics)
+        costs: Array = squares / (2.0 * step.pose**2) + self.root_costs[:, None]
         # Most steps cost more than a jump by their poses alone, and need no more. Flat
         # indices of the others take a tenth of the time of a mask.
         near = np.flatnonzero(costs < JUMP_COST)

@@ -108,11 +108,11 @@ def nearest_codes(codes, groups, tiles, count):
 
 
 class Sources(NamedTuple):
-    """The states of a beam, and where their clips continue at each of the speeds."""
+    """The states of a beam, and where their clips continue."""
 
     totals: Array  # (n,) the total of each state
-    codes: Codes  # (speeds, n, D) where it continues
-    costs: Array  # (speeds, n) of continuing at this speed
+    codes: Codes  # (n, D) where its clip continues
+    costs: Array  # (n,) of continuing there
     groups: Rows  # (n, g) the groups of poses that it can step to
 
 
@@ -185,17 +185,13 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
         if total_before >= bound:
             continue
         farthest = np.float32((bound - total_before) / bounds.scale)
+        start = np.float32(sources.costs[row] / bounds.scale)
         for group in sources.groups[row]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
                 distances[:] = farthest
-                near = False
-                for speed in range(len(sources.codes)):
-                    start = np.float32(sources.costs[speed, row] / bounds.scale)
-                    code = sources.codes[speed, row]
-                    near |= lower_distances(
-                        distances, start, code, tiles.codes[t], partial
-                    )
-                if not near:
+                if not lower_distances(
+                    distances, start, sources.codes[row], tiles.codes[t], partial
+                ):
                     continue
                 for lane in range(LANES):
                     if distances[lane] >= farthest:

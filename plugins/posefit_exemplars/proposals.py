@@ -20,7 +20,6 @@ from posefit_exemplars import kernels
 from posefit_exemplars.beam import Beam, diverse_best, joined, yaw_bins
 from posefit_exemplars.cost_model import (
     JUMP_COST,
-    RECORDED_SPEED,
     YAW_TOLERANCE,
     ClipSteps,
     lines_of_sight,
@@ -37,7 +36,6 @@ BEAM_STATES = 400  # states that a frame keeps
 # Each candidate is also tried with this turn away from its clip, to either side.
 CANDIDATE_TURN = np.radians(7.0)
 YAW_SHARES = 4  # candidates in one yaw bin: at most 1 / YAW_SHARES of all
-MAX_EXCESS_COST = 8.0  # steps that cost more than a jump plus this are left out
 # Share of the proposed states for where clips continue. The others are for a search
 # everywhere.
 CONTINUED_SHARE = 0.25
@@ -67,22 +65,21 @@ SAME_DISTANCE = 0.03
 def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     """Return at most `count` states that a beam reaches in one step, at least cost.
 
-    The costs are those of `ClipSteps.costs`, without that of an aligned root. Each pose
-    that is reached gets the yaw at which its parent's clip continues, and one a little
-    to either side.
+    The costs are those of `ClipSteps.costs`, without that of an aligned root. Steps
+    that cost as much as a jump are left out. Each pose that is reached gets the yaw at
+    which its parent's clip continues, and one a little to either side.
     """
     beam = steps.beam
     sources = kernels.Sources(
         beam.totals,
         steps.codes,
         steps.root_costs,
-        exemplars.near_groups(steps.codes[RECORDED_SPEED]),
+        exemplars.near_groups(steps.codes),
     )
     least = beam.totals.min()
     share = max(count // YAW_SHARES, 1)
     scale = 1.0 / (2.0 * steps.step.pose**2)
-    limit = least + JUMP_COST + MAX_EXCESS_COST
-    bounds = kernels.Bounds(scale, least, limit, share)
+    bounds = kernels.Bounds(scale, least, least + JUMP_COST, share)
     places = len(exemplars.tiles.states)
     room = kernels.Room(
         np.full(places, np.inf),

@@ -23,7 +23,7 @@ from posefit.reading import cut
 from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
 
-THREAD_SECONDS = 1.0  # how long threads may go on after a command
+THREAD_SECONDS = 1.0  # how long threads may continue after a command
 GROUPS: dict[str, tuple[click.Command, ...]] = {
     "Follow a person": (tracking.track, tracking.fit, tracking.extract),
     "Compare methods": (sweeping.sweep, sweeping.report, sweeping.rerun, suite.suite),
@@ -91,6 +91,7 @@ def run() -> None:
     try:
         main()
     except OSError as error:
+        # only a standard stream on a full disk raises this error without a file name
         if error.errno != errno.ENOSPC or error.filename is not None:
             raise
         drop(1)
@@ -100,6 +101,8 @@ def run() -> None:
         )
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
+        # Python waits for every thread that is no daemon, so a thread that a plugin
+        # left running could keep the process alive for ever
         running = []
         for thread in threading.enumerate():
             own = thread.name.startswith(f"{POOL}_")
@@ -112,6 +115,7 @@ def run() -> None:
             names = cut(", ".join(sorted(alive)))
             say(f"posefit: not waiting for threads that a plugin left running: {names}")
             sys.stdout.flush()
+            # an ordinary exit would wait for the threads
             if isinstance(end.code, int):
                 os._exit(end.code)
             os._exit(0 if end.code is None else 1)

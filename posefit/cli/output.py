@@ -107,6 +107,7 @@ def results_alone() -> Iterator[None]:
     That includes compiled code and other processes.
     """
     sys.stdout.flush()
+    # compiled code and other processes write to the descriptor, not to `sys.stdout`
     with redirect_stdout(sys.stderr):
         stdout_copy = os.dup(1)
         os.dup2(2, 1)

@@ -94,6 +94,11 @@ def sweep(
 )
 @click.option("--latex", metavar="FILE", help="Write the leaderboard as a LaTeX table.")
 @click.option(
+    "--coco",
+    metavar="DIR",
+    help="Write single searches to this new folder as files that COCO's cocopp reads.",
+)
+@click.option(
     "--methods",
     metavar="NAMES",
     multiple=True,

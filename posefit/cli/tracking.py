@@ -68,6 +68,7 @@ def track(
     if live is not None:
         return _track_live(live, as_json, options, shown)
 
+    # plugins may print, and stdout must hold nothing but the JSON object
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
     shown.log(f"took {_times(shown)}")
@@ -301,6 +302,7 @@ def extraction_of(
         values["method"] = values.pop("extraction")
     name = segmenter_name(values.get("method"), values.get("background"))
     if settings is None and "settings" in options:
+        # `--set` has the settings of all plugins, and the tracker refuses unknown ones
         own = []
         others = []
         for text in options["settings"]:

@@ -821,7 +821,7 @@ def _add_views(parents, radii, views, frames, owners, reach, bones):
 def _write_equations(numbers, prior, means, derivatives, matrix, right):
     """Write the normal equations of a step, `matrix` and `right`. contour (15).
 
-    Of the matrix (m, m) only the upper half is written. The right side is (m,).
+    Of the matrix (m, m) only the lower half is written. The right side is (m,).
     """
     place, pose = numbers
     hessian, gradient = derivatives
@@ -832,7 +832,7 @@ def _write_equations(numbers, prior, means, derivatives, matrix, right):
         precision = prior.precisions[a]
         right[a] = gradient[number, 0] + precision * (value - means[a])
         for b in range(a + 1):
-            matrix[b, a] = hessian[number, free[b]]
+            matrix[a, b] = hessian[number, free[b]]
         matrix[a, a] += precision
 
 
@@ -855,19 +855,25 @@ def _subtract(numbers, free, step, max_turn):
 def solve_symmetric(matrix, right):
     """Solve a positive definite system by elimination, in place. contour (16).
 
-    Only the upper half of the matrix (m, m) is read. The matrix is overwritten, and the
+    Only the lower half of the matrix (m, m) is read. The matrix is overwritten, and the
     right side (m,) becomes the solution.
+
+    The last number is eliminated first: an angle shares second derivatives only with
+    those between it and the root, and such zeros stay zero only from the ends of the
+    limbs inwards (Featherstone, Rigid body dynamics algorithms, 2008, section 6.5).
     """
     m = right.size
-    for k in range(m):
-        for i in range(k + 1, m):
+    for k in range(m - 1, -1, -1):
+        for i in range(k):
+            if matrix[k, i] == 0.0:
+                continue
             factor = matrix[k, i] / matrix[k, k]
-            for j in range(i, m):
+            for j in range(i + 1):
                 matrix[i, j] -= factor * matrix[k, j]
             right[i] -= factor * right[k]
-    for k in range(m - 1, -1, -1):
+    for k in range(m):
         total = right[k]
-        for j in range(k + 1, m):
+        for j in range(k):
             total -= matrix[k, j] * right[j]
         right[k] = total / matrix[k, k]
 

@@ -83,7 +83,8 @@ def cleaned(
     if words:
         warnings.append(f"{view.name}: {words}")
         before = full_planes(count, view.size) if known is None else known
-        known = before.copy()
+        known = empty_planes(count, view.size)
+        known[:] = before
         others = people.others(parts)
         for k in np.flatnonzero(usable).tolist():
             mask, valid = planes_of(parts, others, k, unpacked(before[k], view.size))
@@ -131,9 +132,12 @@ def _shows_enough(
     whole = np.flatnonzero(usable & ~cut)
     if not len(whole):
         return enough
-    for frame in np.flatnonzero(usable & cut):
-        nearest = whole[np.abs(whole - frame).argmin()]
-        enough[frame] = areas[frame] >= MOST * areas[nearest]
+    frames = np.flatnonzero(usable & cut)
+    later = np.searchsorted(whole, frames).clip(1, len(whole) - 1)
+    # of two that are equally near the earlier one counts
+    is_earlier = frames - whole[later - 1] <= whole[later] - frames
+    nearest = whole[np.where(is_earlier, later - 1, later)]
+    enough[frames] = areas[frames] >= MOST * areas[nearest]
     return enough
 
 

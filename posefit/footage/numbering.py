@@ -152,7 +152,7 @@ def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:
     missing = files.count(None)
     guesses = []
     if numbers.step > 1:
-        guesses.append(f"{name}: every {numbers.step}th number is a frame")
+        guesses.append(f"{name}: the numbers of frames rise by {numbers.step}")
     if missing:
         guesses.append(
             f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are "

@@ -7,9 +7,11 @@ from posefit.footage.source import views_of_masks
 print(view.numbers[view.usable], view.silhouette(0).mask.shape)
 """
 
+import os
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from tempfile import TemporaryFile, gettempdir
 from typing import Any
 
 import cv2
@@ -33,6 +35,8 @@ MOST = 0.5
 Range = tuple[int | None, int | None]
 # (T, bytes): the pixels of each frame as bits, row by row; unused bits at the end are 0
 Planes = NDArray[np.uint8]
+# masks of one camera that are held in memory
+PLANES_BYTES = 128_000_000
 # the fields of a `View` with one row per frame; some may be None
 PER_FRAME = ("numbers", "times", "bits", "known", "usable", "landmarks", "facings")
 # cache of decoded masks: large enough for a short film
@@ -106,9 +110,14 @@ class View:
     @property
     def shows(self) -> NDArray[np.bool_]:
         """Whether each frame (T,) has both person and background pixels."""
-        known = full_planes(1, self.size) if self.known is None else self.known
-        bits = self.bits & known
-        return np.asarray(bits.any(axis=1) & (bits != known).any(axis=1))
+        every = full_planes(1, self.size)[0]
+        shows = np.empty(len(self), dtype=bool)
+        # frame by frame, because all planes of a long film need much memory
+        for k, frame in enumerate(self.bits):
+            known = every if self.known is None else self.known[k]
+            bits = frame & known
+            shows[k] = bits.any() and (bits != known).any()
+        return shows
 
 
 def joined(views: Sequence[View]) -> View:
@@ -188,15 +197,19 @@ def border_of(planes: Planes, size: tuple[int, int]) -> NDArray[np.bool_]:
     border = np.concatenate([places[[0, -1]].ravel(), places[:, [0, -1]].ravel()])
     octets = planes[:, border >> 3]  # (T, n): the byte that holds each pixel
     # `packbits` stores the first pixel in the highest bit
-    shift = 7 - (border & 7)
+    shift = (7 - (border & 7)).astype(np.uint8)
     return np.asarray(octets >> shift & 1 > 0)
 
 
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     """Return uninitialised planes for `count` masks.
 
+    More than `PLANES_BYTES` are in a temporary file without a name, of which the
+    operating system keeps in memory what there is room for.
+
     Raises:
-        InputError: The planes need more memory than this process may use.
+        InputError: The planes need more memory than this process may use, or more disk
+            than there is.
 
     """
     octets = (size[0] * size[1] + 7) // 8
@@ -206,7 +219,20 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
             f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of "
             f"memory, got {count} of {size[0]}x{size[1]} pixels"
         )
-    return np.empty((count, octets), dtype=np.uint8)
+    if count * octets <= PLANES_BYTES:
+        return np.empty((count, octets), dtype=np.uint8)
+    try:
+        with TemporaryFile() as file:
+            # a file with holes would end the process once the disk is full
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, count * octets)
+            return np.memmap(file, np.uint8, "r+", shape=(count, octets))
+    except OSError as error:
+        folder = gettempdir()
+        raise InputError(
+            f"{folder}: expected room for {count * octets / 1e9:.1f} GB of masks, "
+            f"got {error.strerror}"
+        ) from None
 
 
 def full_planes(count: int, size: tuple[int, int]) -> Planes:

@@ -25,6 +25,7 @@ r"""The report of a ledger: a page for any browser, figures for papers, and tabl
 | the data of the page | content.py |
 | the page: markup, style and scripts as one document | page/ |
 | charts by matplotlib, and the folder of a paper's figures | figures.py |
+| single searches as files of COCO | coco.py |
 | running a row again, with or without a ledger | repeat.py |
 
 Statistics are in `posefit.statistics`.

@@ -39,9 +39,10 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
         warnings += texts
     warnings = list(dict.fromkeys(warnings))
     # the texts of a row by their places in `warnings`
+    place_of = {text: k for k, text in enumerate(warnings)}
     warned = {}
     for row, texts in runs.warnings.items():
-        warned[row] = list(map(warnings.index, texts))
+        warned[row] = [place_of[text] for text in texts]
     methods = []
     for name, settings in zip(runs.methods, runs.settings, strict=True):
         methods.append({"name": name, "settings": settings})

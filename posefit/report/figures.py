@@ -63,7 +63,9 @@ def chart_figure(
         line = chart.lines[k]
         if line is None:
             continue
+        # from the eighth method on, colours repeat with another line style
         colour = COLOURS[numbers[k] % len(COLOURS)]
+        # steps, because a best cost holds until the next improvement
         axes.plot(
             line.x,
             line.y,

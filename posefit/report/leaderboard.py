@@ -76,6 +76,8 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
             return math.inf, 0.0
         return (-value if score.down else value), row.get("above", 0.0)
 
+    # the method of the best score comes first only if it lost no more than others that
+    # a test does not separate from it
     best = min((row for row in board if row["taking_part"]), key=badness)
     best_place = contest.methods.index(best["method"])
     worse_methods = set()

@@ -1,6 +1,7 @@
 """Reads the finished rows of a ledger into a table, which holds a hundred thousand."""
 
 import json
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -66,7 +67,8 @@ class _Rows:
         self.seeds: list[int] = []  # of any size, so not an array
         self.keys: list[str] = []
         self.warnings: list[tuple[str, ...]] = []
-        self.figures: list[Array] = []
+        # one after the other: an array for each of a million rows takes twice as much
+        self.figures = array("d")
         self.data: list[tuple[Any, ...]] = []
         self.quarantined = ledger.quarantined()
         shared: dict[bytes, Any] = {}  # arrays that many rows have in common
@@ -98,7 +100,7 @@ class _Rows:
     def _add(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> None:
         spec = row["spec"]
         figures, data = KINDS[spec["kind"]].read(row, shared)
-        self.figures.append(figures.astype(float))
+        self.figures.extend(figures.tolist())
         self.data.append(data)
         self.method.append(self.methods.number(_variant(spec)))
         self.place.append(self.places.number(_place(spec)))

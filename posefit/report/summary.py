@@ -126,6 +126,7 @@ def _power(contest: Contest, unclear: Sequence[Row]) -> str:
     if score.paired == "runs":
         needed = needed / len(contest.instances)
         unit = "seeds of each instance"
+    # a difference of nearly 0 would need millions of runs, a number that misleads
     if needed > MAX_NEEDED:
         return (
             f"Not even {MAX_NEEDED:,} {unit} would show differences as small as these."

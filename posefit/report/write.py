@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
-from posefit.files import check_place, replaceable, replaced_file
+from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
+from posefit.report.coco import write_coco
 from posefit.report.content import data_of
 from posefit.report.contest import Kind
 from posefit.report.page import MARK, document
+from posefit.report.repeat import repeat_command
 from posefit.report.runs import KINDS, runs_of
 from posefit.report.table import LATEX_MARK, board_lines, latex_table
 from posefit.sweep.ledger import Ledger
@@ -27,6 +29,7 @@ def write_report(
     figures: str | None = None,
     csv: str | None = None,
     latex: str | None = None,
+    coco: str | None = None,
     methods: Sequence[str] = (),
     latest: bool = False,
 ) -> dict[str, Any]:
@@ -40,6 +43,7 @@ def write_report(
         figures: A folder for figures (PNG, PDF) and the leaderboard (CSV).
         csv: A file of all rows.
         latex: A file of the leaderboard as a LaTeX table.
+        coco: A new folder of single searches as COCO's files.
         methods: The methods to compare, by their names in the report or in the plan.
             All if empty.
         latest: Whether to compare only the latest version of each method.
@@ -56,7 +60,9 @@ def write_report(
     paths = [path] if isinstance(path, str | Path) else path
     files = [(out, MARK), (csv, CSV_MARK), (latex, LATEX_MARK)]
     _check_files(files)
-    _check_distinct(Path(paths[0]), [out, figures, csv, latex])
+    _check_distinct(Path(paths[0]), [out, figures, csv, latex, coco])
+    if coco is not None:
+        check_new(coco)
     if figures is not None:
         from posefit.report.figures import check_folder, library, write_figures
 
@@ -69,6 +75,11 @@ def write_report(
                 "--figures must be given with a sweep of tracks, "
                 "got one of single searches"
             )
+        if runs.kind.name != "search" and coco is not None:
+            raise InputError(
+                "--coco must be given with a sweep of single searches, "
+                "got one of tracks"
+            )
         data = data_of(ledger, runs)
         if latex is not None and "leaderboard" not in data:
             raise InputError("--latex must be of runs with errors, got none")
@@ -79,6 +90,8 @@ def write_report(
         if csv is not None:
             with replaced_file(csv, CSV_MARK.encode()) as building:
                 write_csv(_csv_rows(ledger, runs.kind), building)
+        if coco is not None:
+            write_coco(runs, coco)
         if latex is not None:
             text = latex_table(runs.kind.score, data["leaderboard"])
             _write(latex, LATEX_MARK, text)
@@ -120,14 +133,18 @@ def _write(path: str, mark: str, text: str) -> None:
 
 
 def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the CSV file, with the figures that are computed from a row."""
+    """Yield the rows of the CSV file.
+
+    They also have the figures that are computed from a row, and the command that
+    repeats it.
+    """
     for row in ledger.all_rows():
         columns = flat(row)
         if row["status"] == "done":
             for column in kind.columns.values():
                 if column.compute is not None:
                     columns[column.name] = column.value(row)
-        yield columns
+        yield {**columns, "command": repeat_command(row["spec"])}
 
 
 def _check_files(files: Sequence[tuple[str | None, str]]) -> None:

@@ -58,8 +58,8 @@ def swept(
                     f"{counted(count, 'row')} in {out} are of another version, "
                     f"{cut(version)}, and do not count here"
                 )
-        elsewhere = done_elsewhere(Path(out)) if shard is None else set()
-        ledger.plan(cells_of(plan, shard), elsewhere)
+        others = shards_in(Path(out)) if shard is None else []
+        ledger.plan(cells_of(plan, shard), done_in(others))
         if retry_quarantined:
             count = ledger.release_quarantined()
             cells = "cell is" if count == 1 else "cells are"
@@ -119,12 +119,17 @@ def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     return (cell for cell in plan if int(cell.key, 16) % count == number - 1)
 
 
-def done_elsewhere(out: Path) -> set[str]:
-    """Return the keys of the cells that shards in a folder have done.
+def shards_in(out: Path) -> list[Path]:
+    """Return the ledgers of shards in a folder.
 
-    A run without shards does not repeat them.
+    A run without shards does not repeat their cells.
     """
-    files = [file for file in sorted(out.glob(SHARDS)) if file.stat().st_size]
+    return sorted(out.glob(SHARDS))
+
+
+def done_in(ledgers: Iterable[Path]) -> set[str]:
+    """Return the keys of the cells that are done in ledgers, as far as these exist."""
+    files = [file for file in ledgers if file.exists() and file.stat().st_size]
     if not files:
         return set()
     with Ledger(*files) as ledger:

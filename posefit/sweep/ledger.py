@@ -155,10 +155,11 @@ class Ledger:
         If several files have a cell, the first finished one counts, else the first.
         """
         query = "SELECT key, status FROM cells WHERE status != 'planned'"
+        places = {False: (k, False), True: (k, True)}  # shared, as cells are many
         for key, status in self._query(k, query):
             done = status == "done"
             if key not in self._places or (done and not self._places[key][1]):
-                self._places[key] = k, done
+                self._places[key] = places[done]
 
     def __enter__(self) -> Self:
         return self

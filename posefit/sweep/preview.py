@@ -16,9 +16,8 @@ from posefit.errors import InputError
 from posefit.reading import cut
 from posefit.settings import settings_text
 from posefit.sweep.cell import Cell, TrackCell, foreign_plugins, json_of, run_cell
-from posefit.sweep.command import cells_of, done_elsewhere, file_of
+from posefit.sweep.command import cells_of, done_in, file_of, shards_in
 from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome
-from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
 
@@ -94,13 +93,12 @@ def _cells(
     """Yield the cells of a plan or of a shard, each with whether it is done."""
     name = file_of(shard)
     cells = cells_of(Plan.read(plan), shard)
-    done = set[str]()
+    ledgers = []
     if out is not None:
+        ledgers.append(Path(out) / name)
         if shard is None:
-            done |= done_elsewhere(Path(out))
-        if (path := Path(out) / name).exists():
-            with Ledger(path) as ledger:
-                done |= ledger.done()
+            ledgers += shards_in(Path(out))
+    done = done_in(ledgers)
     yield from ((cell, cell.key in done) for cell in cells)
 
 

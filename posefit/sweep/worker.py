@@ -112,8 +112,11 @@ class Worker:
                 answer = self.connection.recv_bytes()
                 self._deadline = time.monotonic() + self._limits.seconds
         except (EOFError, OSError):
-            # the process has ended, or a job has closed the connection
-            self._process.join(END_SECONDS)
+            # The process has ended, or a job has closed the connection. `join` would
+            # wait without limit for a job that has closed its other files, too.
+            until = time.monotonic() + END_SECONDS
+            while self.is_alive and time.monotonic() < until:
+                time.sleep(0.01)
             return self._ended()
         if answer == BEGUN:
             if not self.is_alive:

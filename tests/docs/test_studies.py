@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import ablate
 import agents
 import functions
 import proportions
@@ -330,3 +331,20 @@ def test_the_table_of_agents_has_a_search_in_a_line_and_the_mean_of_seeds() -> N
     ]
     assert (*sapso[:2], sapso[5]) == ("sapso", "40; 4,000", "10.0; 2.0")
     assert ppo == ["PPO", "8", "1,000", "60", "2", "6.0", "5.0 to 7.0", "400", "4,000"]
+
+
+def test_every_change_of_the_tracker_finds_its_constants_and_puts_them_back() -> None:
+    for change in [*ablate.MECHANISMS.values(), *ablate.constants().values()]:
+        places = [place for place in change if not place.startswith(ablate.CELL)]
+        before = [value_of(place) for place in places]
+        with ablate.changed(change):
+            assert [value_of(place) for place in places] == [
+                change[place] for place in places
+            ]
+        assert [value_of(place) for place in places] == before
+
+
+def value_of(place: str) -> object:
+    """Return the value of a constant of the tracker, given as `module.NAME`."""
+    module, name = place.split(".")
+    return getattr(importlib.import_module(f"{ablate.PACKAGE}.{module}"), name)

@@ -124,7 +124,8 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
 @each(
     ("names", "count", "guess"),
     [
-        (["f0.png", "f5.png", "f10.png"], 3, "every 5th number is a frame"),
+        (["f0.png", "f5.png", "f10.png"], 3, "the numbers of frames rise by 5"),
+        (["f1.png", "f3.png", "f5.png"], 3, "the numbers of frames rise by 2"),
         (
             ["f0.png", "f5.png", "f15.png"],
             4,

@@ -143,6 +143,11 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
         tmp_path / "results", {"cma": 10, "random": 2}, problems([1, 5], [9], 3), [LOST]
     )
     lines, page = written(results, "--csv", tmp_path / "rows.csv")
+    rows = csv_rows(tmp_path / "rows.csv")
+    first = next(row for row in rows if row["method"] == "cma")
+    # the command repeats a row without the ledger
+    assert first["command"].startswith("posefit sweep - --out rerun <<'END'\n")
+    assert f"\ninstances = [{first['instance']}]\n" in first["command"]
     assert lines[0].startswith("cma reached 37.9 % of all targets (95 % interval ")
     assert lines[2:4] == [
         "1 cell failed, left out of all figures: pso 1",

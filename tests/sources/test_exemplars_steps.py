@@ -140,8 +140,7 @@ def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:
         following, last = steps.costs(clips, beams)[0]
         assert following == pytest.approx(0.0, abs=1e-4)
         off = float(((clips.codes[state + 1] - clips.codes[after]) ** 2).sum())
-        # or less, at another speed
-        assert last <= min(0.5 * off / 0.03**2, 12.0) + 1e-4
+        assert last == pytest.approx(min(0.5 * off / 0.03**2, 12.0), abs=1e-3)
 
 
 POWERS = (1.0, 0.4)

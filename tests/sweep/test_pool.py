@@ -209,6 +209,25 @@ def process_of(_: TrackCell) -> int:
     return os.getpid()
 
 
+def fork_or_close(cell: TrackCell) -> int:
+    """Fork this process where the seed is even, else close its connection and go on."""
+    if cell.seed % 2 == 0:
+        os.fork()
+    else:
+        os.closerange(3, 256)
+        time.sleep(60.0)
+    return cell.seed
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks processes")
+def test_a_forked_process_gives_no_second_answer_and_one_that_cannot_answer_ends() -> (
+    None
+):
+    ended = one_by_one(Pool(1, LIMITS, fork_or_close), [cells(4)[k] for k in (0, 2, 1)])
+    assert [outcome.result for outcome in ended] == [0, 2, None]
+    assert ended[-1].reason == "it closed the connection of its process"
+
+
 def wait_until(true: Callable[[], bool]) -> None:
     """Wait until something is true; the limit of a test ends it otherwise."""
     while not true():

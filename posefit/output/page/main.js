@@ -10,7 +10,7 @@ function header() {
   const every = (count) => (count === 1 ? "every frame" : `one frame in ${whole(count)}`);
   const pictured = (D.film ?? D.masks[0]).every;
   const thinned = D.step > 1 ? `This track is long, so this page shows ${every(D.step)}. ` : "";
-  const fewer = pictured > D.step ? `There is a picture of ${every(pictured)}, so that this file stays small. ` : "";
+  const fewer = pictured > D.step ? `To keep this file small, it has a picture of ${every(pictured)}. ` : "";
   $("thinned").textContent =
     `${thinned}${fewer}poses.npz and frames.csv in the same folder have every frame, overlay.mp4 the pictures.`;
   const time = `${number(D.count / D.fps, 1)} s at ${+D.fps.toPrecision(4)} frames a second`;
@@ -27,7 +27,7 @@ function frameText(frame) {
   const figures = ["mpjpe_mm", "iou", "cost"].filter((name) => D.columns[name]).map(figureText);
   const other = otherOf(frame);
   const states = MARKS.filter(([name]) => D.marks[name].includes(frame)).map(([, , words]) => words);
-  if (other) states.push(`may be the thin bones: ${whole(100 * other.weight)} %`);
+  if (other) states.push(`the thin bones are possible, too: ${whole(100 * other.weight)} %`);
   return [
     `frame ${D.first + frame * D.step} of ${D.first + D.count}, ${number(seconds(frame), 2)} s`,
     ...figures,

@@ -190,13 +190,13 @@ function certainty() {
   const { levels, methods } = D.certainty;
   const share = (value) => `${number(100 * value, 1)} %`;
   const percents = (value) => `${whole(100 * value)} %`;
-  const within = (level) => `Share of joints whose truth lies in the ball that should hold ${percents(level)} of them`;
+  const within = (level) => `Share of true joints inside the balls that should hold ${percents(level)} of them`;
   const columns = levels.flatMap((level, k) => [
     column(`within ${percents(level)}`, ({ coverage }) => coverage[k], share, { about: within(level) }),
     column("mm", ({ width }) => width[k], whole, { about: "Mean radius of these balls" }),
   ]);
   const about =
-    "Expected calibration error of the likeliest mode's probability: the mean distance from how often it is right";
+    "Expected calibration error: how far the likeliest mode's probability is from its share of right frames";
   const error = column("calibration error", "ece", (value) => number(value, 3), { about });
   const rows = D.taking_part.flatMap((m, place) => (methods[place] ? [{ m, ...methods[place] }] : []));
   table($("sure"), [methodColumn("m"), ...columns, error], rows, { name: "Uncertainty" });

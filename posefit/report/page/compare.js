@@ -23,7 +23,7 @@ function comparison() {
   const P = D.pairs;
   $("pairs-note").textContent = P
     ? `Paired t tests of the errors with losses, over ${whole(P.blocks)} pairs of instance and seed. Seeds of one ` +
-      "instance are not independent: all of it holds for these instances."
+      "instance are not independent, so the results hold for these instances only."
     : "Tests need two methods that share at least two runs.";
   const columns = [
     methodColumn("other"),
@@ -31,7 +31,7 @@ function comparison() {
       about: "Below 0 the chosen method is better",
       down: true,
     }),
-    intervalColumn("Of the mean difference, adjusted as p after Holm is", "difference", 2, ["from", "to"]),
+    intervalColumn("Of the mean difference, adjusted like p by Holm's correction", "difference", 2, ["from", "to"]),
     column("p", "p", probability),
     column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P?.pairs.length} comparisons` }),
     textColumn("verdict", verdict),

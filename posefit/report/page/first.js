@@ -18,8 +18,8 @@ function firstScreen() {
   const notes = [D.score.caption];
   if (rows.some((row) => given(row.p)))
     notes.push(
-      "Below a name: how far it is behind the first method, the mean of paired runs, with its 95 % interval and p by a " +
-        "paired t test, both after Holm: where p is below 0.05 a difference is shown.",
+      "Below a name: its mean difference from the first method in paired runs, with the 95 % interval and p of a " +
+        "paired t test, both after Holm's correction; below 0.05 a difference is shown.",
     );
   if (rows.length > MAX_METHODS) notes.push(`The table has ${counted(rows.length - MAX_METHODS, "more method")}.`);
   $("standing-note").textContent = notes.join(" ");

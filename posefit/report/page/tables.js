@@ -85,7 +85,7 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
 }
 
 function leaderboard() {
-  $("leaderboard-note").textContent = `${D.score.leaderboard}A column's title sorts by it.`;
+  $("leaderboard-note").textContent = `${D.score.leaderboard}Click a column's title to sort by it.`;
   const { name: score, digits, points, paired, down } = D.score;
   const bases = D.leaderboard[0].lost_tracks >= 0 ? D.baselines : [];
   const name = (row) => row.name ?? `baseline: ${D.baseline_names[row.baseline]}`;
@@ -98,7 +98,7 @@ function leaderboard() {
     figure(score),
     intervalColumn("Sorts by its width", width, digits),
     column(`behind ${points.trim()}`, "behind", (value) => number(value, digits), { about }),
-    column("p", "p", probability, { about: "Of that difference: a paired t test, after Holm over all pairs" }),
+    column("p", "p", probability, { about: "Of this difference: paired t test, corrected by Holm over all pairs" }),
     column("lost in", "lost_tracks", (count, row) => `${count} of ${row.runs}`, { about: "Tracks that lost frames" }),
     column("failed", "failed", bad),
     ...(D.warnings.length ? [column("warned", "warned", bad, { about: "Runs with a warning" })] : []),

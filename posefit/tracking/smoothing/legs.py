@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.bodies import ObservedFrames
 from posefit.fitting.contours import ROBUST_SCALES
 from posefit.fitting.landmarks import LEGS, landmark_likelihoods, side_odds
 from posefit.fitting.tracker import Frame
@@ -24,7 +23,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
-from posefit.tracking.smoothing.smooth import Smoothed, smooth, smoothed_motion
+from posefit.tracking.smoothing.smooth import Smoothed, drawn, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
 
@@ -119,23 +118,29 @@ def legs_exchanged(
     added = _smoothed_costs(scene, there, beta) - _smoothed_costs(scene, here, beta)
     exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
+    side = 0  # whether legs are exchanged from the latest edge on
+    before = 0
     # in the order of time, because two edges near each other may be one exchange
     for edge in edges:
+        exchanged[before:edge] = side
+        before = edge
         rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
-        later = np.arange(len(frames)) >= edge
         window = replace(scene, observations=[scene.observations[k] for k in rows])
-        trials = [
-            [pairs[which[k]][k] for k in rows]
-            for which in (exchanged, exchanged ^ later)
-        ]
+        earlier = exchanged[rows.start : edge].tolist()
+        trials = []
+        for later in (side, 1 - side):
+            which = [*earlier, *[later] * (rows.stop - edge)]
+            trials.append([pairs[w][k] for w, k in zip(which, rows, strict=True)])
         same, other = (
             _smoothed_costs(window, window.motion(trial), beta).sum()
             for trial in trials
         )
-        later_costs = np.where(exchanged, -added, added)[edge : rows.stop]
-        switch = other - same - later_costs.sum()
+        later_cost = added[edge : rows.stop].sum()
+        switch = other - same - (-later_cost if side else later_cost)
         switches.append(abs(switch))
-        exchanged ^= later & (switch < 0.0)
+        if switch < 0.0:
+            side = 1 - side
+    exchanged[before:] = side
     starts = [0, *edges]
     stops = [*edges, len(frames)]
     stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + odds), starts)
@@ -171,19 +176,38 @@ def in_doubt(
     """
     typical = np.median(costs[usable])
     excess = np.where(usable & (costs > HIGH_COST * typical), costs - typical, 0.0)
-    ends = [0, *edges, len(costs)]
-    near = [np.zeros(len(costs), dtype=bool) for _ in ends]
-    for edge, rows in zip(edges, near[1:-1], strict=True):
-        rows[max(edge - reach, 0) : edge + reach] = True
-    kept = set[int]()
-    anything = False
-    for first, start in enumerate(ends[:-1]):
-        for last in range(first + 1, len(ends)):
-            saved = excess[near[first] | near[last]].sum()
-            if added[start : ends[last]].sum() < saved:
-                anything = True
-                kept |= {start, ends[last]}
-    return [edge for edge in edges if edge in kept], anything
+    ends = np.array([0, *edges, len(costs)])
+    # nothing is near the first and the last end, which are those of the film
+    first = np.maximum(ends - reach, 0)
+    last = ends + reach
+    first[-1] = len(costs)
+    last[0] = 0
+    last = np.minimum(last, len(costs))
+    sums = np.append(0.0, np.cumsum(excess))
+    near = sums[last] - sums[first]
+    until = np.append(0.0, np.cumsum(added))[ends]
+    # A stretch may be better if what its exchange adds, `until` its end less `until`
+    # its start, is less than the excess near both.
+    opening = until + near
+    closing = until - near
+    better = np.zeros(len(ends), dtype=bool)
+    apart = 1
+    # frames that are near both ends of a short stretch count once
+    while (last[:-apart] > first[apart:]).any():
+        shared = np.maximum(sums[last[:-apart]] - sums[first[apart:]], 0.0)
+        saves = closing[apart:] + shared < opening[:-apart]
+        better[:-apart] |= saves
+        better[apart:] |= saves
+        apart += 1
+    # of longer stretches only the best end matters, not each pair
+    least = np.minimum.accumulate(closing[::-1])[::-1]
+    better[:-apart] |= least[apart:] < opening[:-apart]
+    most = np.maximum.accumulate(opening)
+    better[apart:] |= closing[apart:] < most[:-apart]
+    kept = [
+        edge for edge, is_better in zip(edges, better[1:-1], strict=True) if is_better
+    ]
+    return kept, bool(better.any())
 
 
 def doubtful(
@@ -269,14 +293,7 @@ def _smoothed_costs(
     usable = np.array([observation.usable for observation in scene.observations])
     costs = np.zeros(len(motion))
     if usable.any():
-        seen = ObservedFrames.of(each for each in scene.observations if each.usable)
-        costs[usable] = seen.costs_of(
-            scene.body,
-            scene.cameras,
-            motion.poses[usable],
-            motion.translations[usable],
-            beta,
-        )
+        _, costs[usable] = drawn(scene, motion, np.flatnonzero(usable), beta)
     return costs
 
 

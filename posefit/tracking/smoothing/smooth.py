@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.bodies import ObservedFrames
@@ -21,6 +22,7 @@ from posefit.tracking.trajectory import mean_cost
 
 # Standard deviation of the filter of angles in frames that a single camera sees.
 STEADY_SECONDS = 1.0 / 30.0
+DRAWN_FRAMES = 300  # frames whose masks are unpacked together
 
 
 class Smoothed(NamedTuple):
@@ -50,16 +52,45 @@ def smooth(
     scene, motion, shape = smoothed_motion(scene, scene.motion(frames), shape, beta)
     # once more, because the contours pull at standing feet
     motion = smooth_path(motion, visibility)
-    seen = ObservedFrames.of(scene.observations)
-    areas = seen.areas_of(scene.body, scene.cameras, motion.poses, motion.translations)
-    costs = seen.costs(areas[:, None], beta)[0].tolist()
+    areas, costs = drawn(scene, motion, np.arange(len(motion)), beta)
     smoothed = [
-        _moved(frame, motion.poses[k], motion.translations[k], costs[k], areas[:, k])
-        for k, frame in enumerate(frames)
+        _moved(frame, motion.poses[k], motion.translations[k], cost, areas[:, k])
+        for k, (frame, cost) in enumerate(zip(frames, costs.tolist(), strict=True))
     ]
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smoothed, visibility.usable))
     return Smoothed(scene, smoothed, shape)
+
+
+def drawn(
+    scene: Scene, motion: Motion, rows: NDArray[np.int64], beta: float
+) -> tuple[Areas, Array]:
+    """Return the areas (views, n, 3) and the costs (n,) of some frames of a motion.
+
+    They are drawn in parts, so that the masks of a long film are not in memory at once.
+
+    Args:
+        scene: The scene.
+        motion: The motion of its body.
+        rows: (n,) the frames.
+        beta: The weight in the cost, see `posefit.silhouette.cost`.
+
+    """
+    areas = list[Areas]()
+    costs = list[Array]()
+    for start in range(0, len(rows), DRAWN_FRAMES):
+        part = rows[start : start + DRAWN_FRAMES]
+        seen = ObservedFrames.of(scene.observations[k] for k in part.tolist())
+        areas.append(
+            seen.areas_of(
+                scene.body,
+                scene.cameras,
+                motion.poses[part],
+                motion.translations[part],
+            )
+        )
+        costs.append(seen.costs(areas[-1][:, None], beta)[0])
+    return np.concatenate(areas, axis=1), np.concatenate(costs)
 
 
 def smoothed_motion(
