@@ -55,9 +55,10 @@ POPULATIONS = (1, 4, 10, 40, 400)
 
 def film(frames: int, size: tuple[int, int] = FILM_SIZE) -> Iterator[Array]:
     """Yield the masks of a person who walks to and fro for a number of frames."""
-    from posefit.footage.source import resolve, scene_of
+    from posefit.footage.options import SourceOptions
+    from posefit.footage.source import scene_of
 
-    scene = scene_of(resolve("walk"), size=size)
+    scene = scene_of("walk", SourceOptions(size=size))
     masks = [each.silhouettes[0].mask for each in scene.observations]
     there_and_back = [*range(len(masks)), *range(len(masks) - 2, 0, -1)]
     for k in range(frames):
