@@ -1,10 +1,10 @@
-"""Are observations worth it? FitImage-v0 by blind searches, cloning and PPO.
+"""Are observations worth it? FitImage-v1 by blind searches, cloning and PPO.
 
     python docs/studies/agents.py --rows agents.jsonl --picture agents.png
 
 All are tested on held-out instances. A learner's row is one training: of
 Stable-Baselines3's PPO, or on the truths of training instances. A search's row has
-every instance once. There is a table for each variant of the task.
+every instance once. There is a table for each level.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,22 +30,16 @@ from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
 from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
-NAME = "posefit_envs:posefit/FitImage-v0"
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES = 200
 SEEDS = 3
 STEPS = 270_000
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
-VARIANTS: dict[str, dict[str, Any]] = {
-    "walks": {},
-    "runs": {"motion": "run"},
-    "all motions": {"motion": "all"},
-    "held-out people": {"held_out_people": True},
-    "unknown yaw": {"yaw": "unknown"},
-    "two views": {"view_degrees": [45.0, 135.0]},
-    "searched translation": {"translation": "searched"},
-    "damaged masks": {"noise": {"holes": 0.3, "shadow": 0.5}},
-    "another body": {"mismatch_percent": 10.0},
+LEVELS = {
+    "easy": "FitImage-easy-v1",
+    "default": "FitImage-v1",
+    "medium": "FitImage-medium-v1",
+    "hard": "FitImage-hard-v1",
 }
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
@@ -55,7 +49,11 @@ LOOK_UP = "look-up"
 CONSTANTS = ("uniform", "the truth, projected", LOOK_UP)
 LOOKED_UP = 10_000  # training instances
 LOOKED_UP_AT_ONCE = 500
-LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
+# taught on silhouettes that the environment draws; see pose_network.py
+POSING = "pose network"
+POSING_STEPS = 240_000
+POSING_ENVIRONMENTS = 256
+LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO", POSING)
 # CMA-ES, started from the best of PPO's proposals
 STARTED = "PPO, then cma"
 STARTED_BUDGET = 200
@@ -71,9 +69,11 @@ NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layer
 # steps of cloning before PPO continues, and the narrower deviation with which it does
 CLONING_STEPS = 30_720
 CLONED_LOG_DEVIATION = -2.3
+LEARNING = {"cloning": CLONING_STEPS, POSING: POSING_STEPS}
 WHITE = (255, 255, 255)
 
-Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
+# of small pictures (n, 12, 16, 2 views), and the costs (n,) of the last proposals
+Policy = Callable[[Any, Array], Array]
 
 
 class Training(NamedTuple):
@@ -82,7 +82,7 @@ class Training(NamedTuple):
     `budget` is the steps of a training, or the evaluations of a search.
     """
 
-    variant: str
+    level: str
     agent: str
     budget: int
     seed: int
@@ -94,13 +94,18 @@ def check_learners() -> None:
         raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
 
 
+def name_of(level: str) -> str:
+    """Return the name of a level's environment."""
+    return f"posefit_envs:posefit/{LEVELS[level]}"
+
+
 def made(training: Training, count: int, **arguments: Any) -> Any:
-    """Return a vector environment of a variant with small pictures.
+    """Return a vector environment of a level with small pictures.
 
     For a blank agent the observed silhouettes are blank.
     """
     env = ResizeObservation(
-        gym.make_vec(NAME, count, **VARIANTS[training.variant], **arguments), SHOWN
+        gym.make_vec(name_of(training.level), count, **arguments), SHOWN
     )
     channels = np.arange(env.single_observation_space.shape[-1])
     channels_shown = np.ones_like(channels)
@@ -112,12 +117,12 @@ def made(training: Training, count: int, **arguments: Any) -> Any:
 
 def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array, Array]:
     """Return actions (k, n, d) and costs (k, n) of an episode on each test instance."""
-    env = made(training, INSTANCES, max_evaluations=proposals)
-    pictures, _ = env.reset(seed=0, options={"instance": TESTED})
+    env = made(training, INSTANCES, split="test", max_evaluations=proposals)
+    pictures, infos = env.reset(seed=0, options={"instance": TESTED})
     actions = []
     costs = []
     for _ in range(proposals):
-        actions.append(np.clip(policy(pictures), -1.0, 1.0))
+        actions.append(np.clip(policy(pictures, infos["cost"]), -1.0, 1.0))
         pictures, _, _, _, infos = env.step(actions[-1])
         costs.append(infos["cost"])
     return np.array(actions), np.array(costs)
@@ -155,12 +160,12 @@ def row_of(
 def constant(training: Training) -> Policy:
     """Return the policy of a reference that ignores its observations."""
     rng = np.random.default_rng(training.seed)
-    env = made(training, INSTANCES)
+    env = made(training, INSTANCES, split="test")
     if training.agent == "uniform":
-        return lambda _: rng.uniform(-1.0, 1.0, env.action_space.shape)
+        return lambda *_: rng.uniform(-1.0, 1.0, env.action_space.shape)
     env.reset(options={"instance": TESTED})
     truths = np.array([problem.truth for problem in env.unwrapped.problems])
-    return lambda _: truths
+    return lambda *_: truths
 
 
 def looked_up(training: Training) -> Policy:
@@ -177,7 +182,7 @@ def looked_up(training: Training) -> Policy:
     answers = np.concatenate(truths)
     asked = 0
 
-    def policy(pictures: Any) -> Array:
+    def policy(pictures: Any, _: Array) -> Array:
         nonlocal asked
         seen = observed(pictures)
         squares = (seen**2).sum(axis=1)[:, None] - 2.0 * seen @ known.T
@@ -200,7 +205,7 @@ def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]
     It searches blindly, or from the proposals of the row `start`.
     """
     name = "cma" if training.agent == STARTED else training.agent
-    env = made(training, INSTANCES)
+    env = made(training, INSTANCES, split="test")
     costs = []
     env.reset(options={"instance": TESTED})
     for number, problem in enumerate(env.unwrapped.problems):
@@ -259,6 +264,14 @@ def ppo(vector: Any, seed: int) -> Any:
 
 def trained(training: Training) -> Policy:
     """Return the policy of a learner, the mean of its distribution."""
+    if training.agent == POSING:
+        from pose_network import PoseNetwork
+
+        endless: dict[str, Any] = {"max_evaluations": 10**9}
+        env = made(training, POSING_ENVIRONMENTS, **endless)
+        network = PoseNetwork(env, training.seed)
+        network.learn(training.budget)
+        return network.policy()
     model = ppo(
         to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed
     )
@@ -269,7 +282,7 @@ def trained(training: Training) -> Policy:
         learning -= CLONING_STEPS
     if learning:
         model.learn(learning)
-    return lambda pictures: np.asarray(
+    return lambda pictures, _: np.asarray(
         model.predict(pictures, deterministic=True)[0], dtype=np.float64
     )
 
@@ -282,19 +295,16 @@ def cloned(model: Any, env: Any) -> None:
     import torch
 
     pictures, infos = env.reset(seed=model.seed)
-    truths = infos["truth"].copy()
     length = ROLLOUT * ENVIRONMENTS
     for _ in range(CLONING_STEPS // length):
         shown = []
         targets = []
         for _ in range(ROLLOUT):
             shown.append(pictures)
-            targets.append(truths.copy())
+            targets.append(infos["truth"])
             pictures, _, _, _, infos = env.step(
                 np.clip(model.predict(shown[-1])[0], -1.0, 1.0)
             )
-            if "truth" in infos:
-                truths[infos["_truth"]] = infos["truth"][infos["_truth"]]
         inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
         answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
         for rows in [
@@ -309,7 +319,7 @@ def cloned(model: Any, env: Any) -> None:
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the table of a variant's rows.
+    """Yield the table of a level's rows.
 
     It has mean costs, and the evaluations that blind searches need for the same cost.
     """
@@ -385,7 +395,7 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     import cv2
 
     instance = int(np.argsort(row["costs"])[INSTANCES // 2])
-    env = gym.make(NAME, **VARIANTS[row["variant"]], render_mode="rgb_array")
+    env = gym.make(name_of(row["level"]), split="test", render_mode="rgb_array")
     env.reset(options={"instance": HELD_OUT + instance})
     panels = []
     for proposals in row["proposals"]:
@@ -407,11 +417,11 @@ def picture(row: Mapping[str, Any], path: str) -> None:
 
 @click.command(cls=Command, help=__doc__)
 @click.option(
-    "--variant",
+    "--level",
     "names",
     multiple=True,
-    type=click.Choice(list(VARIANTS)),
-    help="By default only walks.",
+    type=click.Choice(list(LEVELS)),
+    help="By default the default one.",
 )
 @click.option(
     "--agent",
@@ -436,7 +446,7 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     "--picture",
     "drawn",
     metavar="FILE",
-    help="PNG to write: eight proposals of the first PPO.",
+    help="PNG to write: eight proposals of the first pose network.",
 )
 @WORKERS
 def main(
@@ -448,18 +458,18 @@ def main(
     workers: int | None,
 ) -> None:
     check_learners()
-    if drawn is not None and "PPO" not in (agents or LEARNERS):
-        raise InputError("--picture must come with the agent PPO")
+    if drawn is not None and POSING not in (agents or LEARNERS):
+        raise InputError(f"--picture must come with the agent {POSING}")
     turns = []
-    for variant in names or ("walks",):
-        turns += [Training(variant, agent, 0, 0) for agent in CONSTANTS]
+    for level in names or ("default",):
+        turns += [Training(level, agent, 0, 0) for agent in CONSTANTS]
         turns += [
-            Training(variant, agent, budget, 0)
+            Training(level, agent, budget, 0)
             for agent in SEARCHES
             for budget in BUDGETS
         ]
         turns += [
-            Training(variant, name, CLONING_STEPS if name == "cloning" else STEPS, seed)
+            Training(level, name, LEARNING.get(name, STEPS), seed)
             for seed in range(seeds)
             for name in agents or LEARNERS
         ]
@@ -468,16 +478,14 @@ def main(
     )
     for turn in turns:
         if turn.agent == "PPO":
-            started = Training(turn.variant, STARTED, STARTED_BUDGET, turn.seed)
+            started = Training(turn.level, STARTED, STARTED_BUDGET, turn.seed)
             done[started] = row_of(started, done[turn])
-    for variant in names or ("walks",):
-        click.echo(f"\n{variant}, {INSTANCES} held-out instances\n")
-        for line in table(
-            [row for turn, row in done.items() if turn.variant == variant]
-        ):
+    for level in names or ("default",):
+        click.echo(f"\n{level}, {INSTANCES} held-out instances\n")
+        for line in table([row for turn, row in done.items() if turn.level == level]):
             click.echo(line)
     if drawn is not None:
-        picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)
+        picture(next(done[turn] for turn in turns if turn.agent == POSING), drawn)
 
 
 if __name__ == "__main__":

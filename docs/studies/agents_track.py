@@ -1,4 +1,4 @@
-"""Track-v0: PPO with its last proposals stacked, compared with blind searches.
+"""Track-v1: PPO with its last proposals stacked, compared with blind searches.
 
     python docs/studies/agents_track.py
 
@@ -35,7 +35,9 @@ from posefit_envs.track import FRAMES
 from posefit_reproduce.jobs import each
 from table import WORKERS, bar, drawn_means, markdown, quantiles
 
-NAME = "posefit_envs:posefit/Track-v0"
+NAME = "posefit_envs:posefit/Track-v1"
+# the people of the test are those of training, as when its page was measured
+PEOPLE: dict[str, Any] = {"held_out_people": False}
 STACKED = 4  # number of latest pictures that the agent sees
 BUDGETS = (8, 40, 100, 200)  # evaluations per frame of blind searches
 SEEDS = 2
@@ -49,21 +51,23 @@ SHOWN_FRAMES = {
 DIMENSIONS = 9  # of a proposal
 
 
-def stacked(count: int) -> tuple[Any, Any]:
+def stacked(count: int, split: str) -> tuple[Any, Any]:
     """Return a vector environment for Stable-Baselines3, and one that stacks it.
 
     There are eight proposals per frame.
     """
     from stable_baselines3.common.vec_env import VecFrameStack
 
-    env = gym.make_vec(NAME, count, evaluations_per_frame=MAX_EVALUATIONS, errors=False)
+    env = gym.make_vec(
+        NAME, count, evaluations_per_frame=MAX_EVALUATIONS, split=split, **PEOPLE
+    )
     vector = to_sb3_vec_env(ResizeObservation(env, SHOWN))
     return vector, VecFrameStack(vector, STACKED)
 
 
 def committed(act: Callable[[Any], Array]) -> Array:
     """Return the costs (n, frames) that a policy commits in the held-out tracks."""
-    vector, env = stacked(INSTANCES)
+    vector, env = stacked(INSTANCES, "test")
     vector.set_options({"instance": TESTED})
     pictures = env.reset()
     costs = []
@@ -76,14 +80,16 @@ def committed(act: Callable[[Any], Array]) -> Array:
 
 def trained(seed: int) -> Callable[[Any], Array]:
     """Return the policy of a training, the mean of its distribution."""
-    model = ppo(stacked(ENVIRONMENTS)[1], seed)
+    model = ppo(stacked(ENVIRONMENTS, "train")[1], seed)
     model.learn(STEPS)
     return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0])
 
 
 def searched(name: str, budget: int) -> Array:
     """Return the costs (n, frames) that an optimiser commits in the held-out tracks."""
-    env: Any = gym.make_vec(NAME, INSTANCES, evaluations_per_frame=2, errors=False)
+    env: Any = gym.make_vec(
+        NAME, INSTANCES, evaluations_per_frame=2, split="test", **PEOPLE
+    )
     env.reset(options={"instance": TESTED})
     costs = []
     for frame in range(FRAMES):

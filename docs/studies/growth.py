@@ -41,7 +41,7 @@ FILM_SIZE = (320, 240)  # width and height of most films
 # of a method that is cheap, so that what surrounds a search shows
 CHEAP: dict[str, Any] = {"method": "sapso@pca", "evaluations": 40}
 STREAM_FPS = 100.0
-ENVIRONMENT = "posefit_envs:posefit/FitImage-v0"
+ENVIRONMENT = "posefit_envs:posefit/FitImage-v1"
 ENVIRONMENT_STEPS = 64
 STEPPED_ENVIRONMENTS = 4096
 FITTED_SIZES = 4  # of a fit, at least

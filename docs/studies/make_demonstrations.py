@@ -1,4 +1,4 @@
-"""Makes a data set of demonstrations in FitImage-v0, in the form of Minari.
+"""Makes a data set of demonstrations in FitImage-v1, in the form of Minari.
 
     python docs/studies/make_demonstrations.py --episodes 1000
 
@@ -18,7 +18,7 @@ from posefit.cli.output import Command, progress
 from posefit.motion.instances import TRAINING
 
 NAME = "posefit/fit-image/narrowing-v0"
-ENVIRONMENT = "posefit_envs:posefit/FitImage-v0"
+ENVIRONMENT = "posefit_envs:posefit/FitImage-v1"
 SPREAD = 0.5  # standard deviation of the first proposal around the truth
 NARROWING = 0.6  # factor on it from proposal to proposal
 SCORED = 100  # episodes of which the scores of reference are the means

@@ -1,4 +1,4 @@
-"""Steps of FitImage-v0 per second: the native vector, Gymnasium's Sync and Async.
+"""Steps of FitImage-v1 per second: the native vector, Gymnasium's Sync and Async.
 
 Episodes have eight steps, and the time includes their resets. All training instances
 were met before. The kinds take turns, and the best turn counts. Seconds are CPU
@@ -18,7 +18,7 @@ from posefit.cli.output import Command
 from posefit.motion.instances import TRAINING
 from table import markdown
 
-NAME = "posefit_envs:posefit/FitImage-v0"
+NAME = "posefit_envs:posefit/FitImage-v1"
 COUNTS = (1, 64, 1024)
 # calls and steps of each environment in a turn: two episodes, each with a reset; number
 # of turns of each kind

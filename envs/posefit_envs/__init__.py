@@ -1,20 +1,20 @@
-"""Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/FitImage-v0")`.
+"""Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/FitImage-v1")`.
 
     import gymnasium as gym
 
-    env = gym.make("posefit_envs:posefit/FitImage-v0", motion="run", instance=17)
+    env = gym.make("posefit_envs:posefit/FitImage-v1", motion="run", instance=17)
     observation, info = env.reset(seed=0)
     action = env.action_space.sample()
     observation, reward, terminated, truncated, info = env.step(action)
 
-`FitImage-v0` asks for the pose in one silhouette, within a few proposals. `Track-v0`
-follows a sequence of silhouettes. In `Race-v0` several searches share a budget, and
+`FitImage-v1` asks for the pose in one silhouette, within a few proposals. `Track-v1`
+follows a sequence of silhouettes. In `Race-v1` several searches share a budget, and
 each action chooses which one continues. Their docstrings are their manual.
 
 Importing this package registers the environments; each module is imported when its
 environment is made. `drive` runs an optimiser against an environment or a vector of
 them, and `drive_each` one in every environment of a vector. `track_reference` returns
-what a tracker would commit in Track-v0. `to_sb3_vec_env` adapts a vector environment to
+what a tracker would commit in Track-v1. `to_sb3_vec_env` adapts a vector environment to
 Stable-Baselines3.
 
 A step rasterises proposals in the scenes of a `Stage`. It counts them in a
@@ -23,7 +23,7 @@ single class and a vector class, which share their functions.
 
 | looking for | file |
 |---|---|
-| FitImage-v0, Track-v0, Race-v0: from action to reward | fit.py, track.py, race.py |
+| FitImage-v1, Track-v1, Race-v1: from action to reward | fit.py, track.py, race.py |
 | what they share: actions, rewards, infos, start and end of episodes | base.py |
 | arguments, and the scene of an instance (see `posefit.motion.instances`) | world.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
@@ -52,11 +52,32 @@ _MODULES = {
 }
 __all__ = list(_MODULES)
 
-for _id, _module in {"FitImage": "fit", "Track": "track", "Race": "race"}.items():
+_KNOWN_PEOPLE = {"held_out_people": False}
+# v0 shows the same people in training and in the test
+_IDS: dict[str, dict[str, Any]] = {
+    "FitImage-v0": _KNOWN_PEOPLE,
+    "FitImage-v1": {},
+    "FitImage-easy-v1": _KNOWN_PEOPLE,
+    "FitImage-medium-v1": {"motion": "all"},
+    "FitImage-hard-v1": {
+        "motion": "all",
+        "yaw": "unknown",
+        "noise": {"holes": 0.3, "shadow": 0.5},
+    },
+    "Track-v0": _KNOWN_PEOPLE,
+    "Track-v1": {},
+    "Race-v0": _KNOWN_PEOPLE,
+    "Race-v1": {},
+}
+_FILES = {"FitImage": "fit", "Track": "track", "Race": "race"}
+
+for _id, _arguments in _IDS.items():
+    _class = _id.partition("-")[0]
     register(
-        id=f"posefit/{_id}-v0",
-        entry_point=f"posefit_envs.{_module}:{_id}Env",
-        vector_entry_point=f"posefit_envs.{_module}:{_id}VectorEnv",
+        id=f"posefit/{_id}",
+        entry_point=f"posefit_envs.{_FILES[_class]}:{_class}Env",
+        vector_entry_point=f"posefit_envs.{_FILES[_class]}:{_class}VectorEnv",
+        kwargs=_arguments,
     )
 
 

@@ -18,7 +18,6 @@ from posefit.arrays import Array
 from posefit.fitting.check import one_of, whole
 from posefit.fitting.dlpack import as_numpy
 from posefit.geometry.rotation import wrapped
-from posefit.motion.instances import instance_number
 from posefit.reading import quoted, suggestion
 from posefit_envs.rendering import MODES, Picture, check_mode
 from posefit_envs.stage import Drawn, Rows, Stage
@@ -118,20 +117,26 @@ def error_degrees(truth: Array, pose: Array) -> Any:
     return np.degrees(np.abs(wrapped(truth - pose))).mean(axis=-1)
 
 
-def proposal_infos(
-    stage: Stage, drawn: Drawn, numbers: NDArray[np.int64], errors: bool
-) -> Infos:
-    """Return the infos (n, ...) of evaluated proposals by name.
-
-    With `errors`, they include the error against the truth.
-    """
-    infos: Infos = {
-        "cost": drawn.costs.copy(),
-        "areas": drawn.areas,
-        "instance": numbers.copy(),
-    }
-    if errors:
+def proposal_infos(stage: Stage, drawn: Drawn, shows_truth: bool) -> Infos:
+    """Return the infos (n, ...) of evaluated proposals by name."""
+    infos: Infos = {"cost": drawn.costs.copy(), "areas": drawn.areas}
+    if shows_truth:
         infos["error_degrees"] = error_degrees(stage.truths, drawn.poses)
+    return infos
+
+
+def infos_before(stage: Stage, shows_truth: bool) -> Infos:
+    """Return the same infos (n, ...) before the first proposal.
+
+    Cost and error are infinite, and all of the silhouettes is missed.
+    """
+    totals = stage.totals
+    nothing = np.full(len(totals), np.inf)
+    areas = np.zeros((*totals.shape, 3), dtype=np.int64)
+    areas[..., 0] = totals
+    infos: Infos = {"cost": nothing, "areas": areas}
+    if shows_truth:
+        infos["error_degrees"] = nothing.copy()
     return infos
 
 
@@ -205,7 +210,7 @@ class SearchEnv(Env[Any, Any], ABC):
         if chosen is None:
             self.number = self.world.next_instance(self.np_random)
         else:
-            self.number = checked(instance_number, chosen)
+            self.number = self.world.numbered(chosen)
         self.ended = False
         return self.begin(self.number)
 
@@ -340,14 +345,31 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         if not mask.all() and (self.numbers < 0).any():
             raise error.ResetNeeded("the first reset must be of all environments")
         seeds = _seeds(seed, self.num_envs)
-        numbers = _instances(options.get("instance"), self.num_envs)
+        numbers = self._instances(options.get("instance"))
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._generators[i] = seeding.np_random(seeds[i])
         self.restart(mask, numbers)
         observations = self.observe(np.arange(self.num_envs))
-        infos = masked_infos(mask, self.reset_infos(), {})
-        return observations, self._with_started(infos, mask)
+        return observations, masked_infos(mask, self.reset_infos(), {})
+
+    def _instances(self, chosen: Any) -> list[int | None]:
+        """Return the instance of each environment, or None to draw one.
+
+        One number applies to all. Raises ArgumentError if the count is wrong, or an
+        instance does not exist or is of the other split.
+        """
+        count = self.num_envs
+        if chosen is None:
+            return [None] * count
+        if not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
+            return [self.world.numbered(chosen)] * count
+        if np.ndim(chosen) != 1 or len(chosen) != count:
+            raise ArgumentError(
+                f"instance must be one number or {count}, one for each environment, "
+                f"got {quoted(chosen)}"
+            )
+        return [self.world.numbered(number) for number in chosen]
 
     def restart(self, mask: Flags, numbers: Sequence[int | None] | None = None) -> None:
         """Begin episodes in some environments, with chosen or random instances."""
@@ -384,9 +406,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         stepping: Flags,
         observations: NDArray[Any],
         rewards: Array,
-        ends: tuple[Flags, Flags],
+        terminated: Flags,
         infos: Infos,
-        row_infos: Mapping[int, Infos] = {},
     ) -> tuple[Any, Array, Flags, Flags, Infos]:
         """Return what a step returns.
 
@@ -398,13 +419,12 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             stepping: Which environments (n,) stepped.
             observations: Observations (n, ...) after the step.
             rewards: Rewards (n,).
-            ends: Which episodes terminated and which were truncated. The time limit of
-                Gymnasium truncates others too.
+            terminated: Which episodes have used up their proposals. Only the time limit
+                of Gymnasium truncates.
             infos: Infos (n, ...) by name.
-            row_infos: Further infos of single environments.
         """
-        terminated = stepping & ends[0]
-        truncated = stepping & (ends[1] | (self.steps >= self._longest))
+        terminated = stepping & terminated
+        truncated = stepping & (self.steps >= self._longest)
         self.ended = terminated | truncated
         going = stepping
         begun_infos: Infos = self.reset_infos() if not stepping.all() else {}
@@ -413,25 +433,15 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             ended = self.ended.copy()
             going = ~ended
             for i in np.flatnonzero(ended).tolist():
-                last_infos = row_of(infos, i) | row_infos.get(i, {})
+                last_infos = row_of(infos, i)
                 last = {"final_obs": observations[i].copy(), "final_info": last_infos}
                 final = self._add_info(final, last, i)
             self.restart(ended)
             observations[ended] = self.observe(np.flatnonzero(ended))
             begun_infos = self.reset_infos()
         step_infos = masked_infos(going, infos, begun_infos) | final
-        for i, more in row_infos.items():
-            if going[i]:
-                step_infos = self._add_info(step_infos, more, i)
         rewards = np.where(stepping, rewards, 0.0)
-        step_infos = self._with_started(step_infos, ~going)
         return observations, rewards, terminated, truncated, step_infos
-
-    def _with_started(self, infos: Infos, started: Flags) -> Infos:
-        """Return infos, completed with the infos that only a starting episode has."""
-        for i in np.flatnonzero(started).tolist():
-            infos = self._add_info(infos, self.started_infos(i), i)
-        return infos
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """Return an attribute of each environment, as Gymnasium's vectors do."""
@@ -519,10 +529,6 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     @abstractmethod
     def reset_infos(self) -> Infos:
         """Return the infos (n, ...) of a reset, by name."""
-
-    def started_infos(self, i: int) -> Infos:
-        """Return the infos of environment i that only a starting episode has."""
-        return {}
 
     @abstractmethod
     def picture(self, i: int) -> Picture:
@@ -614,21 +620,3 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
     if len(seed) != count:
         raise ArgumentError(f"seed must be one number or {count}, got {len(seed)}")
     return [each if each is None else checked(whole, "seed", each, 0) for each in seed]
-
-
-def _instances(chosen: Any, count: int) -> list[int | None]:
-    """Return the instance of each environment, or None to draw one.
-
-    One number applies to all. Raises ArgumentError if the count is wrong, or an
-    instance does not exist.
-    """
-    if chosen is None:
-        return [None] * count
-    if not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
-        return [checked(instance_number, chosen)] * count
-    if np.ndim(chosen) != 1 or len(chosen) != count:
-        raise ArgumentError(
-            f"instance must be one number or {count}, one for each environment, "
-            f"got {quoted(chosen)}"
-        )
-    return [checked(instance_number, number) for number in chosen]

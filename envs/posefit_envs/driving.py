@@ -22,7 +22,7 @@ from posefit_envs.track import TrackEnv, committed_infos
 
 
 class FitImageSteps:
-    """Costs of proposals, found by stepping `posefit/FitImage-v0`.
+    """Costs of proposals, found by stepping `posefit/FitImage-v1`.
 
     The environment is a single one or a vector, in any autoreset mode. An episode that
     ends begins again with the same instance.
@@ -76,7 +76,7 @@ class FitImageSteps:
 
 
 def _check_actions_reach(env: AnyEnv) -> None:
-    """Raise gymnasium.error.Error unless actions reach FitImage-v0 unchanged."""
+    """Raise gymnasium.error.Error unless actions reach FitImage-v1 unchanged."""
     wrapper: Any = env
     while wrapper is not env.unwrapped:
         if isinstance(wrapper, ActionWrapper | VectorActionWrapper):
@@ -90,7 +90,7 @@ def _check_actions_reach(env: AnyEnv) -> None:
         rows_of(env).attribute("max_evaluations")
     except AttributeError:
         raise error.Error(
-            f"env must be posefit/FitImage-v0, got {type(env.unwrapped).__name__}"
+            f"env must be posefit/FitImage-v1, got {type(env.unwrapped).__name__}"
         ) from None
     if (space.low != -1.0).any() or (space.high != 1.0).any():
         raise error.Error(f"env must take proposals in [-1, 1], got actions in {space}")
@@ -105,7 +105,7 @@ def drive(
     evaluations: int = 2440,
     **settings: Any,
 ) -> Problem:
-    """Return the problem, minimised by stepping `posefit/FitImage-v0`.
+    """Return the problem, minimised by stepping `posefit/FitImage-v1`.
 
     A population takes as many steps as it needs. If it does not fill the last step, its
     last proposal is repeated; repeats are not counted. An episode that ends begins
@@ -156,7 +156,7 @@ def drive_each(
     may have any size. The seeds are `seed`, `seed` + 1 and so on.
 
     Args:
-        env: A vector of `FitImage-v0`.
+        env: A vector of `FitImage-v1`.
         optimiser: The optimiser's name.
         seed: Seed of the first search.
         instances: An instance for each environment; by default random ones.
@@ -195,14 +195,14 @@ def track_reference(
     train: Sequence[str] = (),
     **settings: Any,
 ) -> list[dict[str, Any]]:
-    """Return the infos of the poses that a tracker commits in a Track-v0 episode.
+    """Return the infos of the poses that a tracker commits in a Track-v1 episode.
 
     The tracker has the environment's budget for a frame, and the same silhouettes. If
     it looks ahead, it reads all of them, so it is a reference for policies and not a
     policy. Its poses may lie outside the box of proposals. The episode is not stepped.
 
     Args:
-        env: `posefit/Track-v0`, after a reset.
+        env: `posefit/Track-v1`, after a reset.
         tracker: The tracker's name.
         seed: Seed of the tracker.
         train: Training motions, named as in `posefit.track`; by default the training
@@ -216,15 +216,13 @@ def track_reference(
     """
     bare = env.unwrapped
     if not isinstance(bare, TrackEnv):
-        raise error.Error(f"env must be posefit/Track-v0, got {type(bare).__name__}")
+        raise error.Error(f"env must be posefit/Track-v1, got {type(bare).__name__}")
     instance = bare.instance
     world = bare.world
-    motions = training_motions(
-        training_clips(
-            train or world.training, followed=world.motion_of(instance.number)
-        ),
-        instance.task.fps,
-    )
+    # the prior has learned from training instances too, so the tracker may
+    followed = world.motion_of(instance.number) if train else None
+    clips = training_clips(train or world.training, followed=followed)
+    motions = training_motions(clips, instance.task.fps)
     task = replace(instance.task, training=motions)
     tracker_settings = {
         f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()

@@ -1,4 +1,4 @@
-"""FitImage-v0: a few proposals of the pose in one silhouette; observed as pictures."""
+"""FitImage-v1: a few proposals of the pose in one silhouette; observed as pictures."""
 
 from functools import partial
 from typing import Any
@@ -8,13 +8,13 @@ import numpy as np
 from posefit import Problem, Problems, SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit.motion.instances import HELD_OUT
 from posefit_envs.base import (
     Flags,
     Infos,
     SearchEnv,
     SearchVectorEnv,
     image_spaces,
+    infos_before,
     proposal_infos,
     reward_of_cost,
     row_of,
@@ -24,20 +24,12 @@ from posefit_envs.stage import Rows, Stage, first_scene
 from posefit_envs.world import (
     FirstFrame,
     Image,
-    World,
     checked,
     first_problem,
+    first_truth,
 )
 
 MAX_EVALUATIONS = 8
-
-
-def shows_truth(world: World, number: int) -> bool:
-    """Return whether a reset gives the true proposal.
-
-    Only training instances give it, so that held-out ones contain no answer.
-    """
-    return world.errors and number not in HELD_OUT
 
 
 class FitImageEnv(SearchEnv):
@@ -79,26 +71,28 @@ class FitImageEnv(SearchEnv):
     `reset(options={"instance": 17})` chooses one.
 
     ## Episode End
-    Truncates after `max_evaluations` proposals. It never terminates, because the end
-    does not depend on the silhouette.
+    Terminates after `max_evaluations` proposals. Only a time limit of Gymnasium
+    truncates. Pictures do not show how many proposals are left: the information does.
 
     ## Information
-    A step gives `cost`, `best_cost`, `evaluations`, `areas` (views, 3) R, B, Y in
-    pixels, and `instance`. Unless `errors=False` it also gives `error_degrees`, the
-    proposal's error against the truth.
-
-    A reset gives `instance`. Unless `errors=False` it also gives `truth` (d,), the
-    proposal nearest to the true pose, for training instances only: held-out ones have
-    no answer to read.
+    A step and a reset give `cost`, `best_cost`, `evaluations`, `remaining_steps`,
+    `areas` (views, 3) R, B, Y in pixels, and `instance`. In training they also give
+    `truth` (d,), the proposal nearest to the true pose, and `error_degrees`, the last
+    proposal's error against the truth, unless `errors=False`. The test split has no
+    answer to read, unless `evaluate=True`. Before the first proposal, costs and errors
+    are infinite.
 
     ## Arguments
-    - `motion="walk"`: a built-in motion, or an .amc or .bvh file; or a list of built-in
-      motions; or "all" for all kinds of built-in motions.
-    - `held_out_people=False`: if true, `motion` names kinds of built-in motions. An
-      instance shows one person's style of it; a held-out instance shows the last
-      person's. If false, the mean of all styles is shown.
-    - `instance=None`: 0 to 19,999. `split="train"` draws from 0 to 9,999, `"test"` from
-      the others, which are held out.
+    - `motion="walk"`: a kind of built-in motion, a list of kinds, or "all".
+    - `held_out_people=True`: an instance shows a person: one person's style of the
+      motion, and a body whose bones and girths differ by up to 10 % from the average.
+      Held-out instances show the styles of two people of whom training instances and
+      the prior have nothing, in any motion. If false, everybody has the average body
+      and the mean of all styles, in training and in the test; `motion` may then also be
+      a single style, or an .amc or .bvh file.
+    - `split="train"`: instances 0 to 9,999, or `"test"`: 10,000 to 19,999, which are
+      held out. Numbers of the other split are refused.
+    - `instance=None`: a number of the split; by default each reset draws one.
     - `yaw="guessed"`: the root's yaw is known to 20 degrees. "unknown": the person
       faces anywhere, and the first number spans 180 degrees to either side of facing
       the first camera.
@@ -113,11 +107,22 @@ class FitImageEnv(SearchEnv):
       `{"holes": 0.3, "shadow": 0.5}`; see `posefit.silhouette.corruption`.
     - `mismatch_percent=0.0`: the largest difference between the bones and radii of the
       fitted body and the person's.
-    - `errors=True`: whether infos hold `truth`, and errors against it.
+    - `errors=True`: whether infos hold the truth in training. `evaluate=False`: whether
+      they do in the test.
     - `max_evaluations=8`.
 
+    ## Levels
+    | id, after `posefit/` | arguments |
+    |---|---|
+    | FitImage-easy-v1 | `held_out_people=False` |
+    | FitImage-v1 | by default |
+    | FitImage-medium-v1 | `motion="all"` |
+    | FitImage-hard-v1 | `motion="all"`, an unknown yaw, damaged silhouettes |
+
     ## Version History
-    - v0: not released yet; until then a version changes without a number.
+    - v1: people are held out by default.
+    - v0: `held_out_people=False`. Three of ten silhouettes of its test walks are in
+      training, byte for byte.
     """
 
     def __init__(
@@ -138,10 +143,21 @@ class FitImageEnv(SearchEnv):
         self.stage.set_scene(0, first_scene(self.world, number))
         frame = FirstFrame(self.world, number)
         self._problem = Problem(frame, self.stage.space(0), self.max_evaluations)
-        infos: Infos = {"instance": number}
-        if shows_truth(self.world, number):
-            infos["truth"] = frame.truth
-        return self.stage.pictures(self.stage.all_rows)[0], infos
+        picture = self.stage.pictures(self.stage.all_rows)[0]
+        return picture, self._infos(infos_before(self.stage, self.world.shows_truth))
+
+    def _infos(self, infos: Infos) -> Infos:
+        """Return the infos of the only row, completed."""
+        problem = self.problem
+        infos = row_of(infos, 0)
+        infos["best_cost"] = problem.best_cost
+        infos["evaluations"] = problem.evaluations
+        infos["remaining_steps"] = self.max_evaluations - problem.evaluations
+        infos["instance"] = self.number
+        if self.world.shows_truth:
+            assert self.number is not None
+            infos["truth"] = first_truth(self.world, self.number).copy()
+        return infos
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, Infos]:
         """Evaluate a proposal. Raises ResetNeeded if the episode has ended."""
@@ -152,12 +168,8 @@ class FitImageEnv(SearchEnv):
         self._cost = float(drawn.costs[0])
         reward = float(reward_of_cost(self._cost))
         self.ended = not problem.remaining_evaluations
-        numbers = np.array([self.number])
-        infos = proposal_infos(self.stage, drawn, numbers, self.world.errors)
-        infos = row_of(infos, 0)
-        infos["best_cost"] = problem.best_cost
-        infos["evaluations"] = problem.evaluations
-        return drawn.pictures[0], reward, False, self.ended, infos
+        infos = self._infos(proposal_infos(self.stage, drawn, self.world.shows_truth))
+        return drawn.pictures[0], reward, self.ended, False, infos
 
     @property
     def space(self) -> SearchSpace:
@@ -190,6 +202,7 @@ class FitImageVectorEnv(SearchVectorEnv):
         self.stage = Stage(self.world, num_envs, self.threads)
         self._problems = Problems(num_envs, self.world.dimensions)
         self._costs = np.full(num_envs, np.nan)  # of the last proposals
+        self._truths = np.zeros((num_envs, self.world.dimensions))
 
     def begin(self, rows: Rows) -> None:
         """Begin episodes in some environments, with the instances of `numbers`."""
@@ -197,6 +210,8 @@ class FitImageVectorEnv(SearchVectorEnv):
             number = int(self.numbers[i])
             self.stage.set_scene(i, first_scene(self.world, number))
             self._problems.begin(i, partial(first_problem, self.world, number))
+            if self.world.shows_truth:
+                self._truths[i] = first_truth(self.world, number)
 
     def observe(self, rows: Rows) -> Image:
         """Return the pictures of some environments as they are now."""
@@ -204,13 +219,18 @@ class FitImageVectorEnv(SearchVectorEnv):
 
     def reset_infos(self) -> Infos:
         """Return the infos of a reset, by name."""
-        return {"instance": self.numbers.copy()}
+        return self._infos(infos_before(self.stage, self.world.shows_truth))
 
-    def started_infos(self, i: int) -> Infos:
-        """Return the true proposal of environment i, if a reset gives it."""
-        if not shows_truth(self.world, int(self.numbers[i])):
-            return {}
-        return {"truth": self._problems[i].truth}
+    def _infos(self, infos: Infos) -> Infos:
+        """Return the infos of all rows, completed."""
+        evaluations = self._problems.evaluations
+        infos["best_cost"] = self._problems.best_costs.copy()
+        infos["evaluations"] = evaluations.copy()
+        infos["remaining_steps"] = self.max_evaluations - evaluations
+        infos["instance"] = self.numbers.copy()
+        if self.world.shows_truth:
+            infos["truth"] = self._truths.copy()
+        return infos
 
     def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
         """Evaluate a proposal in each environment; ended episodes reset."""
@@ -221,12 +241,9 @@ class FitImageVectorEnv(SearchVectorEnv):
         problems.count(rows, proposals[rows, None], drawn.costs[rows, None])
         self._costs = drawn.costs
         rewards = reward_of_cost(drawn.costs)
-        truncated = problems.evaluations >= self.max_evaluations
-        infos = proposal_infos(self.stage, drawn, self.numbers, self.world.errors)
-        infos["best_cost"] = problems.best_costs.copy()
-        infos["evaluations"] = problems.evaluations.copy()
-        ends = np.zeros_like(truncated), truncated
-        return self.end_step(stepping, drawn.pictures, rewards, ends, infos)
+        terminated = problems.evaluations >= self.max_evaluations
+        infos = self._infos(proposal_infos(self.stage, drawn, self.world.shows_truth))
+        return self.end_step(stepping, drawn.pictures, rewards, terminated, infos)
 
     def picture(self, i: int) -> Picture:
         """Return the picture of the last proposal in environment i."""

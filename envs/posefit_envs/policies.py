@@ -1,4 +1,4 @@
-"""Rollouts of policies, and readable observations and actions of Race-v0.
+"""Rollouts of policies, and readable observations and actions of Race-v1.
 
 A policy is called with an observation and the step's number. It returns an action.
 """
@@ -65,7 +65,7 @@ def rollout(
 def race_features(observation: Any) -> tuple[Array, Array]:
     """Return the features (..., k, 4) of k searches, and the common ones (..., 3).
 
-    They are read from observations (..., 4 k + 3) of Race-v0. A search has best cost,
+    They are read from observations (..., 4 k + 3) of Race-v1. A search has best cost,
     slope, spread and share of the budget used. In common are best cost, budget left and
     budget.
     """
@@ -78,7 +78,7 @@ def race_features(observation: Any) -> tuple[Array, Array]:
 
 
 def race_action(choice: Any, searches: int) -> Array:
-    """Return actions (..., searches + 1) of Race-v0 that make the choices (...).
+    """Return actions (..., searches + 1) of Race-v1 that make the choices (...).
 
     A choice is a whole number from 0 to `searches`.
     """

@@ -1,4 +1,4 @@
-"""Race-v0: searches share a budget; an action continues one, or starts a new one."""
+"""Race-v1: searches share a budget; an action continues one, or starts a new one."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -209,9 +209,10 @@ class Races:
             "best_cost": problems.best_costs.copy(),
             "proposal": problems.best.copy(),
             "evaluations": problems.evaluations.copy(),
+            "remaining_steps": self.left.copy(),
             "instance": numbers.copy(),
         }
-        if self.world.errors:
+        if self.world.shows_truth:
             # alignment moves the body but not the pose, so no row is aligned
             nobody = self.stage.all_rows[:0]
             poses = self.stage.decode(problems.best[:, None], nobody)[0][:, 0]
@@ -271,19 +272,20 @@ class RaceEnv(SearchEnv):
 
     ## Starting State
     The first population of each search, drawn uniformly and evaluated; the budget does
-    not include it. The instance is chosen as in `FitImage-v0`. The budget is drawn from
+    not include it. The instance is chosen as in `FitImage-v1`. The budget is drawn from
     `generations`.
 
     ## Episode End
-    Terminates when the budget is used up. It is never truncated.
+    Terminates when the budget is used up. Only a time limit of Gymnasium truncates.
 
     ## Information
     A step and a reset give `best_cost`, the `proposal` (d,) with that cost,
-    `evaluations`, and `instance`. Unless `errors=False` they also give `error_degrees`,
-    the best pose's error against the truth.
+    `evaluations`, `remaining_steps`, and `instance`. In training they also give
+    `error_degrees`, the best pose's error against the truth, unless `errors=False`; in
+    the test only with `evaluate=True`.
 
     ## Arguments
-    As in `FitImage-v0`, without `max_evaluations`, and with:
+    As in `FitImage-v1`, without `max_evaluations`, and with:
 
     - `optimiser="pso"`: any optimiser of posefit or a plugin that takes a
       `population_size`.
@@ -296,7 +298,8 @@ class RaceEnv(SearchEnv):
     planned for the largest budget.
 
     ## Version History
-    - v0: not released yet; until then a version changes without a number.
+    - v1: people are held out by default.
+    - v0: `held_out_people=False`.
     """
 
     def __init__(
@@ -404,8 +407,7 @@ class RaceVectorEnv(SearchVectorEnv):
         terminated = self.races.left == 0
         infos = self.races.infos(self.numbers)
         observations = self.races.observations()
-        ends = terminated, np.zeros_like(terminated)
-        return self.end_step(stepping, observations, rewards, ends, infos)
+        return self.end_step(stepping, observations, rewards, terminated, infos)
 
     def picture(self, i: int) -> Picture:
         """Return the picture of the best proposal in environment i."""

@@ -21,8 +21,11 @@ Picture = NDArray[np.uint8]  # (height, width, 3) red, green, blue
 def check_mode(mode: str | None) -> None:
     """Raise gymnasium.error.UnsupportedMode for an unknown render mode."""
     if mode is not None and mode not in MODES:
+        wrap = ""
+        if mode == "human":
+            wrap = ": Gymnasium's wrapper HumanRendering shows these in a window"
         raise error.UnsupportedMode(
-            f"render_mode must be one of {', '.join(MODES)}, got {mode!r}"
+            f"render_mode must be one of {', '.join(MODES)}, got {mode!r}{wrap}"
         )
 
 

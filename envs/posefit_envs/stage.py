@@ -156,6 +156,11 @@ class Stage:
         """The true poses (n, 66)."""
         return self._columns.truth
 
+    @property
+    def totals(self) -> NDArray[np.int64]:
+        """The pixels (n, views) of the observed silhouettes."""
+        return self._columns.totals
+
     def set_scene(self, row: int, scene: SceneRow) -> None:
         """Set a row's scene, without a body."""
         self._has_body[row] = False

@@ -1,4 +1,4 @@
-"""Track-v0: a sequence of silhouettes, several proposals for each."""
+"""Track-v1: a sequence of silhouettes, several proposals for each."""
 
 from functools import partial
 from typing import Any
@@ -10,12 +10,14 @@ from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.fitting.metrics import mpjpe_mm, pose_error_degrees
 from posefit.fitting.tracker import Prediction, Predictor
+from posefit.geometry.skeleton import ANGLES
 from posefit_envs.base import (
     Flags,
     Infos,
     SearchEnv,
     SearchVectorEnv,
     image_spaces,
+    infos_before,
     proposal_infos,
     reward_of_cost,
     row_of,
@@ -69,39 +71,43 @@ class TrackEnv(SearchEnv):
     moves with the prediction, SAPSO (6).
 
     ## Action Space
-    `Box(-1, 1, (d,), float32)`: a proposal, as in `FitImage-v0`. The yaw and a searched
+    `Box(-1, 1, (d,), float32)`: a proposal, as in `FitImage-v1`. The yaw and a searched
     translation are relative to the pose that was committed last.
 
     ## Observation Space
-    `Box(0, 255, (height, width, 2 views), uint8)`, as in `FitImage-v0`: the silhouette
+    `Box(0, 255, (height, width, 2 views), uint8)`, as in `FitImage-v1`: the silhouette
     of the current frame and of the last proposal. The first picture of a frame shows
     the pose that was committed in the previous frame.
 
     ## Rewards
-    -ln(1 + cost) of the proposal, as in `FitImage-v0`.
+    -ln(1 + cost) of the proposal, as in `FitImage-v1`.
 
     ## Starting State
-    The first frame of an instance, as in `FitImage-v0`.
+    The first frame of an instance, as in `FitImage-v1`.
 
     ## Episode End
-    Terminates when the last frame's pose is committed.
+    Terminates when the last frame's pose is committed. Only a time limit of Gymnasium
+    truncates.
 
     ## Information
-    A step gives `cost`, `best_cost`, `evaluations` of the frame, `areas` (views, 3),
-    `frame`, and `instance`. Unless `errors=False` it also gives the proposal's
-    `error_degrees`.
+    A step and a reset give `cost`, `best_cost`, `evaluations` of the frame,
+    `remaining_steps` of the episode, `areas` (views, 3), `frame`, and `instance`; and
+    of the pose that the step commits `committed_frame`, `committed_cost` and
+    `committed_pose` (66,). A step that commits nothing has -1, infinity and zeros. The
+    `frame` of one that commits is the next frame.
 
-    The step that commits a pose adds `committed_frame`, `committed_cost` and
-    `committed_pose` (66,). Unless `errors=False` it also adds `committed_error_degrees`
-    and `committed_mpjpe_mm`. Its `frame` is the next frame. A reset gives `instance`
-    and `frame`.
+    In training they also give `error_degrees` of the proposal,
+    `committed_error_degrees` and `committed_mpjpe_mm`, unless `errors=False`; in the
+    test only with `evaluate=True`. Before the first proposal, costs and errors are
+    infinite.
 
     ## Arguments
-    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of
+    As in `FitImage-v1`, with `frames=20` and `evaluations_per_frame=100` instead of
     `max_evaluations`.
 
     ## Version History
-    - v0: not released yet; until then a version changes without a number.
+    - v1: people are held out by default.
+    - v0: `held_out_people=False`.
     """
 
     metadata = SearchEnv.metadata | {"render_fps": 30}
@@ -129,7 +135,9 @@ class TrackEnv(SearchEnv):
         )
         self._begin_frame()
         observation = self.stage.pictures(self.stage.all_rows)[0]
-        return observation, {"instance": number, "frame": 0}
+        self._done = 0
+        infos = row_of(infos_before(self.stage, self.world.shows_truth), 0)
+        return observation, self._infos(infos, nothing_committed(self.world))
 
     def _begin_frame(self) -> None:
         self._problem = self._sequence.problem()
@@ -146,28 +154,39 @@ class TrackEnv(SearchEnv):
         self._cost = float(drawn.costs[0])
         observation = drawn.pictures[0]
         reward = float(reward_of_cost(self._cost))
-        numbers = np.array([self.number])
-        infos = proposal_infos(self.stage, drawn, numbers, self.world.errors)
-        infos = row_of(infos, 0)
-        infos["best_cost"] = problem.best_cost
-        infos["evaluations"] = problem.evaluations
+        infos = row_of(proposal_infos(self.stage, drawn, self.world.shows_truth), 0)
+        self._done += 1
+        committed = nothing_committed(self.world)
         if not problem.remaining_evaluations:
             poses, places = self.stage.decode(problem.best[None, None], rows)
-            infos |= committed_infos(
+            committed = committed_infos(
                 sequence.instance,
                 sequence.frame,
                 poses[0, 0],
                 places[0, 0],
                 problem.best_cost,
-                self.world.errors,
+                self.world.shows_truth,
             )
             self.ended = sequence.commit(problem.best)
             if not self.ended:
                 self._begin_frame()
                 self.stage.set_body(0, poses[0, 0], places[0, 0])
                 observation = self.stage.pictures(rows)[0]
-        infos["frame"] = min(sequence.frame, self.frames - 1)
+        # the counts are of the frame that the proposal was for
+        infos = self._infos(infos, committed, problem)
         return observation, reward, self.ended, False, infos
+
+    def _infos(
+        self, infos: Infos, committed: Infos, problem: Problem | None = None
+    ) -> Infos:
+        """Return the infos of the only row, completed by the counts of a problem."""
+        problem = problem or self.problem
+        infos["best_cost"] = problem.best_cost
+        infos["evaluations"] = problem.evaluations
+        infos["remaining_steps"] = self.frames * self.evaluations_per_frame - self._done
+        infos["frame"] = min(self._sequence.frame, self.frames - 1)
+        infos["instance"] = self.number
+        return infos | committed
 
     @property
     def instance(self) -> Instance:
@@ -233,7 +252,9 @@ class TrackVectorEnv(SearchVectorEnv):
 
     def reset_infos(self) -> Infos:
         """Return the infos of a reset, by name."""
-        return {"instance": self.numbers.copy(), "frame": self._frames()}
+        infos = infos_before(self.stage, self.world.shows_truth)
+        self._count(infos)
+        return infos | self._committed({})
 
     def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
         """Evaluate a proposal in each environment; a full frame commits its best."""
@@ -244,14 +265,28 @@ class TrackVectorEnv(SearchVectorEnv):
         problems.count(rows, proposals[rows, None], drawn.costs[rows, None])
         self._costs = drawn.costs
         rewards = reward_of_cost(drawn.costs)
-        infos = proposal_infos(self.stage, drawn, self.numbers, self.world.errors)
-        infos["best_cost"] = problems.best_costs.copy()
-        infos["evaluations"] = problems.evaluations.copy()
+        infos = proposal_infos(self.stage, drawn, self.world.shows_truth)
+        self._count(infos)
         full = stepping & (problems.evaluations >= self.evaluations_per_frame)
         terminated, committed = self._commit(np.flatnonzero(full), drawn.pictures)
         infos["frame"] = self._frames()
-        ends = terminated, np.zeros_like(terminated)
-        return self.end_step(stepping, drawn.pictures, rewards, ends, infos, committed)
+        infos |= self._committed(committed)
+        return self.end_step(stepping, drawn.pictures, rewards, terminated, infos)
+
+    def _count(self, infos: Infos) -> None:
+        """Add the counts (n,) of all rows to their infos."""
+        problems = self._problems
+        infos["best_cost"] = problems.best_costs.copy()
+        infos["evaluations"] = problems.evaluations.copy()
+        infos["remaining_steps"] = self.frames * self.evaluations_per_frame - self.steps
+        infos["frame"] = self._frames()
+        infos["instance"] = self.numbers.copy()
+
+    def _committed(self, committed: dict[int, Infos]) -> Infos:
+        """Return the infos (n, ...) of the poses that some rows have committed."""
+        nothing = nothing_committed(self.world)
+        rows = [committed.get(i, nothing) for i in range(self.num_envs)]
+        return {name: np.array([row[name] for row in rows]) for name in nothing}
 
     def _commit(self, rows: Rows, pictures: Image) -> tuple[Flags, dict[int, Infos]]:
         """Commit the best proposals of some environments, and draw their next frames.
@@ -272,7 +307,7 @@ class TrackVectorEnv(SearchVectorEnv):
                 poses[i, 0],
                 places[i, 0],
                 float(self._problems.best_costs[i]),
-                self.world.errors,
+                self.world.shows_truth,
             )
             terminated[i] = sequence.commit(self._problems.best[i])
             if not terminated[i]:
@@ -322,6 +357,19 @@ def _label(
     if not evaluations:
         return f"instance {number}, frame {frame}"
     return f"frame {frame}: cost {cost:.1f}, best {best:.1f}, {evaluations} evaluations"
+
+
+def nothing_committed(world: World) -> Infos:
+    """Return the infos of a step that commits no pose."""
+    infos: Infos = {
+        "committed_frame": -1,
+        "committed_cost": np.inf,
+        "committed_pose": np.zeros(ANGLES),
+    }
+    if world.shows_truth:
+        infos["committed_error_degrees"] = np.inf
+        infos["committed_mpjpe_mm"] = np.inf
+    return infos
 
 
 def committed_infos(

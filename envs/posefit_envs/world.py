@@ -48,6 +48,11 @@ from posefit.silhouette.drawn import uncounted
 
 SPLITS = {"train": TRAINING, "test": HELD_OUT}
 YAWS = ("guessed", "unknown")
+# the people whom the test split shows, numbered as in the CMU database; every kind of
+# built-in motion has a style of one of them, and styles of others
+HELD_OUT_PEOPLE = ("14", "16")
+# largest difference of a person's bones and girths from the average body
+PEOPLE_PERCENT = 10.0
 FPS = 30.0
 # largest difference between the middle of the searched yaw and the truth
 YAW_DEGREES = 20.0
@@ -78,7 +83,7 @@ class World:
     """
 
     motion: tuple[str, ...] = ("walk",)
-    held_out_people: bool = False
+    held_out_people: bool = True
     yaw: str = "guessed"
     instance: int | None = None
     split: str = "train"
@@ -90,6 +95,12 @@ class World:
     noise: tuple[tuple[str, float], ...] = ()
     mismatch_percent: float = 0.0
     errors: bool = True
+    evaluate: bool = False
+
+    @property
+    def shows_truth(self) -> bool:
+        """Whether infos hold the truth: those of the test split only to evaluate."""
+        return self.errors and (self.evaluate or self.split == "train")
 
     @cached_property
     def learned(self) -> Prior:
@@ -98,14 +109,16 @@ class World:
 
     @cached_property
     def training(self) -> tuple[str, ...]:
-        """The training motions: other styles of the built-in motions, or of "walk"."""
+        """The training motions: styles of the built-in motions, or of "walk".
+
+        With held-out people they are the styles of everybody else. Without, they are
+        the other styles than the one that is shown.
+        """
         if self.train:
             return self.train
         if self.held_out_people:
             return tuple(
-                style
-                for kind in self.motion
-                for style in built_in.other_styles(kind)[:-1]
+                style for kind in self.motion for style in styles_of(kind, False)
             )
         names = [
             motion if motion in built_in.names() else "walk" for motion in self.motion
@@ -124,14 +137,29 @@ class World:
     def motion_of(self, number: int) -> str:
         """Return the motion of an instance.
 
-        Several motions take turns, and so do the styles of held-out people.
+        Several motions take turns, and so do the styles of several people.
         """
         turn, which = divmod(number, len(self.motion))
         motion = self.motion[which]
         if not self.held_out_people:
             return motion
-        *others, last = built_in.other_styles(motion)
-        return last if number in HELD_OUT else others[turn % len(others)]
+        styles = styles_of(motion, number in HELD_OUT)
+        return styles[turn % len(styles)]
+
+    def numbered(self, number: object) -> int:
+        """Return the number of an instance of the split as an int.
+
+        Raises:
+            ArgumentError: If there is no such instance, or it is of the other split.
+        """
+        chosen: int = checked(instance_number, number)
+        split = SPLITS[self.split]
+        if chosen not in split:
+            raise ArgumentError(
+                f"instance must lie in {split[0]} to {split[-1]} with "
+                f"split={self.split!r}, got {chosen}"
+            )
+        return chosen
 
     def next_instance(self, rng: np.random.Generator) -> int:
         """Return the number of the next instance: fixed, or drawn from the split."""
@@ -139,6 +167,15 @@ class World:
             return self.instance
         split = SPLITS[self.split]
         return int(rng.integers(split.start, split.stop))
+
+
+def styles_of(kind: str, held_out: bool) -> tuple[str, ...]:
+    """Return the styles of a kind of motion, of held-out people or of all others."""
+    return tuple(
+        style
+        for style in built_in.other_styles(kind)
+        if (built_in.person_of(style) in HELD_OUT_PEOPLE) == held_out
+    )
 
 
 def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
@@ -186,7 +223,7 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     motion = _motions(world.motion, held_out_people)
     number = world.instance
     if number is not None:
-        number = checked(instance_number, number)
+        number = world.numbered(number)
     return replace(
         world,
         motion=motion,
@@ -198,6 +235,7 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
         noise=_strengths(world.noise),
         mismatch_percent=mismatch,
         errors=flag("errors", world.errors),
+        evaluate=flag("evaluate", world.evaluate),
     )
 
 
@@ -238,10 +276,17 @@ def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
         raise ArgumentError(
             f"motion must be a name, several, or 'all', got {quoted(motion)}"
         )
-    known = kinds if held_out_people else built_in.names()
-    if held_out_people or len(names) > 1:
+    if held_out_people:
         for name in names:
-            checked(one_of, "motion", name, known)
+            if name not in kinds:
+                raise ArgumentError(
+                    f"motion must be one of {', '.join(kinds)} with held-out people, "
+                    f"got {quoted(name)}{suggestion(name, kinds)}: "
+                    "held_out_people=False allows others"
+                )
+    elif len(names) > 1:
+        for name in names:
+            checked(one_of, "motion", name, built_in.names())
     return tuple(names)
 
 
@@ -373,6 +418,14 @@ class FirstFrame:
         return getattr(self.cost, name)
 
 
+@lru_cache(maxsize=len(TRAINING))
+def first_truth(world: World, number: int) -> Array:
+    """Return the proposal (d,) nearest to the true first pose of an instance."""
+    truth = FirstFrame(world, number).truth
+    truth.setflags(write=False)
+    return truth
+
+
 def first_problem(world: World, number: int) -> Problem:
     """Return the problem of an instance's first frame."""
     frame = FirstFrame(world, number)
@@ -406,6 +459,8 @@ def instance(
     # for noise, yaw and build only: the instance's number gives motion and views
     rng = generator("scene", number)
     body = body_of(motion)
+    if world.held_out_people:
+        body = varied(body, PEOPLE_PERCENT, generator("person", number))
     facing = float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
     middle[1] = HEIGHT

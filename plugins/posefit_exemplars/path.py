@@ -401,12 +401,13 @@ class HypothesisPath:
             if frame_costs.observation.estimate is not None:
                 evaluations += LIMB_EVALUATIONS
             if frame_costs.alone:
-                *fresh, used = fits.race(
+                raced_poses, raced_places, used = fits.race(
                     fresh,
                     lambda poses, places: self._costs.of_poses(
                         frame_costs, poses, places, noise
                     )[0],
                 )
+                fresh = raced_poses, raced_places
                 evaluations += used + len(fresh[0])
             else:
                 fresh = fits.fresh(fresh)

@@ -63,6 +63,16 @@ def other_styles(name: str) -> tuple[str, ...]:
     return tuple(styles)
 
 
+def person_of(style: str) -> str:
+    """Return the person whose clip a style was fitted to, by the database's number.
+
+    Args:
+        style: such as `walk-a`, not the mean of a kind's styles.
+    """
+    clip: str = _stored()["motions"][style]["source"]
+    return clip.partition("_")[0]
+
+
 @lru_cache(maxsize=1)
 def average_skeleton() -> Skeleton:
     """Return the skeleton of the built-in motions: a symmetric mean of nine people."""

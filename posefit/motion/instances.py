@@ -9,12 +9,13 @@ are held out. The table lists the settings that belong to a number, and its effe
 |---|---|---|---|
 | motion of a sweep, an environment | motion, frames | speed, phase, view | motion |
 | scene of an environment | arguments | noise, guesses of yaw and place, body | scene |
+| person of an environment | held_out_people | bones and girths | person |
 | problem of a suite | function, dimension | person, pose, cameras, box, noise | suite |
 
 So a sweep's instance 17 of "walk" is the motion of an environment's instance 17 of
-"walk", and both differ from instance 17 of a suite's function. Each row has a separate
-random stream, see `generator`: random numbers of one row do not affect another.
-Instance 0 of a motion is the motion itself.
+"walk" without held-out people, and both differ from instance 17 of a suite's function.
+Each row has a separate random stream, see `generator`: random numbers of one row do not
+affect another. Instance 0 of a motion is the motion itself.
 """
 
 from collections.abc import Sequence
@@ -34,9 +35,14 @@ TRAINING = range(10_000)  # instances to learn from and to tune on
 HELD_OUT = range(10_000, 20_000)
 INSTANCES = range(20_000)
 
-Stream = Literal["motion", "scene", "suite"]
+Stream = Literal["motion", "scene", "person", "suite"]
 # part of the seed of every instance: published numbers depend on these values
-RNG_STREAMS: dict[Stream, int] = {"motion": 2013, "scene": 2012, "suite": 2026}
+RNG_STREAMS: dict[Stream, int] = {
+    "motion": 2013,
+    "scene": 2012,
+    "person": 2027,
+    "suite": 2026,
+}
 
 # greatest relative change of a built-in motion's cadence in an instance
 SPEED = 0.15

@@ -18,7 +18,7 @@ from posefit import SynthesisTracker
 from posefit_envs.world import instance
 from tests.cases import each
 
-SEARCHES = tuple(f"posefit/{name}-v0" for name in ("FitImage", "Track", "Race"))
+SEARCHES = tuple(f"posefit/{name}-v1" for name in ("FitImage", "Track", "Race"))
 WORLDS: list[dict[str, Any]] = [
     {},
     {"instance": 17},
@@ -28,7 +28,7 @@ WORLDS: list[dict[str, Any]] = [
         "noise": {"holes": 0.5, "shadow": 0.5},
         "yaw": "unknown",
     },
-    {"motion": ["walk", "jump"], "held_out_people": True, "errors": False},
+    {"motion": ["walk", "walk-a"], "held_out_people": False, "errors": False},
     {
         "translation": "aligned",
         "mismatch_percent": 10.0,
@@ -40,9 +40,9 @@ VARIANTS = [(name, {}) for name in SEARCHES] + list(
     zip(2 * SEARCHES, WORLDS[1:], strict=False)
 )
 SHORT: dict[str, dict[str, Any]] = {
-    "posefit/FitImage-v0": {"max_evaluations": 7},
-    "posefit/Track-v0": {"frames": 3, "evaluations_per_frame": 3},
-    "posefit/Race-v0": {"searches": 3, "generations": [4, 6]},
+    "posefit/FitImage-v1": {"max_evaluations": 7},
+    "posefit/Track-v1": {"frames": 3, "evaluations_per_frame": 3},
+    "posefit/Race-v1": {"searches": 3, "generations": [4, 6]},
 }
 
 
@@ -121,10 +121,10 @@ def test_pictures_are_rgb(name: str) -> None:
 
 
 def test_fit_ends_with_the_budget_and_counts_the_best() -> None:
-    env = gym.make("posefit/FitImage-v0", instance=3, max_evaluations=3)
+    env = gym.make("posefit/FitImage-v1", instance=3, max_evaluations=3)
     env.reset(seed=0)
     ends = [env.step(np.full(9, 0.3 * k, np.float32)) for k in range(3)]
-    assert [end[2:4] for end in ends] == [(False, False), (False, False), (False, True)]
+    assert [end[2:4] for end in ends] == [(False, False), (False, False), (True, False)]
     costs = [end[4]["cost"] for end in ends]
     assert [end[1] for end in ends] == pytest.approx(
         [-math.log(1.0 + cost) for cost in costs]
@@ -133,6 +133,7 @@ def test_fit_ends_with_the_budget_and_counts_the_best() -> None:
         min(costs[: k + 1]) for k in range(3)
     ]
     assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
+    assert [end[4]["remaining_steps"] for end in ends] == [2, 1, 0]
 
 
 class OnePopulation:
@@ -149,7 +150,7 @@ class OnePopulation:
 
 def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
     env: Any = gym.make(
-        "posefit/Track-v0", instance=5, frames=3, evaluations_per_frame=4
+        "posefit/Track-v1", instance=5, frames=3, evaluations_per_frame=4
     ).unwrapped
     env.reset(seed=0)
     populations = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 4, 9))
@@ -183,14 +184,14 @@ def test_numbers_of_numpy_are_taken_as_arguments() -> None:
         "noise": {"holes": 0.5}, "errors": True, "generations": (3, 6), "searches": 2,
     }  # fmt: skip
     first, second = (
-        gym.make("posefit/Race-v0", **more).reset(seed=1) for more in (arguments, plain)
+        gym.make("posefit/Race-v1", **more).reset(seed=1) for more in (arguments, plain)
     )
     assert data_equivalence(first, second)
 
 
 TWO = r"generations must be two whole numbers such as \(100, 220\), got "
 WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
-    "posefit/Track-v0": [
+    "posefit/Track-v1": [
         ({"motion": "wakl"}, "did you mean 'walk'"),
         ({"prior": "pcb"}, "prior must be one of .* did you mean 'pca'"),
         ({"train": ["wakl"]}, "did you mean 'walk'"),
@@ -212,7 +213,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ),
         ({"errors": "no"}, "errors must be true or false, got 'no'"),
     ],
-    "posefit/FitImage-v0": [
+    "posefit/FitImage-v1": [
         ({"max_evaluations": 0}, "max_evaluations must be at least 1, got 0"),
         ({"yaw": "any"}, "yaw must be one of guessed, unknown, got 'any'"),
         ({"motion": []}, r"motion must be a name, several, or 'all', got \[\]"),
@@ -224,7 +225,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ),
         ({"held_out_people": 1}, "held_out_people must be true or false, got 1"),
     ],
-    "posefit/Race-v0": [
+    "posefit/Race-v1": [
         ({"searches": 1}, "searches must be at least 2, got 1"),
         ({"population_size": 1}, "population_size must be at least 2, got 1"),
         (
@@ -268,16 +269,16 @@ def test_unknown_arguments_and_modes_are_named() -> None:
         TypeError,
         match="an unexpected keyword argument: it must be one of motion, .*, got 'nois'; did you mean 'noise'",
     ):
-        gym.make("posefit/Track-v0", nois={"holes": 0.3})
+        gym.make("posefit/Track-v1", nois={"holes": 0.3})
     with pytest.raises(
         TypeError,
         match="one of motion, .*, optimiser, .*, got 'optimizer'; did you mean 'optimiser'",
     ):
-        gym.make("posefit/Race-v0", optimizer="cma")
+        gym.make("posefit/Race-v1", optimizer="cma")
     with pytest.raises(
         error.UnsupportedMode, match="render_mode must be one of rgb_array, got 'ansi'"
     ):
-        gym.make("posefit/Track-v0", render_mode="ansi")
+        gym.make("posefit/Track-v1", render_mode="ansi")
 
 
 @each("name", SEARCHES)

@@ -1,4 +1,4 @@
-"""Race-v0: a step is one generation of the chosen search, and its policies choose what they should."""
+"""Race-v1: a step is one generation of the chosen search, and its policies choose what they should."""
 
 import copy
 import math
@@ -18,7 +18,7 @@ LOG_101 = math.log(101.0)
 
 def made(**arguments: Any) -> Any:
     usual = {"instance": 3, "searches": 4, "generations": (20, 20)}
-    return gym.make("posefit/Race-v0", **{**usual, **arguments}).unwrapped
+    return gym.make("posefit/Race-v1", **{**usual, **arguments}).unwrapped
 
 
 def test_a_step_is_one_generation_of_the_chosen_search() -> None:

@@ -85,11 +85,11 @@ RACE: list[dict[str, Any]] = [
         "optimiser": "cma",
     },
 ]
-CASES = {"posefit/FitImage-v0": FIT, "posefit/Track-v0": TRACK, "posefit/Race-v0": RACE}
+CASES = {"posefit/FitImage-v1": FIT, "posefit/Track-v1": TRACK, "posefit/Race-v1": RACE}
 SHORT: dict[str, dict[str, Any]] = {
-    "posefit/FitImage-v0": {"max_evaluations": 5},
-    "posefit/Track-v0": {"frames": 2, "evaluations_per_frame": 2},
-    "posefit/Race-v0": {"searches": 2, "generations": (2, 6)},
+    "posefit/FitImage-v1": {"max_evaluations": 5},
+    "posefit/Track-v1": {"frames": 2, "evaluations_per_frame": 2},
+    "posefit/Race-v1": {"searches": 2, "generations": (2, 6)},
 }
 
 
@@ -182,7 +182,7 @@ def test_neither_threads_nor_neighbours_change_a_row() -> None:
                 np.testing.assert_array_equal(first, own[:3])
                 np.testing.assert_array_equal(own, other)
     with pytest.raises(error.Error, match="threads must be at least 1, got 0"):
-        gym.make_vec("posefit/FitImage-v0", num_envs=2, threads=0)
+        gym.make_vec("posefit/FitImage-v1", num_envs=2, threads=0)
 
 
 @each("name", CASES)
@@ -213,7 +213,7 @@ def test_a_reset_gives_each_environment_its_instance(name: str) -> None:
     ],
 )
 def test_a_wrong_reset_mask_raises_what_gymnasiums_own_vectors_raise(mask: Any) -> None:
-    name = "posefit/FitImage-v0"
+    name = "posefit/FitImage-v1"
     raised = []
     for vector in (gym.make_vec(name, 3), gym.make_vec(name, 3, "sync")):
         vector.reset(seed=0)
@@ -315,8 +315,8 @@ def test_seeds_may_be_an_array(name: str) -> None:
 @each(
     ("name", "arguments"),
     [
-        ("posefit/FitImage-v0", {"max_evaluations": 3}),
-        ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
+        ("posefit/FitImage-v1", {"max_evaluations": 3}),
+        ("posefit/Track-v1", {"frames": 1, "evaluations_per_frame": 3}),
     ],
 )
 def test_stable_baselines3_gets_the_last_observation_of_an_episode(
@@ -343,8 +343,8 @@ def test_stable_baselines3_gets_the_last_observation_of_an_episode(
 
 
 def test_an_attribute_is_set_as_in_gymnasiums_own_vectors() -> None:
-    vector = gym.make_vec("posefit/Race-v0", num_envs=3)
-    plain = SyncVectorEnv([lambda: gym.make("posefit/Race-v0")] * 3)
+    vector = gym.make_vec("posefit/Race-v1", num_envs=3)
+    plain = SyncVectorEnv([lambda: gym.make("posefit/Race-v1")] * 3)
     for values in ([1, 2, 3], ("a", "b", "c"), [[1], [2], [3]], 7, "abc", None):
         for each_vector in (vector, plain):
             each_vector.set_attr("note", values)
@@ -365,7 +365,7 @@ def test_an_attribute_is_set_as_in_gymnasiums_own_vectors() -> None:
 
 def test_stable_baselines3_chooses_environments_by_indices() -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    vector = gym.make_vec("posefit/Race-v0", num_envs=3, render_mode="rgb_array")
+    vector = gym.make_vec("posefit/Race-v1", num_envs=3, render_mode="rgb_array")
     adapted = to_sb3_vec_env(vector)
     adapted.reset()
     assert adapted.get_attr("world", indices=[0, 2]) == [vector.unwrapped.world] * 2  # type: ignore[attr-defined]
@@ -394,24 +394,20 @@ def test_the_package_is_light_to_import() -> None:
     assert set(dir(posefit_envs)) >= {"__all__"}
 
 
-def test_the_truth_comes_with_a_training_instance_alone() -> None:
-    vector = gym.make_vec("posefit/FitImage-v0", 3, max_evaluations=2)
-    _, infos = vector.reset(seed=0, options={"instance": [5, 10_005, 6]})
-    assert infos["_truth"].tolist() == [True, False, True]
-    assert not infos["truth"][1].any()
-    single = gym.make("posefit/FitImage-v0", max_evaluations=2)
+def test_the_truth_is_the_proposal_nearest_to_the_true_pose() -> None:
+    vector = gym.make_vec("posefit/FitImage-v1", 3, max_evaluations=2)
+    _, infos = vector.reset(seed=0, options={"instance": [5, 7, 6]})
+    single = gym.make("posefit/FitImage-v1", max_evaluations=2)
     np.testing.assert_array_equal(
         single.reset(options={"instance": 6})[1]["truth"], infos["truth"][2]
     )
-    assert "truth" not in single.reset(options={"instance": 10_005})[1]
-    cost = single.unwrapped.step(np.zeros(9))[-1]["cost"]
-    for arguments in ({"errors": False}, {"split": "test"}):
-        assert (
-            "truth" not in gym.make("posefit/FitImage-v0", **arguments).reset(seed=0)[1]
-        )
-    assert (
-        vector.step(np.where(infos["_truth"][:, None], infos["truth"], 0.0))[-1][
-            "cost"
-        ][1]
-        == cost
+    np.testing.assert_array_equal(
+        infos["truth"][1],
+        vector.unwrapped.problems[1].truth,  # type: ignore[attr-defined]
     )
+    truths = infos["truth"].copy()
+    infos["truth"][:] = 0.0  # what a user changes, changes nothing here
+    later = vector.step(truths)[-1]
+    np.testing.assert_array_equal(later["truth"], truths)
+    zero = vector.step(np.zeros((3, 9)))[-1]
+    assert (later["error_degrees"] < zero["error_degrees"]).all()

@@ -12,6 +12,7 @@ import pytest
 from gymnasium import error
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import DictInfoToList
 
 import posefit_envs  # noqa: F401, registers them
 from posefit import minimise
@@ -24,11 +25,11 @@ from posefit_envs.world import first_problem, world_of
 
 MODES = list(AutoresetMode)
 NAMES: dict[str, dict[str, Any]] = {
-    "posefit/FitImage-v0": {"max_evaluations": 3},
-    "posefit/Track-v0": {"frames": 2, "evaluations_per_frame": 2},
-    "posefit/Race-v0": {"searches": 2, "generations": (2, 4)},
+    "posefit/FitImage-v1": {"max_evaluations": 3},
+    "posefit/Track-v1": {"frames": 2, "evaluations_per_frame": 2},
+    "posefit/Race-v1": {"searches": 2, "generations": (2, 4)},
 }
-FIT = "posefit/FitImage-v0"
+FIT = "posefit/FitImage-v1"
 COUNT = 2
 EPISODES = 3
 SEED = 5
@@ -192,7 +193,7 @@ def _policy_of(shape: Any, i: int) -> Callable[[Any, int], Any]:
 
 
 def test_a_rollout_of_episodes_of_several_lengths_keeps_each() -> None:
-    name = "posefit/Race-v0"
+    name = "posefit/Race-v1"
     expected = []
     for i in range(COUNT):
         env = gym.make(name, searches=2, generations=(2, 9))
@@ -284,3 +285,96 @@ def test_an_unknown_argument_is_named_in_the_words_that_libraries_look_for() -> 
     ):
         with pytest.raises(TypeError, match="unexpected keyword argument.*'colour'"):
             make()
+
+
+# what tells of the answer
+TRUTHS = {
+    "truth",
+    "error_degrees",
+    "committed_error_degrees",
+    "committed_mpjpe_mm",
+}
+ENDS = {"final_obs", "final_info"}
+
+
+def rows_of_infos(
+    vector: Any, mode: AutoresetMode, steps: int
+) -> list[list[dict[str, Any]]]:
+    """Return the infos of a reset and of steps of each environment, last ones too."""
+    shown = DictInfoToList(vector)
+    rows = [[info] for info in shown.reset(seed=SEED)[1]]
+    for step in range(steps):
+        shape = vector.single_action_space.shape
+        actions = [action_of(shape, i, step) for i in range(COUNT)]
+        _, _, terminated, truncated, infos = shown.step(np.array(actions))
+        ended = terminated | truncated
+        for i, info in enumerate(infos):
+            rows[i].append({key: info[key] for key in info.keys() - ENDS})
+            if "final_info" in info:
+                rows[i].append(info["final_info"])
+        if mode is AutoresetMode.DISABLED and ended.any():
+            begun = shown.reset(options={"reset_mask": ended})[1]
+            for i in np.flatnonzero(ended).tolist():
+                rows[i].append(begun[i])
+    return rows
+
+
+@pytest.mark.parametrize(("form", "mode", "name"), FORMS, ids=IDS)
+def test_a_reset_and_every_step_have_the_same_infos(
+    form: str, mode: AutoresetMode, name: str
+) -> None:
+    with made(form, mode, name) as vector:
+        for infos in rows_of_infos(vector, mode, 8):
+            assert {frozenset(info) for info in infos} == {frozenset(infos[0])}
+            assert "remaining_steps" in infos[0]
+
+
+@pytest.mark.parametrize(("form", "mode", "name"), FORMS, ids=IDS)
+def test_infos_of_the_test_hold_nothing_of_the_truth_unless_they_evaluate(
+    form: str, mode: AutoresetMode, name: str
+) -> None:
+    with made(form, mode, name) as vector:
+        trained = rows_of_infos(vector, mode, 1)[0][0]
+    with made(form, mode, name, split="test") as vector:
+        for infos in rows_of_infos(vector, mode, 6):
+            assert all(TRUTHS.isdisjoint(info) for info in infos)
+    with made(form, mode, name, split="test", evaluate=True) as vector:
+        evaluated = rows_of_infos(vector, mode, 1)[0][0]
+    assert evaluated.keys() == trained.keys()
+    assert not TRUTHS.isdisjoint(trained)
+
+
+@pytest.mark.parametrize(("form", "mode", "name"), FORMS, ids=IDS)
+def test_the_own_end_terminates_and_a_time_limit_alone_truncates(
+    form: str, mode: AutoresetMode, name: str
+) -> None:
+    arguments: dict[str, Any] = {}
+    if "Race" in name:
+        arguments["generations"] = (3, 3)
+    for limit in (None, 2):
+        with made(form, mode, name, max_episode_steps=limit, **arguments) as vector:
+            _, infos = vector.reset(seed=SEED)
+            left = int(infos["remaining_steps"][0])
+            zeros = np.zeros(vector.action_space.shape)
+            for step in range(1, 1 + (limit or left)):
+                _, _, terminated, truncated, infos = vector.step(zeros)
+                assert terminated.all() == (step == left)
+                assert truncated.all() == (step == limit)
+                if not (terminated | truncated).any():
+                    assert infos["remaining_steps"].tolist() == [left - step] * COUNT
+
+
+# Gymnasium's Async reports an error of its processes in other words
+@pytest.mark.parametrize(("form", "name"), [*product(["native", "sync"], NAMES)])
+def test_a_split_refuses_the_numbers_of_the_other(form: str, name: str) -> None:
+    for split, number, last in (("train", 10_000, 9_999), ("test", 9_999, 19_999)):
+        message = (
+            f"instance must lie in .* to {last} with split='{split}', got {number}"
+        )
+        with (
+            made(form, AutoresetMode.NEXT_STEP, name, split=split) as vector,
+            pytest.raises((error.Error, ValueError), match=message),
+        ):
+            vector.reset(options={"instance": number})
+        with pytest.raises(error.Error, match=message):
+            gym.make(name, split=split, instance=number)

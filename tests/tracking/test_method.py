@@ -167,7 +167,7 @@ def test_a_prior_that_moves_fixed_axes_is_refused_wherever_it_is_used(
         lambda: posefit.track("walk", method="@bad", out=out, **QUICK),
         lambda: posefit.track("walk", method=(SAPSO, learned), **QUICK),
         lambda: posefit.fit(masks_of(scene)[0], method="@bad", height=1.75),
-        lambda: gymnasium.make("posefit/FitImage-v0", prior="bad").reset(seed=0),
+        lambda: gymnasium.make("posefit/FitImage-v1", prior="bad").reset(seed=0),
     ):
         with pytest.raises((BrokenRuleError, gymnasium.error.Error), match=rule):
             refused()
