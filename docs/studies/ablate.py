@@ -119,10 +119,6 @@ MECHANISMS: Mapping[str, Change] = {
     "the beam has all evaluations but a fit": {"tracker.FIT_SHARE": 0.3},
     "the path's costs count as much": {"cost_model.SHARPNESS": 1.0},
     "no smoothing over time": {"smoothing.FILTER_REACH": 0.0},
-    "similar states are not averaged": {
-        "path.SIMILAR_DISTANCE": 1e-6,
-        "path.SIMILAR_YAW": 1e-6,
-    },
     "half as many states": {"proposals.BEAM_STATES": 200},
     "half as many searches everywhere": {"path.SEARCHES_PER_SECOND": 5.0},
     "only the nearest group is searched": {"exemplars.NEAR_GROUPS": 1},

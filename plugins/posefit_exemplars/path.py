@@ -29,7 +29,6 @@ from posefit.fitting.landmarks import (
     usually_exchanged,
 )
 from posefit.fitting.tracker import Observation, Task
-from posefit.geometry.rotation import wrapped
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Beam, diverse_best
 from posefit_exemplars.cost_model import (
@@ -39,7 +38,7 @@ from posefit_exemplars.cost_model import (
     Step,
     yaw_costs,
 )
-from posefit_exemplars.exemplars import Codes, Exemplars, Rows
+from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.fits import FrameFits
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
@@ -59,10 +58,7 @@ from posefit_exemplars.smoothing import Estimate
 FULL_SHARE = 0.6  # share of the path's evaluations for costs at full size
 # The path's evaluations per frame, at least, if several cameras leave less open.
 MIN_PATH_EVALUATIONS = 60.0
-SEARCHES_PER_SECOND = 5.0  # searches everywhere
-# Standard deviations for the mean of the states similar to the likeliest one.
-SIMILAR_DISTANCE = 0.06  # metres, of codes
-SIMILAR_YAW = np.radians(20.0)
+SEARCHES_PER_SECOND = 10.0  # searches everywhere
 
 
 class _PathFrame(NamedTuple):
@@ -122,10 +118,9 @@ class ClipPath:
         for window in markov.windows(self._frames(observations, rng), self._delay):
             states = [frame.states for frame in window]
             row = markov.viterbi_state(states)
-            weights = markov.state_weights(states)
             frame = window[0]
             count = hypotheses.counts(frame.frame_costs).diverse
-            yield self._estimated(frame, row, weights, count)
+            yield self._estimated(frame, row, count)
 
     def _frames(
         self, observations: Iterable[Observation], rng: np.random.Generator
@@ -237,43 +232,24 @@ class ClipPath:
         )
         return full, int((evaluations - full - reserve) / frame_costs.small_share)
 
-    def _estimated(
-        self, frame: _PathFrame, row: int, weights: Array, count: int
-    ) -> Estimate:
-        """Return the estimate of a frame: the mean of the states similar to the path's.
+    def _estimated(self, frame: _PathFrame, row: int, count: int) -> Estimate:
+        """Return the estimate of a frame: the state on the path.
 
         Args:
             frame: The frame.
             row: The state on the path.
-            weights: (n,) the weights of the states.
             count: How many diverse states the estimate gets as alternatives.
 
         """
         beam = frame.beam
         frame_costs = frame.frame_costs
         diverse = beam.rows(diverse_best(self.exemplars, beam, beam.totals, count))
-        codes = self.exemplars.codes[beam.states]
-        squares = state_distances(codes, codes[row], beam.yaws - beam.yaws[row])
-        pose, place = markov.mean_near(
-            row, weights, squares, poses_of(self.exemplars, beam), beam.places
-        )
+        pose = self.exemplars.with_yaws(beam.states[[row]], beam.yaws[[row]])[0]
+        place = beam.places[row]
         if frame_costs.usable:
             place = frame_costs.aligned(pose[None], place[None])[0]
         alternatives = poses_of(self.exemplars, diverse), diverse.places
         return Estimate(pose, place, frame_costs, frame.evaluations, alternatives)
-
-
-def state_distances(codes: Codes, code: Codes, turns: Array) -> Array:
-    """Return the squared distances (n,) of states from one, in standard deviations.
-
-    Args:
-        codes: (n, D) the codes of the states.
-        code: (D,) the code of the one state.
-        turns: (n,) radians, the yaws relative to its yaw.
-
-    """
-    squares = ((codes - code) ** 2).sum(axis=1) / SIMILAR_DISTANCE**2
-    return np.asarray(squares + (wrapped(turns) / SIMILAR_YAW) ** 2)
 
 
 class _FittedFrame(NamedTuple):

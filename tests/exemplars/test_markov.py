@@ -13,7 +13,6 @@ from posefit_exemplars.markov import (
     mean_near,
     state_weights,
 )
-from posefit_exemplars.path import state_distances
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
 from tests.cases import each
 
@@ -74,11 +73,11 @@ def test_a_steady_movement_stays_in_its_order(ahead: int) -> None:
 def test_means_of_yaws_go_the_short_way_round() -> None:
     poses = np.zeros((2, 66))
     places = np.zeros((2, 3))
-    codes = np.zeros((2, 1), dtype=np.float32)
     poses[:, 0] = np.radians([179.0, -179.0])
-    squares = state_distances(codes, codes[0], poses[:, 0] - poses[0, 0])
+    # the other one is a tenth of a standard deviation away
+    squares = np.array([0.0, 0.1**2])
     pose, _ = mean_near(0, np.array([0.5, 0.5]), squares, poses, places)
-    other = np.exp(-0.5 * 0.1**2)  # two degrees away, a tenth of a standard deviation
+    other = np.exp(-0.5 * 0.1**2)
     assert np.degrees(pose[0]) == pytest.approx(179.0 + 2.0 * other / (1.0 + other))
     poses = np.insert(poses, 1, np.pi * np.eye(66)[0], axis=0)
     assert np.cos(
