@@ -460,14 +460,15 @@ def measure(
         for size in ROWS[name].sizes:
             if size < least or (most is not None and size > most):
                 continue
-            figures = known.get((name, size))
-            if figures is None:
+            key = (name, size)
+            if key not in known:
                 for _ in range(1 if compiled else 2):
                     with TemporaryDirectory() as folder:
-                        figures = measured(name, size, Path(folder))
+                        known[key] = measured(name, size, Path(folder))
                 compiled = True
                 with path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(figures) + "\n")
+                    file.write(json.dumps(known[key]) + "\n")
+            figures = known[key]
             click.echo(json.dumps(figures))
             # the next size is about twice as large
             if 2.0 * figures["cpu_seconds"] > seconds:
