@@ -197,7 +197,8 @@ def page() -> str:
         ),
         "## Columns of a sweep's CSV",
         "`posefit report DIR --csv FILE.csv` writes one row per cell. "
-        "`Ledger.frame()` gives the same as a table of pandas, except the last two columns. "
+        "`Ledger.frame()` gives the same as a table of pandas, except the last two "
+        "columns. "
         "The report's page and its data have every figure under the same name.",
         _table("column", [*_described(CELL), *_row_measures(), *_described(SPENT)]),
         "A single search has `instance`, `evaluations`, `seed`, `name` and the last "

@@ -592,7 +592,7 @@ def bent_beyond(true: Motion, angles: Mapping[str, Array]) -> list[float]:
     known = clinical_angles(true.skeleton, true.poses)
     knees = [f"{side}_knee_flexion" for side in SIDES]
     beyond = np.mean([angles[knee] - known[knee] for knee in knees], axis=0)
-    return np.quantile(beyond, (0.5, 0.9)).tolist()
+    return [float(quantile) for quantile in np.quantile(beyond, (0.5, 0.9))]
 
 
 def legs_exchanged(true: Array, joints: Array) -> Array:

@@ -24,7 +24,8 @@ from bodies import SEGMENTS, Shot, cameras_of, person
 from composites_scene import PLACES
 from posefit.cli.output import Command
 from posefit.fitting.shape import NAMES, SPREAD, Shape
-from posefit.footage.source import body_of, scene_of
+from posefit.footage.options import SourceOptions
+from posefit.footage.source import scene_of
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility
 from posefit_reproduce.jobs import each
@@ -57,9 +58,9 @@ def row_of(body: int, views: int, kind: str) -> dict[str, Any]:
             paths.append(Path(folder) / f"{number}.npz")
             fps = np.array(who.motion.fps)
             np.savez_compressed(paths[-1], masks=np.array(masks), fps=fps)
-        scene = scene_of(paths, camera=cameras, height=who.body.stature)
-    average, _, _ = body_of(None, who.body.stature)
-    scene = replace(scene, body=average)
+        options = SourceOptions(camera=cameras, height=who.body.stature)
+        scene = scene_of(paths, options)
+    average = scene.body
     motion = replace(who.motion, skeleton=average.skeleton)
     ones = np.ones(len(NAMES))
     shape: Shape | None = Shape(average, ones, SPREAD, np.inf, who.body.stature)

@@ -30,7 +30,6 @@ from growth import ENVIRONMENT, FPS, film
 from posefit.cli.output import Command
 from table import markdown
 
-NICE = 19
 SAMPLE_SECONDS = 5.0
 START_SHARE = 0.01  # of the time, in which caches fill
 TENTH = 0.1
@@ -189,7 +188,6 @@ def grown(name: str, samples: list[dict[str, float]]) -> Iterator[list[str]]:
 @click.argument("share", type=float)
 def worker(name: str, number: int, seconds: float, share: float) -> None:
     """Do one kind of work for a share of the time, and print samples."""
-    os.nice(NICE)
     process = psutil.Process()
     start = time.perf_counter()
     sampled = -SAMPLE_SECONDS

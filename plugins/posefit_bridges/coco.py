@@ -82,13 +82,13 @@ def add_to_cocopp() -> None:
             self.instantiate_attributes(target_values)
 
         def info(self, fun_number: int | None = None) -> str | None:
-            """Return a function's number and name, or what the suite is."""
+            """Return a function's number and name, or the suite's description."""
             if fun_number is None:
                 return self.__doc__
             return f"F{fun_number} {self.short_names[fun_number]}"
 
         def filter(self, dsl: Any) -> Any:
-            """Return the data as they are: nothing is joined with other suites."""
+            """Return the unchanged data, which are not joined with other suites."""
             return dsl
 
     standard = dict.fromkeys(HELD_OUT[:STANDARD_INSTANCES], 1)

@@ -130,7 +130,7 @@ class Bounds(NamedTuple):
     scale: float  # cost of a unit of squared distance
     least: float  # no step has a lower total
     limit: float  # steps with totals at or above it are left out
-    count: int  # how many states of least totals are wanted
+    wanted: int  # how many states of least totals are wanted, at least
 
 
 @inlined
@@ -208,7 +208,7 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
                     bins[bin_of(total, bounds.least, width)] += 1
                     best[place] = total
                     parents[place] = row
-        bound = bound_of(bins, bounds.least, width, bounds.count, bound)
+        bound = bound_of(bins, bounds.least, width, bounds.wanted, bound)
     places = reached[:count]
     wanted = places[best[places] <= bound]
     steps = tiles.states[wanted], parents[wanted], best[wanted]

@@ -114,7 +114,7 @@ class Flagged(NamedTuple):
     """The frames that are called lost, or whose sides are called unknown."""
 
     frames: NDArray[np.bool_]  # (T,)
-    count: int  # of the frames that it is known of
+    known: int  # the number of frames that it is known of
 
 
 def flagged(table: Table, name: str) -> Flagged | None:
@@ -140,7 +140,7 @@ def flagged(table: Table, name: str) -> Flagged | None:
 def flagged_share(table: Table, name: str) -> float | None:
     """Return the share of the frames that `flagged` returns, None if it is unknown."""
     frames = flagged(table, name)
-    return None if frames is None else float(frames.frames.sum()) / frames.count
+    return None if frames is None else float(frames.frames.sum()) / frames.known
 
 
 def evaluated(

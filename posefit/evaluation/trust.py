@@ -125,7 +125,7 @@ def stance_spread(joints: Array, in_stance: NDArray[np.bool_]) -> float | None:
 
     Args:
         joints: The joints (T, 27, 3) in metres; y is up.
-        in_stance: Whether each foot stands (T, 2).
+        in_stance: Whether each foot is on the ground (T, 2).
 
     Returns:
         The spread, or None if there are fewer than two stances.

@@ -140,7 +140,7 @@ def undetermined(track: Content) -> str:
     for name, verb in words.items():
         frames = flagged(track.table, name)
         if frames is not None and frames.frames.any():
-            parts.append(f"{verb} {frames.frames.sum()} of {frames.count}")
+            parts.append(f"{verb} {frames.frames.sum()} of {frames.known}")
     if not parts:
         return ""
     return f"{', '.join(parts)} frames that show enough of the person"

@@ -1,6 +1,7 @@
 """Masks from elsewhere: what their values mean and which person is followed; images that may be hostile."""
 
 import json
+import pickle
 import struct
 import zlib
 from collections.abc import Sequence
@@ -712,3 +713,20 @@ def test_logits_are_cut_at_zero_however_high_they_go(
     logits = lowest + (highest - lowest) * soft
     np.save(tmp_path / "a.npy", logits)
     check(tmp_path / "a.npy", list(logits > 0.0))
+
+
+def test_masks_of_a_long_film_are_the_same_in_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    masks = np.zeros((5, 20, 30), dtype=bool)
+    masks[:, 5:15, 10:18] = True
+    masks[2, :4] = True
+    np.save(tmp_path / "a.npy", masks)
+    short = read_masks(tmp_path / "a.npy", ALL)
+    monkeypatch.setattr("posefit.footage.views.PLANES_BYTES", 0)
+    long = read_masks(tmp_path / "a.npy", ALL)
+    assert isinstance(long.bits, np.memmap)
+    np.testing.assert_array_equal(long.bits, short.bits)
+    np.testing.assert_array_equal(long.usable, short.usable)
+    again = pickle.loads(pickle.dumps(long))
+    np.testing.assert_array_equal(again.bits, short.bits)

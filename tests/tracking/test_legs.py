@@ -118,6 +118,39 @@ def test_only_stretches_that_may_cost_less_are_in_doubt() -> None:
     assert in_doubt([4, 6, 10], 1, costs, added, every) == ([4, 6], True)
 
 
+def test_stretches_in_doubt_are_those_of_trying_all_pairs_of_edges() -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        frames = int(rng.integers(8, 60))
+        count = int(rng.integers(0, 8))
+        edges = np.sort(rng.choice(np.arange(1, frames), count, replace=False)).tolist()
+        reach = int(rng.integers(1, 5))
+        # whole numbers, so that no sum is rounded; the median is 10
+        costs = rng.choice([10.0, 10.0, 10.0, 16.0, 20.0], frames)
+        added = rng.integers(-1, 4, frames).astype(float)
+        usable = rng.random(frames) < 0.8
+        usable[:2] = True
+        costs[usable.nonzero()[0][::2]] = 10.0
+        costs = np.where(usable, costs, 0.0)
+        high = np.where(usable & (costs > 13.0), costs - 10.0, 0.0)
+        ends = [0, *edges, frames]
+        near = [np.zeros(frames, dtype=bool) for _ in ends]
+        for edge, rows in zip(edges, near[1:-1], strict=True):
+            rows[max(edge - reach, 0) : edge + reach] = True
+        kept = set[int]()
+        pairs = [
+            (start, stop)
+            for start, stop in product(range(len(ends)), repeat=2)
+            if start < stop
+            and added[ends[start] : ends[stop]].sum()
+            < high[near[start] | near[stop]].sum()
+        ]
+        for pair in pairs:
+            kept |= {ends[k] for k in pair}
+        expected = [edge for edge in edges if edge in kept], bool(pairs)
+        assert in_doubt(edges, reach, costs, added, usable) == expected
+
+
 def test_landmarks_say_which_leg_is_the_left_one(
     film: tuple[Scene, list[Frame]],
 ) -> None:

@@ -41,11 +41,17 @@ Box = tuple[int, int, int, int]  # left, top, width and height in a camera's pix
 
 
 class Strip:
-    """Pictures of every frame, or of every second, fourth, ... to limit their size."""
+    """Pictures of every frame, or of every second, fourth, ... to limit their size.
 
-    def __init__(self, room: int, every: int) -> None:
+    Args:
+        room: The most characters of all pictures.
+        step: Which of the frames it gets: every `step`-th one.
+    """
+
+    def __init__(self, room: int, step: int) -> None:
         self.pictures: list[tuple[Any, ...]] = []  # a box and its pictures
-        self.every = every
+        self.every = step  # of the frames, kept pictures show each `every`-th
+        self._step = step
         self._room = room
         self._count = 0
 
@@ -61,7 +67,7 @@ class Strip:
             while len(self.pictures) > 1 and self._size() > self._room:
                 self.pictures = self.pictures[::2]
                 self.every *= 2
-        self._count += 1
+        self._count += self._step
 
     def _size(self) -> int:
         """Return the characters of all pictures."""
@@ -86,6 +92,7 @@ class Stills:
         self._body = scene.body
         self._cameras = scene.cameras
         self._wanted = -(-scene.count // self.step)
+        self._count = 0
         self._fineness: Fineness | None = None  # unknown before the first frame
         self._film: Strip | None = None
         if scene.pictures is not None:
@@ -95,6 +102,11 @@ class Stills:
 
     def add(self, frame: Frame, observation: Observation, filmed: Image | None) -> None:
         """Take the next frame."""
+        number = self._count
+        self._count += 1
+        # to find the person in the other frames of a long film would take minutes
+        if number % self.step:
+            return
         masks = [silhouette.mask for silhouette in observation.silhouettes]
         boxes = []
         for mask, camera in zip(masks, self._cameras, strict=True):
