@@ -47,13 +47,9 @@ def render_frame(
         body = np.zeros_like(mask)
         if proposed is not None:
             body = project(cost.body, camera, *proposed)
-        panels.append(
-            OVERLAP[
-                panel_of(
-                    mask.view(np.uint8) + 2 * body.view(np.uint8), HEIGHT, sharp=True
-                )
-            ]
-        )
+        # 0 for neither, 1 for the mask, 2 for the body, 3 for both
+        overlap = mask.view(np.uint8) + 2 * body.view(np.uint8)
+        panels.append(OVERLAP[panel_of(overlap, HEIGHT, sharp=True), 0])
     if proposed is not None:
         panels.append(side_view(cost.body, cost.cameras[0], *proposed, HEIGHT))
     else:

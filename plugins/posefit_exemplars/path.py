@@ -59,7 +59,7 @@ from posefit_exemplars.smoothing import Estimate
 FULL_SHARE = 0.6  # share of the path's evaluations for costs at full size
 # The path's evaluations per frame, at least, if several cameras leave less open.
 MIN_PATH_EVALUATIONS = 60.0
-SEARCHES_PER_SECOND = 10.0  # searches everywhere
+SEARCHES_PER_SECOND = 5.0  # searches everywhere
 # Standard deviations for the mean of the states similar to the likeliest one.
 SIMILAR_DISTANCE = 0.06  # metres, of codes
 SIMILAR_YAW = np.radians(20.0)

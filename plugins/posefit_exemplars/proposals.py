@@ -35,7 +35,6 @@ from posefit_exemplars.smoothing import Estimate
 BEAM_STATES = 400  # states that a frame keeps
 # Each candidate is also tried with this turn away from its clip, to either side.
 CANDIDATE_TURN = np.radians(7.0)
-YAW_SHARES = 4  # candidates in one yaw bin: at most 1 / YAW_SHARES of all
 # Share of the proposed states for where clips continue. The others are for a search
 # everywhere.
 CONTINUED_SHARE = 0.25
@@ -77,9 +76,8 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
         exemplars.near_groups(steps.codes),
     )
     least = beam.totals.min()
-    share = max(count // YAW_SHARES, 1)
     scale = 1.0 / (2.0 * steps.step.pose**2)
-    bounds = kernels.Bounds(scale, least, least + JUMP_COST, share)
+    bounds = kernels.Bounds(scale, least, least + JUMP_COST, count)
     places = len(exemplars.tiles.states)
     room = kernels.Room(
         np.full(places, np.inf),
@@ -91,11 +89,9 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
         rows = cheapest_first[bins[cheapest_first] == number]
-        states, parents, totals = kernels.cheapest_steps(
-            sources, rows, exemplars.tiles, room, bounds
+        by_bin.append(
+            kernels.cheapest_steps(sources, rows, exemplars.tiles, room, bounds)
         )
-        best = np.argsort(totals, kind="stable")[:share]
-        by_bin.append((states[best], parents[best], totals[best]))
     states, parents, totals = (
         np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True)
     )
