@@ -3,8 +3,8 @@
 #
 # The file has a table for each camera, cam_0, cam_1, ... cam_11. They are read in the order of their names as text:
 # cam_10 and cam_11 come after cam_1. Up to ten cameras keep their order. `project` and `triangulate` go by the number of
-# the camera, so that pixels of the twelve cameras that were written are taken for those of other cameras, here up to 56 pixels away. The names in
-# the tables are right: put the cameras in order by `get_name()`.
+# the camera, so that pixels of the twelve cameras that were written are taken for those of other cameras, here up to 56
+# pixels away. The names in the tables are right: put the cameras in order by `get_name()`.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu
