@@ -2,9 +2,9 @@
 # aniposelib 0.8.0: CameraGroup.load changes the order of more than ten cameras that CameraGroup.dump wrote.
 #
 # The file has a table for each camera, cam_0, cam_1, ... cam_11. They are read in the order of their names as text:
-# cam_10 and cam_11 come after cam_1. Up to ten cameras keep their order. `triangulate` takes an array by the number of
-# the camera, so that points of twelve cameras, of which the file was written, come out elsewhere: here 0.8 m off, of
-# exact points. The names in the tables are right, so that cameras can be put in order by `get_name()`.
+# cam_10 and cam_11 come after cam_1. Up to ten cameras keep their order. `project` and `triangulate` go by the number of
+# the camera, so that pixels of the twelve cameras that were written are taken for those of other cameras, here up to 56
+# pixels away. The names in the tables are right: put the cameras in order by `get_name()`.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu
@@ -46,11 +46,11 @@ for count in (10, 12):
     written = group_of(count)
     written.dump("cameras.toml")
     read = CameraGroup.load("cameras.toml")
-    pixels = written.project(point).reshape(count, 1, 2)
     names = [camera.get_name() for camera in read.cameras]
-    off[count] = float(np.linalg.norm(read.triangulate(pixels) - point))
-    print(count, names, f"off by {off[count]:.2f} m")
+    apart = read.project(point).reshape(count, 2) - written.project(point).reshape(count, 2)
+    off[count] = float(np.linalg.norm(apart, axis=1).max())
+    print(count, names, f"up to {off[count]:.0f} pixels off")
 unchanged = names[1:4] == ["view1", "view10", "view11"]
-unchanged = unchanged and off[10] < 1e-6 and 0.7 < off[12] < 0.9
+unchanged = unchanged and off[10] < 1e-6 and 50.0 < off[12] < 60.0
 raise SystemExit(not unchanged)
 PYTHON

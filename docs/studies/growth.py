@@ -18,6 +18,7 @@ the benchmark's problem with one number changed, in the fastest run on one threa
 import json
 import os
 import resource
+import select
 import subprocess
 import sys
 import time
@@ -113,13 +114,14 @@ def track_stream(frames: int, folder: Path) -> None:
     feeder = [sys.executable, __file__, "feed", str(frames)]
     words = ["track", "--live", "-", "--evaluations", str(CHEAP["evaluations"])]
     words += ["--fps", f"{STREAM_FPS:g}", "--out", str(folder / "live")]
+    from posefit.cli import main as posefit_main
+
     with subprocess.Popen(feeder, stdout=subprocess.PIPE) as fed:
         assert fed.stdout is not None
+        # a stream that has no frame for some seconds counts as broken
+        select.select([fed.stdout], [], [])
         os.dup2(fed.stdout.fileno(), 0)
-        from posefit.cli import main as posefit_main
-
-        with suppress(SystemExit):
-            posefit_main(words)
+        posefit_main(words, standalone_mode=False)
 
 
 def track_known(

@@ -1,30 +1,95 @@
-"""The table of a report's runs, and the contest of the methods that share some."""
+"""The table of a report's runs, the protocol of their kind, and their contest."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import printable
+from posefit.report.columns import Column, Score
 from posefit.settings import settings_text
 from posefit.statistics.paired import PairedTest, paired_tests
 from posefit.statistics.pairing import Shared
 
-if TYPE_CHECKING:
-    from posefit.report.searches import Searches
-    from posefit.report.tracks import Tracks
-
-# The two classes have the same attributes and methods: a kind's figures, names, texts
-# and page.
-Kind: TypeAlias = "Tracks | Searches"
-
 Place = Mapping[str, Any]  # the fields of a plan that define an instance
 Row = Mapping[str, Any]
+
+
+class Kind(Protocol):
+    """A kind of runs, tracks or single searches: its figures, names and texts.
+
+    Attributes:
+        name: The kind's name, in the singular.
+        noun: Its runs, in the plural.
+        title: The title of the page.
+        columns: Its figures by name.
+        score: The figure that orders the methods.
+        named: The fields that an instance's name contains.
+        data: The names of a row's other data.
+        baselines: The label of each baseline by name.
+    """
+
+    name: str
+    noun: str
+    title: str
+    columns: Mapping[str, Column]
+    score: Score
+    named: tuple[str, ...]
+    data: tuple[str, ...]
+    baselines: Mapping[str, str]
+
+    def read(
+        self, row: Row, shared: dict[bytes, Any], /
+    ) -> tuple[Array, tuple[Any, ...]]:
+        """Return the figures of a row and its other data.
+
+        `shared` holds arrays that many rows have in common, to save memory.
+        """
+        ...
+
+    def rank(self, place: Place) -> tuple[Any, ...]:
+        """Return the key by which instances are sorted."""
+        ...
+
+    def place_name(self, place: Place) -> str:
+        """Return an instance's name."""
+        ...
+
+    def facts(self, runs: "Runs") -> dict[str, Any]:
+        """Return the facts about the runs by their titles."""
+        ...
+
+    def tested_errors(self, contest: "Contest") -> Array:
+        """Return the errors (methods, blocks, 1) for tests. Lower is better."""
+        ...
+
+    def board(self, contest: "Contest") -> dict[int, dict[str, Any]]:
+        """Return the entries of each method's leaderboard row besides averages."""
+        ...
+
+    def baseline_rows(self, contest: "Contest") -> list[dict[str, Any]]:
+        """Return the baselines' rows, on the same runs as the methods."""
+        ...
+
+    def place_words(self, contest: "Contest") -> str:
+        """Return the instances of a contest in words."""
+        ...
+
+    def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
+        """Return sentences that compare the best baseline with the first method.
+
+        The rows of both are given.
+        """
+        ...
+
+    def page(self, runs: "Runs", contest: "Contest | None", /) -> dict[str, Any]:
+        """Return the data that only pages of this kind have, with their `sections`."""
+        ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
