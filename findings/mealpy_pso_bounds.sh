@@ -11,10 +11,7 @@ set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "${PYTHON:-python3}" -m venv "$folder/venv"
-# without their dependencies, as they ask for a NumPy before 2
-"$folder/venv/bin/python" -m pip install --quiet --no-deps mealpy==3.0.3 opfunu==1.0.4
-"$folder/venv/bin/python" -m pip install --quiet numpy==2.4.6 scipy==1.17.1 pandas==3.1.1 matplotlib==3.11.2 \
-    requests==2.34.2 pillow==13.0.0
+"$folder/venv/bin/python" -m pip install --quiet mealpy==3.0.3 opfunu==1.0.4 numpy==1.26.0
 cd "$folder"
 venv/bin/python -W ignore - <<'PYTHON'
 from importlib.metadata import version
