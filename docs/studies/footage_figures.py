@@ -174,7 +174,9 @@ def filmed_scene(
     start, stop = span(recording.frames if frames == (None, None) else frames, count)
     if frames == (None, None):
         stop = min(stop, start + FRAMES_OF_THE_PAPER)
-    camera = () if recording.calibration is None else (recording.calibration,)
+    camera: Any = ()
+    if recording.calibration is not None:
+        camera = (recording.calibration,)
     scene = scene_of(
         [recording.film],
         SourceOptions(
