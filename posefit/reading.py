@@ -140,8 +140,7 @@ def parsed_toml(text: str) -> dict[str, Any]:
         weight += dots * dots
         if dots > DOTS or weight > NESTING:
             raise InputError(
-                "expected keys that are not nested so deeply, "
-                f"got {dots} dots in line {number}"
+                f"expected less deeply nested keys, got {dots} dots in line {number}"
             )
     try:
         return tomllib.loads(text)

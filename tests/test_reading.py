@@ -64,7 +64,7 @@ def test_a_text_that_is_too_large_or_no_utf_8_is_named(tmp_path):
     ],
 )
 def test_keys_of_very_many_parts_and_brackets_without_end_are_refused(parse, text):
-    with pytest.raises(ValueError, match="not nested so deeply"):
+    with pytest.raises(ValueError, match="less deeply nested"):
         parse(text)
 
 

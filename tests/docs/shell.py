@@ -58,10 +58,9 @@ def check(words: list[str]) -> None:
         path = ROOT / words[1]
         assert path.is_file(), f"no file {words[1]}"
         if path.parent.name == "studies":
+            command, _ = _innermost(import_module(path.stem).main, words[2:])
             options = {
-                option
-                for parameter in import_module(path.stem).main.params
-                for option in parameter.opts
+                option for parameter in command.params for option in parameter.opts
             }
             assert {word for word in words if word.startswith("--")} <= options, (
                 f"an option that {path.name} lacks"
@@ -74,13 +73,21 @@ def check(words: list[str]) -> None:
 
 
 def _check_posefit(command: click.Command, words: list[str]) -> None:
+    command, rest = _innermost(command, words)
+    command.make_context(command.name, rest)
+
+
+def _innermost(
+    command: click.Command, words: list[str]
+) -> tuple[click.Command, list[str]]:
+    """Return the command of a group that words name, and the words after its name."""
     context = click.Context(command, info_name=command.name)
     while isinstance(command, click.Group) and words and not words[0].startswith("-"):
         inner = command.get_command(context, words[0])
-        assert inner is not None, f"posefit has no command {words[0]}"
+        assert inner is not None, f"{command.name} has no command {words[0]}"
         command = inner
         words = words[1:]
-    command.make_context(command.name, list(words))
+    return command, list(words)
 
 
 def _check_extras(words: list[str]) -> None:

@@ -201,7 +201,7 @@ def test_a_run_without_a_budget_or_beyond_it_is_no_run() -> None:
     problem = posefit.suite(function=1, instance=10_000)
     problem(np.zeros((3, 9)))
     for budget, reason in (
-        (None, "budget must be known"),
+        (None, "budget must be given"),
         (2, "evaluations must be at most 2, the budget, got 3"),
     ):
         with pytest.raises(InputError, match=reason):
