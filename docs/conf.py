@@ -20,7 +20,7 @@ release = version = posefit.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
 # the last are parts of pages
-exclude_patterns = ["_build", "contributions", "generated/*.md"]
+exclude_patterns = ["_build", "contributions"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3

@@ -3,8 +3,8 @@
 They are settings, figures, equations, commands, environments, messages and modules.
 `python docs/generator` writes them, and so does docs/conf.py before every build. Parts
 of pages in the repository are between `<!-- from the code: NAME -->` and
-`<!-- end -->`; tests/docs compares them with the code. Whole pages go to
-docs/generated, which is not in the repository.
+`<!-- end -->`; tests/docs compares them with the code. Pages of modules and
+environments go to docs/generated, which is not in the repository.
 """
 
 import re
@@ -24,21 +24,27 @@ from generator import (
 )
 
 DOCS = Path(__file__).parents[1]
+# the parts of each page, by their names
 PARTS = {
-    "background/equations.md": equations.page,
-    "howto/measuring.md": angles.page,
-    "reference/joints.md": joints.page,
-    "reference/settings.md": settings.tracker,
+    "background/equations.md": {"equations": equations.page},
+    "howto/measuring.md": {"angles": angles.page},
+    "reference/commands.md": {"commands": commands.page},
+    "reference/figures.md": {"figures": figures.page},
+    "reference/joints.md": {"joints": joints.page},
+    "reference/messages.md": {"messages": messages.page},
+    "reference/settings.md": {"settings": settings.tracker, "methods": settings.page},
 }
-_PART = re.compile(r"(<!-- from the code: \w+ -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def pages() -> dict[str, str]:
     """Return the text of every page in the repository with a part from the code."""
-    return {
-        name: _with_part((DOCS / name).read_text("utf-8"), make())
-        for name, make in PARTS.items()
-    }
+    texts = {}
+    for name, parts in PARTS.items():
+        text = (DOCS / name).read_text("utf-8")
+        for part, make in parts.items():
+            text = _with_part(text, part, make())
+        texts[name] = text
+    return texts
 
 
 def write() -> None:
@@ -46,10 +52,6 @@ def write() -> None:
     shutil.rmtree(DOCS / "generated", ignore_errors=True)
     for name, text in {
         **pages(),
-        "generated/commands.md": commands.page(),
-        "generated/figures.md": figures.page(),
-        "generated/messages.md": messages.page(),
-        "generated/settings.md": settings.page(),
         **{
             f"generated/python/{name}.rst": text
             for name, text in python.pages().items()
@@ -64,5 +66,11 @@ def write() -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _with_part(page: str, part: str) -> str:
-    return _PART.sub(lambda match: f"{match[1]}\n{part}\n{match[2]}", page)
+def _with_part(page: str, name: str, part: str) -> str:
+    pattern = f"(<!-- from the code: {name} -->\n).*?(<!-- end -->)"
+    return re.sub(
+        pattern,
+        lambda match: f"{match[1]}\n{part}\n{match[2]}",
+        page,
+        flags=re.DOTALL,
+    )

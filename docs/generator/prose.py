@@ -53,6 +53,9 @@ def _block(block: list[str]) -> list[str]:
         and block[0].rstrip().endswith(":")
         and block[1].startswith("    ")
     ):
+        # an example is code, although its lines may have colons
+        if block[1].lstrip().startswith(">>>"):
+            return [*_block(block[:1]), "", "::", "", *block[1:]]
         return [*_block(block[:1]), "", *_entries(block[1:])]
     heading = re.fullmatch(r"#+ (.*)", block[0])
     if heading:

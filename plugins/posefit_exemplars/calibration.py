@@ -67,7 +67,7 @@ def none_features(log: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration:
+class PosteriorCalibration:
     """The fitted corrections that calibrate the intervals and modes of a frame."""
 
     slopes: Array  # (4,) of the logarithm of the expected error, over `evidence`
@@ -98,7 +98,7 @@ class Calibration:
 
 
 @cache
-def stored_calibration() -> Calibration:
+def stored_calibration() -> PosteriorCalibration:
     """Return the calibration that `docs/studies/posterior.py` fitted to library people.
 
     These are the people of the clips in the motion library.
@@ -111,7 +111,7 @@ def stored_calibration() -> Calibration:
     # the tracker has the temperature as a constant
     stored.pop("temperature")
     arrays = {name: np.array(values) for name, values in stored.items()}
-    return Calibration(range=(low, high), sharpness=sharpness, **arrays)
+    return PosteriorCalibration(range=(low, high), sharpness=sharpness, **arrays)
 
 
 def recalibrated(

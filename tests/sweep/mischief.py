@@ -296,6 +296,22 @@ def engine_of(name: str, workers: int) -> Iterator[Engine]:
         yield Cluster(address, LIMITS, run_cell, 300.0)
 
 
+class Apart:
+    """An engine for which each misbehaving optimiser is a package by itself.
+
+    Cells of one package share processes, so the first kinds would keep the others from misbehaving.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self.window = engine.window
+        self.wait = engine.wait
+        self.close = engine.close
+
+    def submit(self, cell: Cell, tenant: str = "") -> None:
+        self._engine.submit(cell, f"{tenant} {cell.method}" if tenant else "")
+
+
 def left(noted: Path) -> list[int]:
     """Return the processes that were noted and have not ended within some seconds."""
     numbers = noted.read_text().split() if noted.exists() else []
@@ -327,7 +343,7 @@ def run(folder: Path, engine: str, count: int, workers: int) -> dict[str, Any]:
         mixed.append(cell)
         mixed += bad[k * len(bad) // count : (k + 1) * len(bad) // count]
     with engine_of(engine, workers) as started, closing(started):
-        tally = swept(folder / "results", mixed, started)
+        tally = swept(folder / "results", mixed, Apart(started))
     rows = {row["key"]: row for row in rows_in(folder / "results")}
     quarantined = {row["key"]: row for row in quarantined_in(folder / "results")}
     changed = []
