@@ -31,7 +31,7 @@ from posefit.sweep.check import cell_of
 from posefit.uncertainty.calibration import LEVELS, Recalibration
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of, poses_apart
-from posefit_exemplars.calibration import Calibration, evidence, none_features
+from posefit_exemplars.calibration import PosteriorCalibration, evidence, none_features
 from posefit_exemplars.tracker import POSTERIOR_TEMPERATURE
 from posefit_reproduce.jobs import each
 from table import WORKERS, bar, markdown, percent
@@ -232,7 +232,7 @@ class TrackFeatures:
         )
 
 
-def calibration_of(tracks: Sequence[TrackFeatures]) -> Calibration:
+def calibration_of(tracks: Sequence[TrackFeatures]) -> PosteriorCalibration:
     """Return the calibration of the intervals and the weights of modes of tracks."""
     calibration = _expected_error(tracks)
     joints, angles = _spreads(calibration, tracks)
@@ -280,7 +280,7 @@ def _rounded(values: Any) -> Any:
     return float(f"{float(values):.4g}")
 
 
-def _none(calibration: Calibration, tracks: Sequence[TrackFeatures]) -> Array:
+def _none(calibration: PosteriorCalibration, tracks: Sequence[TrackFeatures]) -> Array:
     """Return the coefficients (3,) of the log-odds that no mode is right.
 
     No mode is right if the truth is far from the nearest one.
@@ -312,7 +312,7 @@ def frame_weights(tracks: Sequence[TrackFeatures]) -> Array:
     return np.asarray(np.concatenate(weights) / len(frames))
 
 
-def _expected_error(tracks: Sequence[TrackFeatures]) -> Calibration:
+def _expected_error(tracks: Sequence[TrackFeatures]) -> PosteriorCalibration:
     """Return a fit of the error's logarithm to evidence, by weighted least squares."""
     signs, errors = (
         np.concatenate([getattr(track, name) for track in tracks])
@@ -330,13 +330,13 @@ def _expected_error(tracks: Sequence[TrackFeatures]) -> Calibration:
         plain.joint_factors,
         plain.angle_factors,
     )
-    return Calibration(
+    return PosteriorCalibration(
         slopes, (float(low), float(high)), *corrections, 1.0, np.zeros(3)
     )
 
 
 def _spreads(
-    calibration: Calibration, tracks: Sequence[TrackFeatures]
+    calibration: PosteriorCalibration, tracks: Sequence[TrackFeatures]
 ) -> tuple[Array, Array]:
     """Return the likeliest spreads of joints (27,) and angles (66,).
 
@@ -380,7 +380,7 @@ def _spreads(
 
 
 def _factors(
-    calibration: Calibration, tracks: Sequence[TrackFeatures]
+    calibration: PosteriorCalibration, tracks: Sequence[TrackFeatures]
 ) -> tuple[Array, Array]:
     """Return the conformal factors of joints (levels, 27) and angles (levels, 66).
 
@@ -442,7 +442,7 @@ def conformal_factor(scores: Sequence[Array], level: float) -> float:
 
 
 def scores(
-    calibration: Calibration, features: TrackFeatures, every: int = 1
+    calibration: PosteriorCalibration, features: TrackFeatures, every: int = 1
 ) -> tuple[Array, Array]:
     """Return the errors of joints (T, levels, 27) and angles (T, levels, 66).
 
@@ -457,7 +457,7 @@ def scores(
 
 
 def radii_of(
-    calibration: Calibration, features: TrackFeatures, every: int = 1
+    calibration: PosteriorCalibration, features: TrackFeatures, every: int = 1
 ) -> tuple[Array, Array]:
     """Return joints' radii (T, levels, 27), angles' half intervals (T, levels, 66)."""
     joints = []
@@ -526,7 +526,7 @@ class Evaluation:
     turned: Array = field(repr=False)  # (levels,) share of angles that are inside
 
 
-def evaluated(calibration: Calibration, features: TrackFeatures) -> Evaluation:
+def evaluated(calibration: PosteriorCalibration, features: TrackFeatures) -> Evaluation:
     none = np.array(
         [
             calibration.recalibration(calibration.log(signs)).none
