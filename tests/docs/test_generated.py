@@ -10,7 +10,6 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-import generator
 import pytest
 from generator import angles, figures, messages, settings
 from generator.prose import restructured
