@@ -25,5 +25,6 @@ def test_the_example_of_a_manual_page_runs(name: str) -> None:
         result = doctest.testmod(import_module(name))
     except ModuleNotFoundError as error:
         pytest.skip(f"without {error.name}")
-    assert result.attempted >= 3
+    # Python counts skipped lines as attempted from 3.13 on
+    assert PAGES[name].count(">>> ") >= 3
     assert result.failed == 0
