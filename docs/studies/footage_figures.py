@@ -174,9 +174,7 @@ def filmed_scene(
     start, stop = span(recording.frames if frames == (None, None) else frames, count)
     if frames == (None, None):
         stop = min(stop, start + FRAMES_OF_THE_PAPER)
-    camera: Any = ()
-    if recording.calibration is not None:
-        camera = (recording.calibration,)
+    camera = () if recording.calibration is None else (recording.calibration,)
     scene = scene_of(
         [recording.film],
         SourceOptions(

@@ -11,6 +11,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Iterable, Mapping
+from datetime import datetime
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
@@ -236,17 +237,18 @@ WRITERS = {"motions": write_motions, "suite": write_suite}
 @click.option(
     "--date",
     required=True,
+    type=click.DateTime(["%Y-%m-%d"]),
     metavar="YYYY-MM-DD",
     help="When the data sets are published.",
 )
-def main(out: str, date: str) -> None:
+def main(out: str, date: datetime) -> None:
     """Write the data sets with their metadata into the new folder DIR."""
     with new_folder(out) as building:
         for name, write in WRITERS.items():
             folder = building / name
             folder.mkdir()
             shutil.copyfile(CARDS / name / "README.md", folder / "README.md")
-            write(folder, date)
+            write(folder, f"{date:%Y-%m-%d}")
     print(f"written to {out}: {', '.join(WRITERS)}")
 
 

@@ -108,9 +108,25 @@ WORK: dict[str, Callable[[int], Work]] = {
 
 
 @click.group(help=__doc__, invoke_without_command=True)
-@click.option("--seconds", default=1200.0, help="How long all of it runs.")
-@click.option("--share", default=0.2, help="Share of the time that work may take.")
-@click.option("--environments", "number", default=4096, help="Side by side.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=1.0),
+    default=1200.0,
+    help="How long all of it runs.",
+)
+@click.option(
+    "--share",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    default=0.2,
+    help="Share of the time that work may take.",
+)
+@click.option(
+    "--environments",
+    "number",
+    type=click.IntRange(min=1),
+    default=4096,
+    help="Side by side.",
+)
 @click.option("--only", multiple=True, type=click.Choice(list(WORK)))
 @click.option("--out", help="A file of all samples.")
 @click.pass_context
@@ -162,6 +178,9 @@ def main(
 
 def grown(name: str, samples: list[dict[str, float]]) -> Iterator[list[str]]:
     """Yield a line for each figure: its medians in the first and in the last tenth."""
+    # work that ended before its first sample is named as failed
+    if not samples:
+        return
     length = samples[-1]["seconds"]
     for figure in FIGURES:
         known = [sample for sample in samples if figure in sample]

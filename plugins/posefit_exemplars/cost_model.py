@@ -30,7 +30,7 @@ from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
 
-# Of the path.
+# The path's costs.
 
 JUMP_COST = 12.0  # cost of a jump to any other pose; costs are over the temperature
 # Standard deviation of turns away from the clip, for a thirtieth of a second.
@@ -48,7 +48,7 @@ YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 # thirtieth of a second.
 WRONG_YAW_COST = 4.0
 
-# Of the hypotheses.
+# The hypotheses' costs.
 
 # Silhouettes cost this times as much as on the path, because fitted poses are nearer.
 SHARPNESS = 2.0
@@ -150,9 +150,9 @@ class ClipSteps:
         """Return the costs (n, m) of steps to the states of the next frame.
 
         A pose costs half the square of its distance, in spreads, from where the clip
-        continues. A yaw costs half the square of its turn away
-        from the clip's yaw, in spreads. A step costs at most as much as a jump, unless
-        it turns faster than possible.
+        continues. A yaw costs half the square of its turn away from the clip's yaw, in
+        spreads. A step costs at most as much as a jump, unless it turns faster than
+        possible.
 
         Args:
             exemplars: The poses of the clips.

@@ -33,8 +33,10 @@ class Group(click.Group):
             elif args[0] in every:
                 known[args[0]] = every[args[0]]
             near = get_close_matches(cut(args[0]), known, 1)
-            hint = f"; did you mean {known[near[0]]!r}?" if near else ""
-            raise click.UsageError(f"No such command {quoted(args[0])}{hint}")
+            hint = f"see {_path_of(context)} --help"
+            if near:
+                hint = f"did you mean {known[near[0]]!r}?"
+            raise click.UsageError(f"No such command {quoted(args[0])}; {hint}")
         return super().resolve_command(context, args)
 
 

@@ -82,7 +82,7 @@ PROPORTIONS_CORRELATION = np.array(
 # that the fit leaves it as it is. In a mask, the knee is where the flesh of the thigh
 # and that of the shank meet. Most flesh is behind the bones, by 2 cm (Dumas et al.
 # 2007): a knee that is a little bent seems to be higher than it is, by more than the
-# 6 % by which people's ratios vary, and in all frames and views alike.
+# 6 % by which people's ratios vary, and in every frame and every view.
 RATIO_SHARE = 1e-4
 SCALE_SPREAD = 0.10
 HIPS_SPREAD = 0.06

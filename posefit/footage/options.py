@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from posefit.geometry.camera import Camera
     from posefit.geometry.units import Unit
 
+    # a camera, a calibration, or the file of either
+    OneCamera = Camera | Calibration | str | Path
+
 LARGEST_SIDE = 16_384  # pixels of a rendered picture
 
 
@@ -168,7 +171,7 @@ class SourceOptions(Options):
         "FILE",
         heading="Source and camera",
     )
-    camera: "Camera | str | Path | Sequence[Camera | str | Path]" = option(
+    camera: "OneCamera | Sequence[OneCamera]" = option(
         (),
         "Calibration file, one per view. Default: guessed.",
         _cameras,
@@ -256,9 +259,9 @@ class SourceOptions(Options):
     )
 
     @property
-    def cameras(self) -> "Sequence[Camera | Calibration | str | Path]":
+    def cameras(self) -> "Sequence[OneCamera]":
         """The value of `camera`, always a sequence."""
-        return cast("Sequence[Camera | Calibration | str | Path]", self.camera)
+        return cast("Sequence[OneCamera]", self.camera)
 
     @property
     def degrees(self) -> Sequence[float]:

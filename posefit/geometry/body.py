@@ -107,7 +107,7 @@ class Body:
 def varied(body: Body, percent: float, rng: np.random.Generator) -> Body:
     """Return a body whose lengths and radii vary by at most `percent` each.
 
-    The left and the right side vary alike.
+    The left and the right side vary by the same factors.
     """
     if percent == 0.0:
         return body

@@ -69,7 +69,7 @@ SCORE = Score(
 
 
 class Searches:
-    """The kind of runs of single searches, with the attributes of `Tracks`."""
+    """The kind of runs of single searches, see `posefit.report.contest.Kind`."""
 
     name = "search"
     noun = "searches"

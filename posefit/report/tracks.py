@@ -154,18 +154,7 @@ SCORE = Score(
 
 
 class Tracks:
-    """The kind of runs of tracks.
-
-    Attributes:
-        name: The kind's name, in the singular.
-        noun: Its runs, in the plural.
-        title: The title of the page.
-        columns: Its figures by name.
-        score: The figure that orders the methods.
-        named: The fields that an instance's name contains.
-        data: The names of a row's other data.
-        baselines: The label of each baseline by name.
-    """
+    """The kind of runs of tracks, see `posefit.report.contest.Kind`."""
 
     name = "track"
     noun = "tracks"

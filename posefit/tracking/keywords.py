@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from posefit.fitting.space import Translation
     from posefit.fitting.tracker import TrackerFactory
     from posefit.footage.extraction import Extraction
+    from posefit.footage.options import OneCamera
     from posefit.footage.people import Choice
     from posefit.footage.views import Range
     from posefit.geometry.calibration import Up
-    from posefit.geometry.camera import Camera
     from posefit.geometry.units import Unit
     from posefit.motion.clips import Source
     from posefit.progress import Progress
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 class _Keywords(TypedDict, total=False):
     asf: str | Path | None
-    camera: "Camera | str | Path | Sequence[Camera | str | Path]"
+    camera: "OneCamera | Sequence[OneCamera]"
     up: "Up | None"
     unit: "Unit | None"
     rate: float | None

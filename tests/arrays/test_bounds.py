@@ -7,6 +7,7 @@ the numbers are usually right all the same.
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from tests.cases import each
 
@@ -53,7 +54,41 @@ assert np.isfinite(moved[0]).all()
 """
 
 
-@each("script", [COSTS, CONTOURS])
+BODIES = """
+import numpy as np
+from posefit.fitting.bodies import HeldFrames, scaled_bodies
+from posefit.fitting.shape import NAMES, _scales
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import synthetic
+from posefit.motion import built_in
+
+motion = built_in.motion("walk", frames=60).frames(5, 6)
+scene = synthetic(motion, (60.0, 150.0), (37, 41), (), (None, None))
+nothing = np.zeros((2, 3))
+frame = Frame(motion.poses[0], motion.translations[0], 0.0, nothing, 1)
+held = HeldFrames.of(scene.body, scene.cameras, scene.observations, [frame])
+factors = np.ones((2, len(NAMES)))
+for aligned in (False, True):
+    bodies = scaled_bodies(scene.body, *_scales(factors), 1.7)
+    assert np.isfinite(held.costs(*bodies, aligned, 0.5)).all()
+"""
+
+ENVIRONMENTS = """
+import gymnasium
+
+env = gymnasium.make_vec("posefit_envs:posefit/FitImage-v1", 2, size=(36, 36))
+env.reset(seed=0)
+env.step(env.action_space.sample())
+"""
+
+BEAM = """
+import pytest
+
+raise SystemExit(pytest.main(["-q", "-n", "0", "-W", "ignore", "tests/exemplars/test_beam.py"]))
+"""
+
+
+@each("script", [COSTS, CONTOURS, BODIES, ENVIRONMENTS, BEAM])
 def test_kernels_stay_within_their_arrays(script: str) -> None:
     environment = os.environ | {
         "NUMBA_DISABLE_JIT": "1",
@@ -62,9 +97,10 @@ def test_kernels_stay_within_their_arrays(script: str) -> None:
     }
     ran = subprocess.run(
         [sys.executable, "-c", script],
+        cwd=Path(__file__).parents[2],
         env=environment,
         capture_output=True,
         encoding="utf-8",
         check=False,
     )
-    assert ran.returncode == 0, ran.stderr
+    assert ran.returncode == 0, ran.stdout + ran.stderr

@@ -456,9 +456,12 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
             error_of(*words)
             == f"posefit: No such command {name!r}; did you mean {path!r}?"
         )
-    assert error_of("zebra") == "posefit: No such command 'zebra'"
+    assert error_of("zebra") == "posefit: No such command 'zebra'; see posefit --help"
     # near the name of a command of another group, which does something else
-    assert error_of("suite", "extrat") == "posefit: No such command 'extrat'"
+    assert (
+        error_of("suite", "extrat")
+        == "posefit: No such command 'extrat'; see posefit suite --help"
+    )
 
 
 def test_check_reports_every_rule_and_how_many_ran() -> None:
