@@ -49,6 +49,15 @@ class Space(Protocol):
     """The box [-1, 1]^d as an optimiser knows it; part of it is feasible.
 
     `SearchSpace` is one.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.testing.toy import Toy
+        >>> space = Toy(2)
+        >>> space.dimensions, space.start
+        (2, None)
+        >>> space.feasible(np.array([[0.0, 0.0], [2.0, 0.0]])).tolist()
+        [True, False]
     """
 
     @property

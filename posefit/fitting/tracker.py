@@ -182,6 +182,25 @@ class Tracker(Protocol):
 
     It takes one observation before it yields a frame, unless it is registered with
     `looks_ahead`.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> from posefit.plugin import Frame, areas, mismatch
+        >>> class Still:
+        ...     def __init__(self, task):
+        ...         self.task = task
+        ...
+        ...     def track(self, observations, rng):
+        ...         pose = self.task.training[0].poses[0]
+        ...         for seen in observations:
+        ...             view = self.task.body, self.task.cameras[0], seen.silhouettes[0]
+        ...             place = np.array(seen.translation)
+        ...             counts = areas(*view, pose[None], place[None])
+        ...             cost = float(mismatch(counts)[0])
+        ...             yield Frame(pose, place, cost, counts, evaluations=1)
+        >>> posefit.track("walk", method=Still, frames=(0, 2)).joints.shape
+        (2, 27, 3)
     """
 
     def track(
@@ -197,7 +216,23 @@ Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[F
 
 
 class Initialiser(Protocol):
-    """Guesses which poses an observation may show; nothing to inherit."""
+    """Guesses which poses an observation may show; nothing to inherit.
+
+    Example:
+        >>> from posefit.plugin import Posterior
+        >>> from posefit.testing.tracker_rules import scene
+        >>> class First:
+        ...     def __init__(self, task):
+        ...         self.task = task
+        ...
+        ...     def posterior(self, observation):
+        ...         pose = self.task.training[0].poses[:1]
+        ...         place = self.task.training[0].translations[:1]
+        ...         return Posterior(pose, place, [1.0])
+        >>> task, _, observations = scene()
+        >>> First(task).posterior(observations[0]).poses.shape
+        (1, 66)
+    """
 
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return weighted poses with translations, or None for a blind search."""
@@ -433,6 +468,21 @@ class SynthesisTracker:
 
     `make` builds an optimiser from a space, a generator and the evaluations of its
     search. `next_frame` tells what becomes of it in the next frame.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> from posefit import SynthesisTracker
+        >>> from posefit.testing.tracker_rules import scene
+        >>> task, _, observations = scene()
+        >>> prior = posefit.prior("pca")().fit(task.angles)
+        >>> pso = posefit.optimiser("pso")
+        >>> def make(space, rng, evaluations):
+        ...     return pso(space, rng, population_size=20)
+        >>> tracker = SynthesisTracker(task, prior, make)
+        >>> frames = tracker.track(observations[:2], np.random.default_rng(0))
+        >>> [frame.pose.shape for frame in frames]
+        [(66,), (66,)]
     """
 
     task: Task

@@ -56,7 +56,7 @@ def check(words: list[str]) -> None:
         assert importlib.util.find_spec(words[2]) is not None, f"no module {words[2]}"
     elif name == "python":
         path = ROOT / words[1]
-        assert path.is_file(), f"no file {words[1]}"
+        assert path.exists(), f"no file {words[1]}"
         if path.parent.name == "studies":
             command, _ = _innermost(import_module(path.stem).main, words[2:])
             options = {
