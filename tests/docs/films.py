@@ -22,6 +22,8 @@ MATRIX = np.array([[1100.0, 0.0, 960.0], [0.0, 1100.0, 540.0], [0.0, 0.0, 1.0]])
 EYES = np.array([[2.87, 0.89, 1.3], [0.51, 2.96, 1.3]])
 # from the world of posefit, where y is up, to that of the board, where z is
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+# the walk is turned, so that it crosses the pictures of both cameras
+ACROSS = cv2.Rodrigues(np.radians([0.0, 0.0, 59.0]))[0]
 EMPTY = 30  # frames of the walk's films before the person appears
 
 
@@ -79,9 +81,11 @@ def write_walks(folder: Path) -> None:
     rng = np.random.default_rng(0)
     for name, eye in zip("ab", EYES, strict=True):
         turn, move = looking(eye)
-        camera = Camera(*SIZE, MATRIX[[0, 1], [0, 1]], MATRIX[:2, 2], turn @ Z_UP, move)
-        room = rng.uniform(0, 255, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
-        room = cv2.GaussianBlur(room, (0, 0), 9)
+        camera = Camera(
+            *SIZE, MATRIX[[0, 1], [0, 1]], MATRIX[:2, 2], turn @ ACROSS @ Z_UP, move
+        )
+        room = rng.uniform(20, 70, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
+        room = cv2.GaussianBlur(room, (0, 0), 3)
         writer = _writer(folder / f"walk-{name}.mp4")
         for k in range(-EMPTY, len(walk)):
             image = room.copy()

@@ -513,6 +513,7 @@ def test_each_file_is_written_alone_as_it_is_among_all(tmp_path: Path) -> None:
         (["trc", "bvh"], ("bvh", "trc", "summary")),
         (("frames.csv",), ("frames", "summary")),
         ("summary", ("summary",)),
+        ("amc", ("asf", "amc", "summary")),
     ],
 )
 def test_files_are_chosen_by_their_kinds_or_names(write: Any, kinds: Any) -> None:
