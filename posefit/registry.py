@@ -480,7 +480,10 @@ def _offers(
         check_hints(label, factory)
 
     for kind in kinds:
-        register = command if kind == COMMAND else partial(method, kind)
+        if kind == COMMAND:
+            register = command
+        else:
+            register = partial(method, kind)
         getattr(manager.hook, f"posefit_register_{kind}s")(register=register)
     return offers
 

@@ -31,7 +31,9 @@ def parsed_by(
         try:
             if isinstance(value, tuple):
                 return tuple(map(parse, value))
-            return None if value is None else parse(value)
+            if value is None:
+                return None
+            return parse(value)
         except ValueError as error:
             raise click.BadParameter(str(error)) from None
 
@@ -132,7 +134,10 @@ def track_flags(*names: str) -> list[Decorator]:
         option = declared(field)
         default = field.default
         heading = option.heading or heading
-        unwanted = field.name not in names if names else option.flag == ""
+        if names:
+            unwanted = field.name not in names
+        else:
+            unwanted = option.flag == ""
         if unwanted:
             continue
         flag = (option.flag or field.name).replace("_", "-")

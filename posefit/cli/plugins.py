@@ -142,4 +142,6 @@ def check(
 
 def _own(context: click.Context) -> tuple[str, ...]:
     root = context.find_root().command
-    return tuple(root.commands) if isinstance(root, click.Group) else ()
+    if isinstance(root, click.Group):
+        return tuple(root.commands)
+    return ()

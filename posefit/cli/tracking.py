@@ -163,7 +163,10 @@ def _print(
         click.echo(table(content))
     else:
         first, *others = brief(content)
-        grade = "good" if content.trust is None else content.trust.grade
+        if content.trust is None:
+            grade = "good"
+        else:
+            grade = content.trust.grade
         click.secho(first, bold=True, fg=COLOURS[grade])
         click.echo("\n".join(others))
     out = options["out"]
@@ -261,7 +264,10 @@ def _arguments(
             settings=options["settings"],
             train=options["train"],
         )
-        motion = options["source"].named[0] if medium == "motion" else None
+        if medium == "motion":
+            motion = options["source"].named[0]
+        else:
+            motion = None
         options["train"] = without_subjects(completed(chosen, motion).train, left_out)
     return options
 
@@ -315,7 +321,9 @@ def extraction_of(
     if settings:
         factory = registry().offer("segmenter", name).factory
         values["settings"] = parse_texts(name, factory, settings)
-    return Extraction(**values) if values else None
+    if values:
+        return Extraction(**values)
+    return None
 
 
 def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:

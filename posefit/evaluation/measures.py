@@ -40,7 +40,9 @@ class Measure:
 
     def number(self, value: float | None) -> str:
         """Return a value with its digits and without its unit, or "-" for None."""
-        return "-" if value is None else f"{self.factor * value:,.{self.digits}f}"
+        if value is None:
+            return "-"
+        return f"{self.factor * value:,.{self.digits}f}"
 
     def shown(self, value: float | None) -> str:
         """Return a value with its label and unit, such as `MPJPE 18 mm`."""

@@ -89,7 +89,9 @@ def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float
         if len(near) >= MIN_SMOOTH_FRAMES:
             path = np.polynomial.Polynomial.fit(near - k, depths[near], 2)
             away.append(abs(depths[k] - path(0.0)) / depths[k])
-    return float(np.quantile(away, SCATTER_QUANTILE)) if away else None
+    if away:
+        return float(np.quantile(away, SCATTER_QUANTILE))
+    return None
 
 
 def hidden_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
@@ -134,7 +136,9 @@ def stance_spread(joints: Array, in_stance: NDArray[np.bool_]) -> float | None:
     for ball, flags in zip(BALLS, in_stance.T, strict=True):
         for start, stop in runs(flags):
             heights.append(joints[start:stop, ball, 1].mean())
-    return float(np.std(heights)) if len(heights) > 1 else None
+    if len(heights) > 1:
+        return float(np.std(heights))
+    return None
 
 
 def training_distances(
@@ -199,7 +203,9 @@ def explained_share(
                 image, then, body | old_body, observed | old_observed, reach
             )
         before.append((image, body, observed))
-    return float(counts[0] / counts[1]) if counts[1] else None
+    if counts[1]:
+        return float(counts[0] / counts[1])
+    return None
 
 
 def covered_pixels(
@@ -224,7 +230,9 @@ def covered_pixels(
         return 0, 0
     changed = changed_pixels(image, then)
     moved, inside = moved_pixels(changed, region, body, reach, CLOTHES)
-    return (inside, moved) if moved > MIN_MOVED * body.sum() else (0, 0)
+    if moved > MIN_MOVED * body.sum():
+        return (inside, moved)
+    return (0, 0)
 
 
 Grade = Literal["good", "doubtful", "do not use"]
@@ -395,7 +403,9 @@ def grade_of(signs: Sequence[tuple[Grade, str]]) -> Grade:
     """
     if not signs:
         return "good"
-    return "do not use" if len(signs) >= UNUSABLE_TOGETHER else signs[0][0]
+    if len(signs) >= UNUSABLE_TOGETHER:
+        return "do not use"
+    return signs[0][0]
 
 
 def sentence(figures: Mapping[str, Any], signs: Sequence[tuple[Grade, str]]) -> str:
@@ -614,4 +624,6 @@ def _size(
             fitted = longer_side(body)
             if observed and fitted:
                 ratios.append(observed / fitted)
-    return float(np.median(ratios)) if ratios else None
+    if ratios:
+        return float(np.median(ratios))
+    return None

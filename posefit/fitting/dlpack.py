@@ -38,7 +38,10 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
         return values, lambda results: results
     try:
         here = values.__dlpack_device__()[0] == CPU
-        array = np.from_dlpack(values) if here else np.from_dlpack(values, device="cpu")
+        if here:
+            array = np.from_dlpack(values)
+        else:
+            array = np.from_dlpack(values, device="cpu")
     except (AttributeError, BufferError, RuntimeError, TypeError) as error:
         kind_of_array = f"{type(values).__module__}.{type(values).__name__}"
         raise InputError(
@@ -50,9 +53,15 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
         library = values.__array_namespace__()
     else:  # PyTorch
         library = sys.modules[type(values).__module__.partition(".")[0]]
-    kind = array.dtype if array.dtype.kind == "f" else np.dtype(np.float64)
+    if array.dtype.kind == "f":
+        kind = array.dtype
+    else:
+        kind = np.dtype(np.float64)
     # CuPy has no argument for the device: it uses the current one
-    place = {} if here or library.__name__ == "cupy" else {"device": values.device}
+    if here or library.__name__ == "cupy":
+        place = {}
+    else:
+        place = {"device": values.device}
     return array, lambda results: library.asarray(
         results.astype(kind, copy=False), **place
     )

@@ -100,4 +100,6 @@ def skill(error: float, baseline: float) -> float | None:
 
     None if the baseline is 0.
     """
-    return 1.0 - error / baseline if baseline > 0.0 else None
+    if baseline > 0.0:
+        return 1.0 - error / baseline
+    return None

@@ -167,7 +167,10 @@ class SearchSpace:
         poses = np.empty((n, ANGLES))
         translations = np.empty((n, 3))
         latents = np.empty((n, m))
-        tilt = np.zeros((3 + m, 2)) if self.tilt is None else self.tilt.mean
+        if self.tilt is None:
+            tilt = np.zeros((3 + m, 2))
+        else:
+            tilt = self.tilt.mean
         if not unpack_proposals(
             proposals,
             self.centre,

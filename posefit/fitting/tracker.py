@@ -111,7 +111,9 @@ class Frame:
     @property
     def modes(self) -> Sequence[Mode]:
         """The modes of the posterior, the likeliest first."""
-        return () if self.posterior is None else self.posterior.modes
+        if self.posterior is None:
+            return ()
+        return self.posterior.modes
 
     def __post_init__(self) -> None:
         if self.lost is not None and not 0.0 <= self.lost <= 1.0:
@@ -256,7 +258,9 @@ def guessed_modes(
     if task.evaluations < MIN_GUESSED_EVALUATIONS:
         return ()
     posterior = task.start(task).posterior(observation)
-    return () if posterior is None else modes_apart(task.body.skeleton, posterior)
+    if posterior is None:
+        return ()
+    return modes_apart(task.body.skeleton, posterior)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

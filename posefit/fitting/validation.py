@@ -135,7 +135,10 @@ def check_population(proposals: Any, space: Space, name: str) -> None:
     plain = type(proposals) is np.ndarray
     rule = ""
     if not plain or proposals.shape[1:] != (space.dimensions,):
-        came = f"shape {proposals.shape}" if plain else type(proposals).__name__
+        if plain:
+            came = f"shape {proposals.shape}"
+        else:
+            came = type(proposals).__name__
         rule = f"an array of shape (n, {space.dimensions}), got {came}"
     elif proposals.dtype.kind != "f":
         rule = f"numbers of type float64, got {proposals.dtype}"
@@ -189,11 +192,10 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
         for frame in frames
         if Path(frame.filename).parent == Path(frames[0].filename).parent
     ]
-    place = (
-        f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})"
-        if of_plugin
-        else ""
-    )
+    if of_plugin:
+        place = f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})"
+    else:
+        place = ""
     return BrokenRuleError(
         f"{name}: {what} must not fail, got {type(error).__name__}: {error}{place}"
     )

@@ -196,7 +196,9 @@ def _frame_number(line: Line) -> int | None:
     if len(line.words) != 1 or len(word) >= 10:
         return None
     # isdigit alone also accepts digits that int() does not
-    return int(word) if word.isascii() and word.isdigit() else None
+    if word.isascii() and word.isdigit():
+        return int(word)
+    return None
 
 
 def _rate(line: Line, word: str) -> float:

@@ -413,7 +413,10 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
             where = motion.skeleton.offsets[above - 1]
         order.append(joint)
         lines.append(f"{tab}{'JOINT' if joint else 'ROOT'} {NAMES[JOINTS[joint]]}")
-        channels = "6 Xposition Yposition Zposition" if joint == 0 else "3"
+        if joint == 0:
+            channels = "6 Xposition Yposition Zposition"
+        else:
+            channels = "3"
         lines.extend(
             [
                 f"{tab}{{",

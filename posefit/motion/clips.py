@@ -86,7 +86,10 @@ def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
         )
     if recorded.is_recorded(source):
         return recorded_clip(recorded.clip(str(source)))
-    motion = source if isinstance(source, Motion) else _motion_in(source, stated)
+    if isinstance(source, Motion):
+        motion = source
+    else:
+        motion = _motion_in(source, stated)
     return SourceClip(motion.resampled, len(motion), motion.fps)
 
 
@@ -261,7 +264,9 @@ def _stem(source: Source | None) -> str | None:
     """Return the name of a recorded clip, or of a file such as 16_15.amc."""
     if isinstance(source, Motion):
         return source.name
-    return None if source is None else Path(source).stem
+    if source is None:
+        return None
+    return Path(source).stem
 
 
 def _same(source: Source, other: Source | None) -> bool:

@@ -107,7 +107,10 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
         )
         at = skeleton.offsets[start - 1] if start else np.zeros(3)
         turns = [f"{name}_{_TURNS[axis]}" for axis in JOINT_ORDER]
-        kind = "CustomJoint" if any(turn in free for turn in turns) else "WeldJoint"
+        if any(turn in free for turn in turns):
+            kind = "CustomJoint"
+        else:
+            kind = "WeldJoint"
         joint = _joint(
             joints, kind, name, f"/bodyset/{JOINTS[start]}", at, skeleton.axes[bone]
         )

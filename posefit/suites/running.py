@@ -285,7 +285,9 @@ def method_name(run: SuiteRun) -> str:
     details = [f"{name}={value}" for name, value in sorted(run.settings.items())]
     if run.looked:
         details.append("looks")
-    return f"{run.method} ({', '.join(details)})" if details else run.method
+    if details:
+        return f"{run.method} ({', '.join(details)})"
+    return run.method
 
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:

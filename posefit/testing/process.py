@@ -101,7 +101,10 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
         messages = [json.loads(line) for line in written]
     if messages and ended - messages[-1].get("at", ended) > results.SECONDS:
         return messages, f"it must end within {results.SECONDS:g} s, and did not"
-    how = f"exit status {status}" if status >= 0 else signal.Signals(-status).name
+    if status >= 0:
+        how = f"exit status {status}"
+    else:
+        how = signal.Signals(-status).name
     return messages, f"it must not end the program, got {how}"
 
 
@@ -164,7 +167,10 @@ def _checks(
         # check here: each check would report the same invalid value
         offer.factory(**settings)
     registered = {"optimiser": "next_frame", "tracker": "looks_ahead"}
-    more = [getattr(offer, registered[kind])] if kind in registered else []
+    if kind in registered:
+        more = [getattr(offer, registered[kind])]
+    else:
+        more = []
     checks = checks_of(kind, offer.factory, settings, *more)
     names = [check.name for check in checks]
     for rule in only:

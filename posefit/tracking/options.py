@@ -67,9 +67,9 @@ class TrackOptions(SourceOptions):
 
     method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(  # noqa: E501
         None,
-        "OPTIMISER@PRIOR such as cma@pca, OPTIMISER, @PRIOR, or a tracker such as vsmm; "
-        "`posefit plugins` lists them. Default: exemplars, or annealed@pca for a "
-        "built-in motion.",
+        "OPTIMISER@PRIOR such as cma@pca, OPTIMISER, @PRIOR, or a tracker such as "
+        "vsmm; `posefit plugins` lists them. Default: exemplars, or annealed@pca for "
+        "a built-in motion.",
         _method,
         "METHOD",
         heading="Method and budget",
