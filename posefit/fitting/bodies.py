@@ -105,10 +105,11 @@ class ObservedFrames:
             borders.append([each.extent for each in row])
             views = range(len(row))
             known.append([view for view in views if row[view].known] or views)
-        observed = [
-            Observed(*(np.array(part) for part in zip(*view, strict=True)))
-            for view in zip(*stacks, strict=True)
-        ]
+        observed = []
+        for view in zip(*stacks, strict=True):
+            observed.append(
+                Observed(*(np.array(part) for part in zip(*view, strict=True)))
+            )
         return cls(observed, np.array(borders), known)
 
     def areas(

@@ -223,10 +223,9 @@ class SilhouetteCost:
 
     @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
-        views = [
-            (drawing_of(self.body, camera, silhouette), silhouette)
-            for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
-        ]
+        views = []
+        for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
+            views.append((drawing_of(self.body, camera, silhouette), silhouette))
         return known_views(views, self.silhouettes)
 
     def _cost(self, poses: Array, translations: Array) -> Array:

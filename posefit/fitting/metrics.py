@@ -49,10 +49,11 @@ def geodesic_degrees(truth: Array, estimate: Array) -> Array:
         rotation_from_root_angles(truth[:, :3]),
         rotation_from_root_angles(estimate[:, :3]),
     )
-    inner = [
-        rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3))
-        for poses in (truth, estimate)
-    ]
+    inner = []
+    for poses in (truth, estimate):
+        inner.append(
+            rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3))
+        )
     return np.asarray(
         np.degrees(np.column_stack([root, geodesic(*inner)])).mean(axis=1)
     )

@@ -357,11 +357,10 @@ class Predictor:
             tilt=self._tilt,
             root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )
-        earlier = [
-            frame.details[COORDINATES]
-            for frame in task.before
-            if COORDINATES in frame.details
-        ]
+        earlier = []
+        for frame in task.before:
+            if COORDINATES in frame.details:
+                earlier.append(frame.details[COORDINATES])
         # coordinates of the latest gbest, the newest last
         self._latest: list[Array] = earlier[-HISTORY_FRAMES:]
         self.guess_evaluations = 0  # evaluations of the guess of the latest start

@@ -182,16 +182,14 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
             f"{name}: {what} must not end the program, got SystemExit: {error.code}"
         )
     # where the plugin raised it, or passed it on from a library
-    frames = [
-        frame
-        for frame in extract_tb(error.__traceback__)
-        if POSEFIT not in Path(frame.filename).parents
-    ]
-    of_plugin = [
-        frame
-        for frame in frames
-        if Path(frame.filename).parent == Path(frames[0].filename).parent
-    ]
+    frames = []
+    for frame in extract_tb(error.__traceback__):
+        if POSEFIT not in Path(frame.filename).parents:
+            frames.append(frame)
+    of_plugin = []
+    for frame in frames:
+        if Path(frame.filename).parent == Path(frames[0].filename).parent:
+            of_plugin.append(frame)
     if of_plugin:
         place = f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})"
     else:

@@ -197,7 +197,7 @@ def test_explained_messages_exist() -> None:
     assert [message for message, part in parts if part not in code] == []
 
 
-def test_words_and_counts_are_compared_exactly_and_figures_about() -> None:
+def test_words_and_counts_are_compared_exactly_and_figures_roughly() -> None:
     for shown, line, holds in (
         (
             "error 1.21 degrees, 5.6 ms a frame",

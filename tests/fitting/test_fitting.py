@@ -59,7 +59,7 @@ def drawn(cost: SilhouetteCost, count: int) -> Array:
     ("translation", "tilted"),
     [("known", False), ("searched", True), ("aligned", False)],
 )
-def test_a_cost_has_the_same_bits_whatever_is_beside_it(
+def test_a_cost_has_the_same_bits_in_any_population(
     cost: SilhouetteCost, translation: str, tilted: bool
 ) -> None:
     tilt = (

@@ -43,7 +43,7 @@ def decoded(video: Video, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, An
     return passes
 
 
-def test_frames_of_the_span_are_decoded_once_whoever_writes_into_them(
+def test_frames_are_decoded_once_even_if_a_reader_overwrites_them(
     video: Video, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     expected = [*video.frames(*SPAN, (40, 30))]
@@ -90,7 +90,7 @@ def test_frames_that_are_too_many_or_hardly_scaled_are_decoded_again(
     assert passes == [SPAN, SPAN]
 
 
-def test_what_a_thread_makes_ahead_comes_in_order_and_with_its_error() -> None:
+def test_a_threads_results_come_in_order_with_its_error() -> None:
     def numbers() -> Any:
         yield from range(5)
         raise ValueError("no more")

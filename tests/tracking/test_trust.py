@@ -50,7 +50,7 @@ def test_the_longer_side_of_a_mask_is_that_of_its_bounding_box() -> None:
     assert longer_side(mask) == 0
 
 
-def test_depth_scatters_by_what_no_smooth_path_explains() -> None:
+def test_depth_scatter_is_the_deviation_from_a_smooth_path() -> None:
     time = np.arange(60) / 30.0
     assert depth_scatter(8.0 - 1.2 * time + 0.3 * time**2, ALL, 30.0) == pytest.approx(
         0.0, abs=1e-9
@@ -326,7 +326,7 @@ def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
     assert "the distance jumps by 1" in trust.sentence
 
 
-def test_the_sentence_stands_on_top_of_every_output_where_the_truth_is_unknown(
+def test_the_verdict_is_on_top_of_every_output_if_the_truth_is_unknown(
     tmp_path: Path,
 ) -> None:
     scene = walk(3)
