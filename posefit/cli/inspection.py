@@ -121,6 +121,7 @@ def diagnosis(
         offered = [f"{offer.kind} {offer.name}" for offer in plugin.offers]
         offered += [f"{COMMAND} {command.name}" for command in plugin.commands]
         state: str = plugin.state
+        # a plugin without a marked hook loads without an error, and does nothing
         if state == "loaded" and not offered:
             state = "empty"
         states.add(state)

@@ -155,9 +155,11 @@ def track_flags(*names: str) -> list[Decorator]:
         if option.parse in (int, float):
             kind = "INTEGER" if option.parse is int else "FLOAT"
             words["metavar"] = option.unit or kind
+            # click's own message for a wrong number has no example
             words |= {"type": str, "callback": parsed_by(number_by(option.parse))}
         else:
             words["callback"] = parsed_by(option.parse)
+        # None means that the default depends on the source; the help describes it
         if not isinstance(default, tuple) and default is not None:
             words |= {"default": default, "show_default": True}
         flags.append(make(f"--{flag}", field.name, **words))

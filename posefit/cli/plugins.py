@@ -21,6 +21,7 @@ def plugins(context: click.Context, as_json: bool) -> None:
     from posefit.cli.inspection import described, listing
     from posefit.registry import KINDS, registry
 
+    # plugins may print while they are imported
     with results_alone():
         offers = registry().offers
     descriptions: list[dict[str, Any]] = []

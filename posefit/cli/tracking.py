@@ -129,6 +129,7 @@ def _track_live(
     out = options["out"]
     # live frames are treated like a video's
     chosen = _arguments(options, "video")
+    # a stream has no files that these could apply to
     for name in _OF_FILES:
         chosen.pop(name, None)
     frames = track_live(live, progress=shown, **chosen)
@@ -259,6 +260,7 @@ def _arguments(
         medium = options["source"].medium
     options["extraction"] = extraction_of(options, medium)
     if left_out := options.pop("without_subject"):
+        # the default training motions depend on the method and the source
         chosen = TrackOptions(
             method=options["method"],
             settings=options["settings"],

@@ -321,6 +321,7 @@ def _certainty(
         radii = joint_intervals(skeleton, frame.posterior, frame.pose)[:, 1:]
         radii_mm.append(1e3 * radii)
         radius_mm[k] = radii_mm[-1][MAIN_LEVEL].mean()
+        # with both roots at the origin, like the intervals
         if truth is not None:
             off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
             inside.append(np.linalg.norm(off, axis=1)[1:] <= radii)

@@ -158,6 +158,7 @@ def training_distances(
     """
     both = np.concatenate([poses, mirrored_poses(skeleton, poses)])
     nearest = np.full(2 * len(poses), np.inf)
+    # a pose is as familiar in any direction
     both[:, 0] = 0.0
     for motion in training:
         others = motion.poses[:: max(1, round(TRAINING_SECONDS * motion.fps))].copy()
@@ -197,6 +198,7 @@ def explained_share(
         body = project(scene.body, camera, frame.pose, frame.translation)
         observed = observation.silhouettes[0].mask
         reach = max(reach, longer_side(observed))
+        # the body covers the place that it left, too, because that changes as well
         if before and is_usable:
             then, old_body, old_observed = before[0]
             counts += covered_pixels(
@@ -230,6 +232,7 @@ def covered_pixels(
         return 0, 0
     changed = changed_pixels(image, then)
     moved, inside = moved_pixels(changed, region, body, reach, CLOTHES)
+    # a few pixels of noise say nothing about the body
     if moved > MIN_MOVED * body.sum():
         return (inside, moved)
     return (0, 0)
@@ -622,6 +625,7 @@ def _size(
             observed = longer_side(silhouette.mask)
             body = project(scene.body, camera, frame.pose, frame.translation)
             fitted = longer_side(body)
+            # a mask that the picture cuts has no size
             if observed and fitted:
                 ratios.append(observed / fitted)
     if ratios:

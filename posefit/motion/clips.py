@@ -117,6 +117,7 @@ def _motion_in(source: str | Path, stated: FileOptions) -> Motion:
         )
     if path.suffix.lower() == ".bvh":
         return read_bvh(existing(path), unit=stated.unit, up=stated.up)
+    # a bare word may be a misspelt built-in motion, whose message lists the names
     if path.exists() or path.suffix or os.sep in str(source):
         expected = "an .amc file, a .bvh file or a built-in motion"
         raise InputError(
@@ -201,6 +202,8 @@ def training_clips(
         for clip in _clips(source, stated, followed):
             clips.append(clip)
             poses += clip.count(FPS)
+            # after each clip, so that a folder of too many is refused before all are
+            # read
             _check_memory(poses, FPS, most)
     return clips
 

@@ -132,10 +132,7 @@ class _Buffer:
         if target is not None:
             view["target"] = target
         self.views.append(view)
-        if indices or raw.shape[1] == 1:
-            kind = "SCALAR"
-        else:
-            kind = f"VEC{raw.shape[1]}"
+        kind = "SCALAR" if indices or raw.shape[1] == 1 else f"VEC{raw.shape[1]}"
         accessor: dict[str, Any] = {
             "bufferView": len(self.views) - 1,
             "componentType": SHORT if indices else FLOAT,

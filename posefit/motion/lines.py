@@ -81,6 +81,7 @@ def lines_of(path: Path, longest: int) -> Iterator[Line]:
                 )
             if words := raw.removeprefix(BOM).decode("utf-8", errors="replace").split():
                 yield Line(path, number, words)
+    # an empty line, so that a missing part of the file has a line number in its message
     yield Line(path, max(number, 1), ())
 
 

@@ -203,6 +203,7 @@ def named(name: str) -> Sequence[RecordedClip]:
         people = [person.strip() for person in listed.split(",")]
     else:
         people = []
+    # a comma too many or a lone minus is a slip, not a choice of everybody
     if not is_library(name) or "" in people or "-" in people:
         raise InputError(
             f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, "

@@ -227,6 +227,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     average_leg = float(average.lengths[thigh_and_shin].sum())
     legs = [rig.length(side) for side in ("left", "right")]
     scale = float(np.mean(legs)) / average_leg
+    # also true of NaN
     if not scale > 0.0:
         raise InputError("legs with a length, got a length of 0")
     bones = _bones(rig, scale)

@@ -65,6 +65,8 @@ def check_in_process(
                 f"{kind} {name!r}: it must load in a separate process; {blame}"
             )
         done += [Result(**message) for message in messages if "outcome" in message]
+        # the process ended during this check: it failed, and the next ones get a new
+        # process
         if "outcome" not in messages[-1]:
             done.append(
                 Result(messages[-1].get("begins", plugin["checks"][0]), "failed", blame)
@@ -99,6 +101,7 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
         ended = time.monotonic()
         written.seek(0)
         messages = [json.loads(line) for line in written]
+    # a process that was ended by its own timer reports no reason
     if messages and ended - messages[-1].get("at", ended) > results.SECONDS:
         return messages, f"it must end within {results.SECONDS:g} s, and did not"
     if status >= 0:
@@ -135,6 +138,8 @@ def _check() -> None:
     with memory(GIGABYTES):
         for check in checks:
             send(begins=check.name, at=time.monotonic())
+            # ends the process even in compiled code, which a Python signal cannot
+            # interrupt
             faulthandler.dump_traceback_later(
                 task["seconds"] + task["overrun"], exit=True
             )
