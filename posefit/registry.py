@@ -84,8 +84,8 @@ class Offer:
 
         That is its distribution and version, a digest of its package's source, and its
         library. posefit's own plugins have the same version; their packages' names
-        distinguish them. What they offer from posefit itself depends on posefit's
-        build.
+        distinguish them. Their parts that are imported from posefit depend on
+        posefit's build.
         """
         if self.distribution == OWN:
             return f"{self.name} {self.version}".rstrip()

@@ -190,7 +190,7 @@ JSON = _result(
     "--json",
     "as_json",
     is_flag=True,
-    help="Print one JSON object and nothing else on stdout.",
+    help="Print only one JSON object on stdout.",
 )
 QUIET = _result("--quiet", is_flag=True, help="Print only the result.")
 EXTRACTION = (

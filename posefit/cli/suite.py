@@ -97,7 +97,7 @@ def suite(context: click.Context, as_json: bool) -> None:
     "--json",
     "as_json",
     is_flag=True,
-    help="Print one JSON array and nothing else on stdout.",
+    help="Print only one JSON array on stdout.",
 )
 def suite_run(
     optimiser: str,

@@ -173,7 +173,7 @@ class Measures:
         "mm a step",
         0,
         "distance that a standing foot moves along the ground, the mean over steps: "
-        "about 20 in motion capture; a foot stands while the true one does, or while "
+        "about 20 in motion capture; a foot stands while the true foot does, or while "
         "it is low and slow if the truth is unknown",
     )
     held_frames: int = _figure(

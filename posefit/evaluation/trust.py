@@ -121,7 +121,7 @@ def hidden_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
 
 
 def stance_spread(joints: Array, in_stance: NDArray[np.bool_]) -> float | None:
-    """Return the spread of the heights at which feet stand, in metres.
+    """Return the spread of the heights at which feet touch the ground, in metres.
 
     It is the standard deviation over stances of the height of the foot's ball.
 
@@ -307,12 +307,12 @@ class Trust:
     )
     foot_share: float | None = _sign(
         (1.0, 0.8, 1.0),
-        "a foot stands in only {foot_share:.0%} of the frames",
-        "a foot stands in {foot_share:.0%} of frames",
+        "a foot is on the ground in only {foot_share:.0%} of the frames",
+        "a foot is on the ground in {foot_share:.0%} of frames",
     )
     stance_spread_m: float | None = _sign(
         (0.0, 0.15, 0.6),
-        "feet stand at heights {stance_spread_m:.2f} m apart",
+        "feet touch the ground at heights {stance_spread_m:.2f} m apart",
         "at heights {stance_spread_m:.2f} m apart",
     )
     explained: float | None = _sign(
@@ -516,7 +516,7 @@ def trust_of(
         "stance_spread_m": _figure(
             {TOO_FEW: few},
             lambda: stance_spread(joints, in_stance),
-            "no foot stands twice",
+            "no foot touches the ground twice",
         ),
         "explained": _figure(
             {MASKS_ALONE: scene.pictures is None, MOVES: scene.camera_moves},

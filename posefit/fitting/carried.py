@@ -58,8 +58,8 @@ def revived(
 
     Args:
         state: The state, from `carried`.
-        space: The space of another frame of the same track. It gives what the state
-            does not have.
+        space: The space of another frame of the same track, for the parts that the
+            state does not have.
         rng: The generator of the filter.
         evaluations: The budget of a search.
         make: Builds the filter.

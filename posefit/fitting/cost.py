@@ -90,8 +90,8 @@ class SilhouetteCost:
     """The cost of proposals for one observation, a pure function. SAPSO (4).
 
     Call it with proposals (n, d) of its space for their costs (n,), 0 to 100: the mean
-    over the views. The cost of a proposal has the same bits whatever the other
-    proposals are, and with any number of threads. A `Problem` counts the calls.
+    over the views. The cost of a proposal has the same bits in any population
+    and with any number of threads. A `Problem` counts the calls.
 
     Args:
         body: the person's body.

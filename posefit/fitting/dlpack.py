@@ -18,8 +18,8 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
 
     An array on the CPU is not copied. From another device it is copied, and its results
     are copied back. Results have the type of the values if that is a floating type:
-    float32 of JAX or PyTorch gives float32. NumPy's arrays, and values without
-    `__dlpack__`, are returned as they are, and so are their results.
+    float32 of JAX or PyTorch gives float32. NumPy's arrays, values without
+    `__dlpack__`, and their results are returned unchanged.
 
     Args:
         name: The name of the values in messages.

@@ -7,8 +7,8 @@
     print(problem.best_cost, problem.evaluations)
 
 Everything that posefit searches is a problem: a frame of a track, a person's build, a
-numbered instance of a suite, an episode of an environment. The problem counts its
-evaluations and remembers its best proposal; nothing else does.
+numbered instance of a suite, an episode of an environment. Only the problem counts
+its evaluations and remembers its best proposal.
 """
 
 import warnings
@@ -122,7 +122,7 @@ class Problem:
         space: the box, as an optimiser knows it.
         budget: the largest number of evaluations; None for any number.
         repair: moves infeasible proposals (n, d) before they are evaluated; by default
-            they are evaluated as they are.
+            they are not moved.
         noisy: returns the noisy costs (n,) that a call returns, from the proposals
             (n, d) and the number of evaluations before them. By default a call returns
             `cost`. The best and the trace are always of `cost`.

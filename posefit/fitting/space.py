@@ -71,7 +71,7 @@ class SearchSpace:
     )
     # None: the first population is drawn uniformly from the box
     start: Start | None = None
-    # None: pitch and roll are those of the pose
+    # None: pitch and roll are in the pose
     tilt: Tilt | None = field(default=None, repr=False)
     root_order: RootOrder = "yaw_first"  # Interpretation S3; "xyz" has no tilt
     # (d,) coordinates of the box's middle

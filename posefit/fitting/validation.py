@@ -111,7 +111,7 @@ class Checked:
             raise _broken_by(self.name, what, error) from error
         if self._drawn.poses:
             rule = (
-                f"leave evaluations to the search, got {self._drawn.poses:g} of its own"
+                f"leave evaluations to the search, got {self._drawn.poses:g} by itself"
             )
             raise BrokenRuleError(f"{self.name}: {what} must {rule}")
         return answer
@@ -156,7 +156,7 @@ def plugin_errors(
 ) -> Iterator[None]:
     """Turn exceptions of the body, SystemExit too, into a BrokenRuleError.
 
-    A BrokenRuleError stays as it is: it names another plugin, which this one called.
+    A BrokenRuleError is not changed: it names another plugin, which this one called.
 
     Args:
         name: The name of the plugin.

@@ -143,8 +143,14 @@ def test_a_body_covers_half_of_what_moves() -> None:
             "do not use: the person seems to be 2.70 m tall, not 1.80 m",
         ),
         ({"depth_scatter": 0.3}, "do not use: the distance jumps by 30%"),
-        ({"foot_share": 0.1}, "doubtful: a foot stands in only 10% of the frames"),
-        ({"stance_spread_m": 0.3}, "doubtful: feet stand at heights 0.30 m apart"),
+        (
+            {"foot_share": 0.1},
+            "doubtful: a foot is on the ground in only 10% of the frames",
+        ),
+        (
+            {"stance_spread_m": 0.3},
+            "doubtful: feet touch the ground at heights 0.30 m apart",
+        ),
         ({"explained": 0.35}, "do not use: the body covers only 35% of what moves"),
         ({"acceleration": 30.0}, "doubtful: joints jerk, by 30 m/s2"),
         ({"frames": 2}, "doubtful: only 2 frames to judge the person by"),
