@@ -88,7 +88,7 @@ class ObservedFrames:
     All of them are drawn on the CPU, even if the silhouettes are on a device.
     """
 
-    observed: Sequence[Observed] = field(repr=False)  # one a camera
+    observed: Sequence[Observed] = field(repr=False)  # one for each camera
     borders: Array = field(repr=False)  # (f, views, 4) pixels, see `Silhouette.extent`
     # for each frame, the views that show something, or all if none does
     known: Sequence[Sequence[int]] = field(repr=False)

@@ -190,7 +190,7 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
         drawn = _drawn(space, None, rng, count)
     if drawn is None:
         raise InputError(
-            "the prior must find some of its range feasible,"
+            "some of the prior's range must be feasible,"
             f" got none in {REDRAWS} x {count} draws"
         )
     return drawn

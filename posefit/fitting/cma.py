@@ -245,7 +245,7 @@ class CMAES:
         """Start around a feasible prediction, or around a fresh draw."""
         if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
             raise InputError(
-                "spread must be above 0 in some coordinate and negative in none,"
+                "spread must be 0 or more in each coordinate, and above 0 in one,"
                 f" got {cut(str(spread))}"
             )
         start = self.space.start

@@ -134,7 +134,7 @@ class SilhouetteCost:
     def __post_init__(self) -> None:
         if len(self.cameras) != len(self.silhouettes) or not self.cameras:
             raise InputError(
-                f"silhouettes must be one a camera ({len(self.cameras)}),"
+                f"silhouettes must be one for each camera ({len(self.cameras)}),"
                 f" got {len(self.silhouettes)}"
             )
         for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):

@@ -84,7 +84,7 @@ def test_a_spread_of_nothing_is_refused() -> None:
         space = Toy(4, start=Start(np.zeros(4), spread, np.zeros(4)))
         with pytest.raises(
             InputError,
-            match="spread must be above 0 in some coordinate and negative in none, got",
+            match="spread must be 0 or more in each coordinate, and above 0 in one, got",
         ):
             CMAES(space, np.random.default_rng(0))
     narrow = Toy(

@@ -254,7 +254,7 @@ def test_mistakes_are_named(cost: SilhouetteCost) -> None:
         ),
         (
             lambda: replace(cost, silhouettes=[]),
-            r"silhouettes must be one a camera \(2\), got 0",
+            r"silhouettes must be one for each camera \(2\), got 0",
         ),
         (
             lambda: replace(cost, silhouettes=[empty] * 2),
