@@ -28,7 +28,8 @@ TOOLS = (
 
 
 def commands(text: str) -> Iterator[list[str]]:
-    """Yield the words of every command of a block."""
+    """Yield the words of every command of a block, without the text of its input."""
+    text = re.sub(r"<<'?(\w+)'?\n.*?^\1$", "", text, flags=re.MULTILINE | re.DOTALL)
     words: list[str] = []
     for line in text.replace("\\\n", " ").splitlines():
         lexer = shlex.shlex(line, posix=True, punctuation_chars="&|;")
