@@ -147,10 +147,7 @@ def motion(
 def _model(name: str) -> tuple[list[int], Array, float, float]:
     """Return free angles, Fourier series, period in seconds and pace in m/s."""
     _check(name)
-    if name in _stored()["motions"]:
-        styles = [name]
-    else:
-        styles = other_styles(name)
+    styles = [name] if name in _stored()["motions"] else other_styles(name)
     models = [_stored()["motions"][style] for style in styles]
     series = np.mean([model["series"] for model in models], axis=0)
     period = np.mean([model["period"] for model in models], axis=0)

@@ -132,10 +132,7 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     The numbers must have been checked by `checked_address`.
     """
     rng = generator("suite", function, number)
-    if number in TRAINING:
-        people = TRAINING_PEOPLE
-    else:
-        people = HELD_OUT_PEOPLE
+    people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
     subject = people[int(rng.integers(len(people)))]
     learned = learned_without(subject)
     count = dimension - 3  # the root has three coordinates

@@ -74,10 +74,7 @@ class Recalibration:
             "angle_factors",
         ):
             length = ANGLES if name.startswith("angle") else len(JOINTS)
-            if name.endswith("spreads"):
-                shape = (length,)
-            else:
-                shape = (len(LEVELS), length)
+            shape = (length,) if name.endswith("spreads") else (len(LEVELS), length)
             value = frozen(name, getattr(self, name), shape)
             if value.min() < 0.0:
                 raise InputError(f"{name} must be 0 or more, got {value.min():g}")
