@@ -327,32 +327,38 @@ def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array,
     return place, np.array(away)
 
 
-def apparent_sizes(
-    observations: Observations, cameras: Sequence[Camera]
-) -> tuple[float, Array] | None:
-    """Return the medians of `apparent_size` over frames; None if none is usable.
+# the middle (2,) and the height of the person in each camera's picture, in pixels
+Extents = Sequence[tuple[Array, float]]
 
-    A frame is usable here if it is usable in all views.
-    """
+
+def shared_extents(observations: Observations) -> list[Extents]:
+    """Return the person's extents in some of the frames that all views show."""
     count = len(observations)
     each = [view.usable[:count] for view in observations.views]
     usable = np.flatnonzero(np.all(each, axis=0)).tolist()
     if not usable:
-        return None
-    misses = []
-    heights = []
+        return []
+    shared = list[Extents]()
     for k in np.unique(np.linspace(0, len(usable) - 1, SAMPLES).astype(int)):
         silhouettes = observations[usable[k]].silhouettes
-        extents = [extent_of(silhouette) for silhouette in silhouettes]
+        shared.append([extent_of(silhouette) for silhouette in silhouettes])
+    return shared
+
+
+def apparent_sizes(
+    cameras: Sequence[Camera], frames: Sequence[Extents]
+) -> tuple[float, Array]:
+    """Return the medians of `apparent_size` over frames."""
+    misses = []
+    heights = []
+    for extents in frames:
         miss, tall = apparent_size(cameras, extents)
         misses.append(miss)
         heights.append(tall)
     return float(np.median(misses)), np.asarray(np.median(heights, axis=0))
 
 
-def apparent_size(
-    cameras: Sequence[Camera], extents: Sequence[tuple[Array, float]]
-) -> tuple[float, Array]:
+def apparent_size(cameras: Sequence[Camera], extents: Extents) -> tuple[float, Array]:
     """Return how well several cameras agree on a person's place and height.
 
     Args:
