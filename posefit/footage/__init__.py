@@ -20,8 +20,9 @@ Each row is one step, in one file:
 | values of all masks | the ones that are the person | values.py |
 | images, an .npz or .npy file | a `views.View`: one bit per pixel | readers.py |
 | masks from other tools | one person's masks, not inverted, no holes | cleaning.py |
-| a video file, or one picture per frame | frames at even times | video.py |
-| frames | the same at the size of masks, kept if needed again | scaled.py |
+| a video file, or one picture per frame | frames at the size of masks | video.py |
+| times of a file's frames | a rate, and the frame at each even time | rates.py |
+| decoded frames | the same again, from a temporary file | kept.py |
 | one frame | the people in it | segmenter.py, extraction.py |
 | frames in their order | people, their masks and quality | scanner.py |
 | blobs of successive frames | people, and which one is followed | people.py |
@@ -31,6 +32,7 @@ Each row is one step, in one file:
 | a video | a `View` of the person in it | segmentation.py |
 | masks of segmented frames | a verdict: can they be a person? | quality.py |
 | a `View` | the files of `posefit extract` | extract.py |
+| pictures | an .mp4 file | writing.py |
 | a stream | a `View` of each frame | live.py |
 | calibrations and sources | which camera took which source | pairing.py |
 | calibrations | the axes and the unit of their world | world.py |

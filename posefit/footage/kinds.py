@@ -86,8 +86,8 @@ class Kind(NamedTuple):
     recognises: Callable[[Place], bool]
     # (place, frames, label, fps) to the view
     view: Callable[[Any, Range, int | None, float | None], View] | None = None
-    # (place, fps) to the film
-    film: Callable[[Any, float | None], Video] | None = None
+    # (place, fps, width) to the film, scaled down to the width
+    film: Callable[[Any, float | None, int], Video] | None = None
 
 
 def _is_film(place: Place) -> bool:
@@ -126,7 +126,7 @@ KINDS = (
     Kind("masks", _ends_in(".npy"), view=read_npy),
     Kind("pictures", _is_film, film=Video.of_pictures),
     Kind("masks", lambda place: isinstance(place, Images), view=read_images),
-    Kind("video", _is_video, film=lambda place, _: Video.of(place)),
+    Kind("video", _is_video, film=lambda place, _, width: Video.of(place, width)),
     Kind("motion", lambda _: True),  # names of motions need no suffix
 )
 

@@ -18,7 +18,6 @@ from posefit.footage.people import (
     planes_of,
 )
 from posefit.footage.quality import FrameQuality
-from posefit.footage.scaled import ScaledVideo
 from posefit.footage.segmenter import PersonSegmenter
 from posefit.footage.video import Video
 from posefit.footage.views import Range, View, empty_planes, span, times_of
@@ -47,7 +46,6 @@ class Scanner:
         video: Video,
         how: Extraction,
         frames: Range,
-        scaled: ScaledVideo | None = None,
     ) -> None:
         """Prepare a pass.
 
@@ -55,7 +53,6 @@ class Scanner:
             video: The video.
             how: How to segment the people.
             frames: Which frames to read.
-            scaled: The video at its working size, if another pass has it already.
 
         Raises:
             InputError: The extraction or the frames do not fit the video.
@@ -63,13 +60,13 @@ class Scanner:
         """
         self.start, self.stop = span(frames, video.count())
         self.how = how
-        self.scaled = scaled or ScaledVideo(video, how.width, (self.start, self.stop))
-        self.segmenter = PersonSegmenter(self.scaled, how)
+        self.video = video
+        video.keep(self.start, self.stop)
+        self.segmenter = PersonSegmenter(video, how)
 
     def again(self) -> "Scanner":
         """Return another pass through the same frames, with a segmenter that is new."""
-        frames = (self.start, self.stop)
-        return Scanner(self.scaled.video, self.how, frames, self.scaled)
+        return Scanner(self.video, self.how, (self.start, self.stop))
 
     def scan(
         self,
@@ -84,8 +81,8 @@ class Scanner:
                 frame's index and its picture.
 
         """
-        video = self.scaled.video
-        size = self.scaled.size
+        video = self.video
+        size = video.size
         room = self.stop - self.start
         people = People(video.fps)
         camera = CameraMotion(size)
@@ -94,7 +91,7 @@ class Scanner:
         landmarks = list[Array]()
         bits = empty_planes(room, size)
         known = empty_planes(room, size)
-        images = self.scaled.frames(self.start, self.stop)
+        images = video.frames(self.start, self.stop)
         for k, image in enumerate(progress(images, room) if progress else images):
             camera.add(k, image)
             given = image if changed is None else changed(k, image)
@@ -116,12 +113,12 @@ class Scanner:
             usable=np.array([row["usable"] for row in rows.largest], dtype=bool),
             size=size,
             fps=video.fps,
-            filmed=video.size,
+            filmed=video.filmed,
             landmarks=np.array(landmarks),
             facings=np.array(facings),
             moves=camera.moves,
             guesses=video.guesses,
-            pictures=partial(self.scaled.frames, self.start, self.stop),
+            pictures=partial(video.frames, self.start, self.stop),
         )
         return Scan(view, people, rows.largest, rows.blanks, self.how.person)
 
@@ -177,7 +174,7 @@ class _Rows:
         number = self._scanner.start + k
         row = self._scanner.segmenter.row(quality, image, person, number)
         # a repeated frame does not show where the person is at its time
-        usable = row["usable"] and self._scanner.scaled.video.is_filmed(number)
+        usable = row["usable"] and self._scanner.video.is_filmed(number)
         return row | {"usable": int(usable)}
 
 

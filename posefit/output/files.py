@@ -18,7 +18,7 @@ from posefit.errors import InputError
 from posefit.evaluation.errors import FRAME
 from posefit.files import opencv_name
 from posefit.footage.scene import Scene
-from posefit.footage.video import VideoWriter
+from posefit.footage.writing import VideoWriter
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.c3d import write_c3d
 from posefit.measuring.centres import PLACES

@@ -71,10 +71,8 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         ]
 
     def video(path: Path) -> object:
-        filmed = Video.of(path)
-        return filmed.warnings, [
-            image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)
-        ]
+        filmed = Video.of(path, 64)
+        return filmed.warnings, [image.mean() for image in islice(filmed.frames(), 20)]
 
     return {
         "asf": parse_asf,

@@ -24,11 +24,11 @@ from posefit.errors import InputError
 from posefit.evaluation.errors import evaluated, unseen
 from posefit.evaluation.measures import Effort
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage import video
+from posefit.footage import writing
 from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
 from posefit.footage.scene import Scene
-from posefit.footage.video import VideoWriter, video_rate
+from posefit.footage.writing import VideoWriter, video_rate
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.limits import RATES
@@ -372,7 +372,7 @@ def test_a_video_has_the_nearest_rate_that_mpeg_4_counts(tmp_path: Path) -> None
         capture = cv2.VideoCapture(str(tmp_path / "a.mp4"))
         rate = capture.get(cv2.CAP_PROP_FPS)
         capture.release()
-        low, high = video.WRITTEN_RATES
+        low, high = writing.WRITTEN_RATES
         bounded = min(max(fps, low), high)
         # a decimal fraction of at most three places, which OpenCV takes to a thousandth
         finest = max(n for n in (1, 10, 100, 1000) if n * bounded <= MAX_TICKS)
