@@ -63,7 +63,7 @@ class KeptFrames:
                 weakref.finalize(self, self._file.close)
             place = ROOM - self._room
             self._file.seek(place)
-            whole = self._file.write(np.ascontiguousarray(frame)) == frame.nbytes
+            whole = self._file.write(np.ascontiguousarray(frame).data) == frame.nbytes
         except OSError:
             whole = False
         if not whole:  # the disk is full, or there is none for temporary files

@@ -18,8 +18,8 @@ from posefit.footage.people import (
     planes_of,
 )
 from posefit.footage.quality import FrameQuality
-from posefit.footage.segmenter import PersonSegmenter
-from posefit.footage.video import Video
+from posefit.footage.segmenter import PersonSegmenter, SegmentedFrame
+from posefit.footage.video import Video, ahead
 from posefit.footage.views import Range, View, empty_planes, span, times_of
 from posefit.silhouette.foreground import Image, Person
 from posefit.silhouette.mask import touches_border
@@ -91,11 +91,11 @@ class Scanner:
         landmarks = list[Array]()
         bits = empty_planes(room, size)
         known = empty_planes(room, size)
-        images = video.frames(self.start, self.stop)
-        for k, image in enumerate(progress(images, room) if progress else images):
+        # a second core segments the next frames while people are told apart in this one
+        frames = ahead(self._segmented(changed))
+        for k, frame in enumerate(progress(frames, room) if progress else frames):
+            image, (blobs, facing, points) = frame
             camera.add(k, image)
-            given = image if changed is None else changed(k, image)
-            blobs, facing, points = self.segmenter.frame(given)
             facings.append(facing)
             landmarks.append(points)
             bits[k] = np.packbits(blobs[0].mask)
@@ -121,6 +121,17 @@ class Scanner:
             pictures=partial(video.frames, self.start, self.stop),
         )
         return Scan(view, people, rows.largest, rows.blanks, self.how.person)
+
+    def _segmented(
+        self, changed: Callable[[int, Image], Image] | None
+    ) -> Iterator[tuple[Image, SegmentedFrame]]:
+        """Yield each frame's picture, and what the segmenter finds in it.
+
+        `changed` is as for `scan`.
+        """
+        for k, image in enumerate(self.video.frames(self.start, self.stop)):
+            given = image if changed is None else changed(k, image)
+            yield image, self.segmenter.frame(given)
 
 
 class _Rows:

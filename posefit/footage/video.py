@@ -354,15 +354,20 @@ def _check_written(path: Path, first: Any, capture: Any) -> None:
 
 
 def scaled(image: Any, size: tuple[int, int]) -> Image:
-    """Return a picture scaled to a width and a height."""
+    """Return a picture scaled down to a width and a height."""
     wide = image.shape[1]
     tall = image.shape[0]
     whole = min(wide // size[0], tall // size[1])
     # scaling down by a whole number first takes a tenth of the time
     if whole > 1 and wide % whole == tall % whole == 0:
-        smaller = (wide // whole, tall // whole)
-        image = cv2.resize(image, smaller, interpolation=cv2.INTER_AREA)
-    result = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        wide //= whole
+        tall //= whole
+        image = cv2.resize(image, (wide, tall), interpolation=cv2.INTER_AREA)
+    # between pixels nearer than two the line misses none of them, in a tenth of the
+    # time, and keeps outlines sharper than the mean over an area
+    is_near = wide < 2 * size[0] and tall < 2 * size[1]
+    interpolation = cv2.INTER_LINEAR if is_near else cv2.INTER_AREA
+    result = cv2.resize(image, size, interpolation=interpolation)
     return np.asarray(result, dtype=np.uint8)
 
 
