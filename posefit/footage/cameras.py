@@ -9,10 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError, NoPersonError
 from posefit.fitting.tracker import Observation
-from posefit.footage.facing import yaws_of
-from posefit.footage.options import SourceOptions
-from posefit.footage.people import Persons, part_at, paste
-from posefit.footage.quality import (
+from posefit.footage.agreement import (
     apparent_size,
     apparent_sizes,
     disagreement,
@@ -20,9 +17,13 @@ from posefit.footage.quality import (
     meeting,
     shared_extents,
 )
+from posefit.footage.facing import yaws_of
+from posefit.footage.observations import Observations
+from posefit.footage.options import SourceOptions
+from posefit.footage.people import Persons, part_at, paste
 from posefit.footage.scene import Scene
 from posefit.footage.straightening import fitting, straightening
-from posefit.footage.views import Observations, View
+from posefit.footage.views import View
 from posefit.footage.world import LEAST_HEIGHT, is_open, unit_by_height, world_of
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration

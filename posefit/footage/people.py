@@ -98,7 +98,6 @@ class Tracklet:
     def __init__(self, blob: _Blob, frame: int) -> None:
         self.detections: dict[int, Detection] = {}  # by frame
         self.rows: dict[int, dict[str, Any]] = {}  # by frame, of `FrameQuality`
-        self.quality: Any = None  # the `FrameQuality` of this person
         # where they appear: frame, column and row
         self.first = (frame, *blob.place.tolist())
         # the latest blob that shows them alone, and its frame
@@ -195,7 +194,6 @@ class People:
             else:
                 # what only later frames need is freed, or memory would grow with noise
                 tracklet.latest.mask = np.empty((0, 0), dtype=bool)
-                tracklet.quality = None
         owners = _owners(active, blobs, frame)
         confirmed = [
             tracklet

@@ -47,14 +47,14 @@ def read_array(
     stack: NDArray[Any], frames: Range, label: int | None, fps: float | None
 ) -> View:
     """Return the view of masks (T, height, width) in memory."""
-    return _packed("masks", {"masks": stack}, frames, label, fps)
+    return view_of("masks", {"masks": stack}, frames, label, fps)
 
 
 def read_npy(path: Path, frames: Range, label: int | None, fps: float | None) -> View:
     """Return the view of an .npy file of masks."""
     stack = mapped(existing(path))
     check_decoded(str(path), stack.nbytes)
-    return _packed(str(path), {"masks": stack}, frames, label, fps)
+    return view_of(str(path), {"masks": stack}, frames, label, fps)
 
 
 def read_npz(path: Path, frames: Range, label: int | None, fps: float | None) -> View:
@@ -62,7 +62,7 @@ def read_npz(path: Path, frames: Range, label: int | None, fps: float | None) ->
     existing(path)
     with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
         check_decoded(str(path), sum(array.nbytes for array in arrays.values()))
-        return _packed(str(path), arrays, frames, label, fps)
+        return view_of(str(path), arrays, frames, label, fps)
 
 
 def first_number(path: Path) -> int:
@@ -150,14 +150,16 @@ def _marks(
             )
 
 
-def _packed(
+def view_of(
     name: str,
     arrays: Mapping[str, Stored | NDArray[Any]],
     frames: Range,
     label: int | None,
     rate: float | None,
 ) -> View:
-    """Return the view of the arrays of an .npz file, named as in `NAMES`.
+    """Return the view of arrays of masks, named as in `NAMES`.
+
+    This is what the reader of a new kind of file calls once it has decoded the masks.
 
     Args:
         name: What messages call the source.

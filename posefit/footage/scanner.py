@@ -147,6 +147,8 @@ class _Rows:
         self._scanner = scanner
         self._of_blanks = scanner.segmenter.quality()
         self._of_largest = scanner.segmenter.quality()
+        # of the people who may be in the next frame
+        self._of_people = dict[Tracklet, FrameQuality]()
 
     def add(
         self,
@@ -168,13 +170,17 @@ class _Rows:
         """
         known = blobs[0].valid
         empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
+        qualities = dict[Tracklet, FrameQuality]()
         for tracklet in people.active:
             # a new person was in none of the earlier frames
-            tracklet.quality = tracklet.quality or deepcopy(self._of_blanks)
+            quality = self._of_people.get(tracklet) or deepcopy(self._of_blanks)
+            qualities[tracklet] = quality
             person = empty
             if tracklet in present:
                 person = _alone(tracklet, present, blobs, k)
-            tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
+            tracklet.add_row(k, self._row(quality, image, person, k))
+        # those of people who are lost are freed, or memory would grow with noise
+        self._of_people = qualities
         self.blanks.append(self._row(self._of_blanks, image, empty, k))
         self.largest.append(self._row(self._of_largest, image, blobs[0], k))
 

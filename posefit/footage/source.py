@@ -217,7 +217,7 @@ def _of_films(
         # all are checked before any is read
         parts = [Segmentation(film, way, frames, among) for film in films]
         try:
-            views = _taken_out(parts, known, progress)
+            views = _segmented(parts, known, progress)
             doubts = [view.doubt for view in views if view.doubt]
             attempt = _Attempt(way.name, combine(views), doubts[0] if doubts else "")
         except NoPersonError as error:
@@ -237,7 +237,7 @@ def _of_films(
     return replace(best.scene, warnings=[*best.scene.warnings, warning])
 
 
-def _taken_out(
+def _segmented(
     parts: list[Segmentation],
     known: Sequence[Camera | Calibration],
     progress: Progress,

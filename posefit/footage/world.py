@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.quality import disagreement
+from posefit.footage.agreement import disagreement
 from posefit.geometry.calibration import Calibration, Up, guessed_up, upright
 from posefit.geometry.camera import Camera
 from posefit.geometry.units import METRES, UNIT_NAMES, Unit

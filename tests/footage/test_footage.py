@@ -17,10 +17,11 @@ from posefit.footage.camera_motion import CameraMotion
 from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
 from posefit.footage.kept import KeptFrames
+from posefit.footage.observations import Observations
 from posefit.footage.options import SourceOptions
 from posefit.footage.source import scene_of
+from posefit.footage.straightening import undistorted
 from posefit.footage.video import Video
-from posefit.footage.views import Observations, undistorted
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.rotation import wrapped
 from posefit.progress import Progress
