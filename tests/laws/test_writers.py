@@ -35,7 +35,7 @@ from posefit.limits import RATES
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import gait_of
 from posefit.motion import built_in
-from posefit.output import files
+from posefit.output import files, pictures
 from posefit.output.content import Setup, TrackingLog
 from posefit.output.files import FILES, WRITERS, chosen_kinds
 from posefit.output.folder import OutputFolder
@@ -453,8 +453,8 @@ def test_what_fails_of_a_video_is_said_before_the_work_and_costs_nothing_else(
         (Painter, "add", {"overlay.mp4", "summary.png"}),
         (Painter, "summary", {"summary.png"}),
         (VideoWriter, "write", {"overlay.mp4"}),
-        (files.Stills, "add", {"track.html"}),
-        (files, "track_data", {"track.html"}),
+        (pictures.Stills, "add", {"track.html"}),
+        (pictures, "track_data", {"track.html"}),
     ],
 )
 def test_a_picture_that_fails_costs_only_itself(
@@ -553,7 +553,7 @@ def test_a_chosen_file_costs_no_look_at_the_footage(tmp_path: Path) -> None:
 
 @each(
     ("owner", "name"),
-    [(VideoWriter, "close"), (VideoWriter, "write"), (files, "_write_png")],
+    [(VideoWriter, "close"), (VideoWriter, "write"), (pictures, "_write_png")],
 )
 def test_a_disk_without_room_for_a_picture_costs_no_poses(
     owner: Any, name: str, tmp_path: Path
