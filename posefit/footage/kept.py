@@ -36,6 +36,7 @@ class KeptFrames:
         """
         self.wanted = wanted
         self._shape = (size[1], size[0], 3)
+        self._bytes = 3 * size[0] * size[1]  # of a frame
         self._places = dict[int, int]()  # the bytes before each frame, by its number
         self._file: IO[bytes] | None = None
         self._room = ROOM
@@ -50,7 +51,7 @@ class KeptFrames:
     def takes(self, number: int) -> bool:
         """Return whether a frame would be kept if it was added."""
         is_new = number in self.wanted and number not in self._places
-        return is_new and self._room >= np.prod(self._shape)
+        return is_new and self._room >= self._bytes
 
     def add(self, number: int, frame: Image) -> None:
         """Keep a frame, if it is wanted and there is room."""

@@ -223,10 +223,10 @@ def _of_one_picture(
     scene: Scene,
     task: Task,
     method: Method,
-    frames: Sequence[Frame],
+    frames: list[Frame],
     polishing: int,
     progress: Progress,
-) -> tuple[Scene, Sequence[Frame]]:
+) -> tuple[Scene, list[Frame]]:
     """Return the scene and the frame of a single picture, with all poses it may show.
 
     Args:
