@@ -11,6 +11,12 @@ memory is that of the work alone. A size that is in the file is not measured aga
 `table` prints a line a row. Its exponent p is of the fit `a + b n^p`, where a is what
 starting takes. Sizes that were not reached are extrapolated in proportion.
 
+`look` opens a page in headless Chromium, and prints the time to its first picture and
+the memory of the browser.
+
+`cluster` runs cells that sleep on Dask workers of this machine, and prints the share of
+the workers' time in which cells ran.
+
 `pose` prints the microseconds of a pose by picture, views, dimensions and population:
 the benchmark's problem with one number changed, in the fastest run on one thread.
 """
@@ -21,6 +27,7 @@ import resource
 import select
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -41,9 +48,10 @@ FPS = 30.0
 FILM_SIZE = (320, 240)  # width and height of most films
 # of a method that is cheap, so that what surrounds a search shows
 CHEAP: dict[str, Any] = {"method": "sapso@pca", "evaluations": 40}
+KNOWN_FRAMES = (0, 120)
 STREAM_FPS = 100.0
 ENVIRONMENT = "posefit_envs:posefit/FitImage-v1"
-ENVIRONMENT_STEPS = 64
+ENVIRONMENT_STEPS = 256
 STEPPED_ENVIRONMENTS = 4096
 FITTED_SIZES = 4  # of a fit, at least
 FLAT = 0.05  # what grows by less than this share is flat
@@ -127,11 +135,11 @@ def track_stream(frames: int, folder: Path) -> None:
 def track_known(
     options: Callable[[int], Mapping[str, Any]], size: int, folder: Path
 ) -> None:
-    """Track a known motion of twelve frames, and write every file."""
+    """Track a known motion of some seconds, and write every file."""
     import posefit
 
     posefit.track(
-        "walk", frames=(0, 12), out=folder / "track", **CHEAP, **options(size)
+        "walk", frames=KNOWN_FRAMES, out=folder / "track", **CHEAP, **options(size)
     )
 
 
@@ -278,6 +286,14 @@ def write_long_track(frames: int, folder: Path) -> None:
     write_files(folder / "track", long_track(frames))
 
 
+def write_page(frames: int, folder: Path) -> None:
+    """Write the page of a track that repeats a short one."""
+    from posefit.output.files import write_files
+
+    (folder / "track").mkdir()
+    write_files(folder / "track", long_track(frames), ("html",))
+
+
 def long_track(frames: int) -> Any:
     """Return the content of a track that repeats a track of footage."""
     import posefit
@@ -374,6 +390,7 @@ ROWS = {
         "frames", doubled(125, 108_000), track_and_write, write_images, HOUR
     ),
     "files": Row("frames", doubled(125, 108_000), write_long_track, of=HOUR),
+    "page": Row("frames", doubled(1_000, 108_000), write_page, of=HOUR),
     "stream": Row("frames", doubled(250, 108_000), track_stream, of=HOUR),
     "cameras": Row("cameras", doubled(1, 32), partial(track_known, cameras_around)),
     "pixels": Row(
@@ -382,7 +399,9 @@ ROWS = {
         partial(track_known, pixels_high),
     ),
     "proposals": Row("proposals", doubled(1, 1_000_000), cost_of),
-    "environments": Row("environments", doubled(1, 16_384), environments_side_by_side),
+    "environments": Row(
+        "environments", doubled(512, 16_384), environments_side_by_side
+    ),
     "steps": Row("steps", (100_000, 1_000_000, 4_000_000, 10_000_000), steps_in_a_row),
     "plan": Row("cells", doubled(1_000, 1_000_000), plan_cells, of=MILLION),
     "run": Row("cells", doubled(1_000, 1_000_000), run_cells, of=MILLION),
@@ -490,6 +509,8 @@ def work(name: str, size: int, folder: str, prepare: bool) -> None:
         ROWS[name].prepare(size, Path(folder))
         return
     start = time.perf_counter()
+    highest = [0]
+    threading.Thread(target=watch_memory, args=(highest,), daemon=True).start()
     ROWS[name].work(size, Path(folder))
     own = resource.getrusage(resource.RUSAGE_SELF)
     figures = {
@@ -497,8 +518,21 @@ def work(name: str, size: int, folder: str, prepare: bool) -> None:
         "work_seconds": time.perf_counter() - start,
         # Linux counts in kilobytes
         "peak": 1024 * own.ru_maxrss,
+        "without_files": 1024 * highest[0],
     }
     click.echo("\n" + json.dumps(figures))
+
+
+def watch_memory(highest: list[int]) -> None:
+    """Note the highest memory, in kilobytes, that is not of files on the disk.
+
+    The operating system may take back the pages of files at any time.
+    """
+    while True:
+        for line in Path("/proc/self/status").read_text("ascii").splitlines():
+            if line.startswith("RssAnon:"):
+                highest[0] = max(highest[0], int(line.split()[1]))
+        time.sleep(0.2)
 
 
 @main.command(cls=Command, hidden=True)
@@ -564,6 +598,114 @@ def extrapolated(
         f"{values[1] / 1e9:.2f} GB, extrapolated in proportion from "
         f"{sizes[-1]:,.0f}."
     )
+
+
+@main.command(cls=Command)
+@click.argument("page", type=click.Path(exists=True, path_type=Path))
+@click.option("--browser", default="/usr/bin/chromium", help="Its program.")
+def look(page: Path, browser: str) -> None:
+    """Print how long a page takes to its first picture, and the browser's memory."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        chromium = driver.chromium.launch(
+            executable_path=browser, args=["--no-sandbox"]
+        )
+        opened = chromium.new_page()
+        start = time.perf_counter()
+        opened.goto(page.absolute().as_uri())
+        # two frames of the browser's: the first was then on the screen
+        opened.evaluate(
+            "() => new Promise(done => requestAnimationFrame("
+            "() => requestAnimationFrame(done)))"
+        )
+        seconds = time.perf_counter() - start
+        megabytes = sum(map(own_megabytes, children_of(os.getpid())))
+        click.echo(
+            f"{page.stat().st_size / 1e6:.1f} MB: first picture after {seconds:.2f} s; "
+            f"the browser's processes have {megabytes:.0f} MB"
+        )
+        chromium.close()
+
+
+def children_of(process: int) -> list[int]:
+    """Return the processes that a process has started, directly or not."""
+    children = []
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        for child in map(int, task.read_text("ascii").split()):
+            children += [child, *children_of(child)]
+    return children
+
+
+def own_megabytes(process: int) -> float:
+    """Return a process' memory, of which shared parts are divided among its users."""
+    for line in Path(f"/proc/{process}/smaps_rollup").read_text("ascii").splitlines():
+        if line.startswith("Pss:"):
+            return int(line.split()[1]) / 1e3
+    return 0.0
+
+
+@dataclass(frozen=True)
+class Nap:
+    """A job that sleeps for a time."""
+
+    number: int
+    seconds: float
+
+    def __call__(self) -> float:
+        """Sleep."""
+        time.sleep(self.seconds)
+        return self.seconds
+
+
+@main.command(cls=Command)
+@click.option("--workers", default="1,2,4,8", help="Numbers of workers.")
+@click.option("--naps", default="0.1,1", help="Seconds of a cell.")
+@click.option("--seconds", default=10.0, help="How long the cells of a worker take.")
+def cluster(workers: str, naps: str, seconds: float) -> None:
+    """Print the share of the time of Dask's workers in which cells ran."""
+    from operator import methodcaller
+
+    import distributed
+
+    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.engine import Limits
+
+    for count in map(int, workers.split(",")):
+        local = distributed.LocalCluster(
+            n_workers=count, threads_per_worker=1, dashboard_address=None
+        )
+        with local:
+            address = local.scheduler_address
+            engine = Cluster(address, Limits(), methodcaller("__call__"), 120.0)
+            try:
+                # starts the workers' own processes
+                drained(engine, [Nap(k, 1.0) for k in range(4 * count)])
+                for nap in map(float, naps.split(",")):
+                    jobs = [
+                        Nap(k, nap) for k in range(max(count * round(seconds / nap), 1))
+                    ]
+                    took = drained(engine, jobs)
+                    share = len(jobs) * nap / (count * took)
+                    click.echo(
+                        f"{count} workers, {len(jobs):,} cells of {nap:g} s: "
+                        f"{took:.2f} s, {share:.2f}"
+                    )
+            finally:
+                engine.close()
+
+
+def drained(engine: Any, jobs: Sequence[Any]) -> float:
+    """Run jobs on an engine as a sweep does, and return the seconds that they took."""
+    waiting = list(jobs)
+    running = 0
+    start = time.perf_counter()
+    while waiting or running:
+        while waiting and running < engine.window():
+            engine.submit(waiting.pop())
+            running += 1
+        running -= len(engine.wait(0.2))
+    return time.perf_counter() - start
 
 
 @main.command(cls=Command)

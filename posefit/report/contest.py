@@ -43,6 +43,10 @@ class Kind(Protocol):
     data: tuple[str, ...]
     baselines: Mapping[str, str]
 
+    def computed(self, row: Row, /) -> dict[str, float]:
+        """Return the figures that a row of a ledger does not have itself."""
+        ...
+
     def read(
         self, row: Row, shared: dict[bytes, Any], /
     ) -> tuple[Array, tuple[Any, ...]]:

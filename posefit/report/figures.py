@@ -1,10 +1,9 @@
 """Figures for papers, drawn by matplotlib (posefit[figures]), and their folder."""
 
-import importlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
@@ -28,7 +27,7 @@ TABLE = "leaderboard.csv"
 TABLE_MARK = b"method,settings,"
 CHARTS = ("leaderboard", "convergence", "profile")
 NAMES = (*(f"{chart}.{kind}" for chart in CHARTS for kind in ("png", "pdf")), TABLE)
-_SIZE = (6.4, 3.6)  # inches
+WIDTH = 6.4  # inches
 
 
 def save(figure: "Figure", path: Path) -> None:
@@ -56,7 +55,7 @@ def chart_figure(
     Raises:
         ImportError: matplotlib is not installed.
     """
-    figure: Figure = library("figure").Figure(figsize=_SIZE, layout="constrained")
+    figure = empty_figure()
     axes = figure.add_subplot(xlabel=chart.x_label, ylabel=chart.y_label)
     axes.spines[["top", "right"]].set_visible(False)
     for k in order:
@@ -113,9 +112,7 @@ def board_figure(
     """
     rows = [row for row in board if row[score.name] is not None]
     height = 0.9 + 0.3 * len(rows)
-    figure: Figure = library("figure").Figure(
-        figsize=(_SIZE[0], height), layout="constrained"
-    )
+    figure = empty_figure(height)
     axes = figure.add_subplot(xlabel=score.axis)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
@@ -141,17 +138,18 @@ def board_figure(
     return figure
 
 
-def library(name: str) -> Any:
-    """Return a module of matplotlib, or matplotlib itself for an empty name.
+def empty_figure(height: float = 3.6) -> "Figure":
+    """Return a figure of this height in inches.
 
     Raises ImportError if matplotlib is not installed.
     """
     try:
-        return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
+        from matplotlib.figure import Figure
     except ImportError as error:
         raise ImportError(
             "figures need the library matplotlib: pip install posefit[figures]"
         ) from error
+    return Figure(figsize=(WIDTH, height), layout="constrained")
 
 
 def check_folder(path: str | Path) -> None:

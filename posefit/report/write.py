@@ -64,10 +64,10 @@ def write_report(
     if coco is not None:
         check_new(coco)
     if figures is not None:
-        from posefit.report.figures import check_folder, library, write_figures
+        from posefit.report.figures import check_folder, empty_figure, write_figures
 
         check_folder(figures)
-        library("figure")
+        empty_figure()
     with Ledger(*paths) as ledger:
         runs = runs_of(ledger, methods, latest=latest)
         if runs.kind.name == "search" and figures is not None:
@@ -141,9 +141,7 @@ def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
     for row in ledger.all_rows():
         columns = flat(row)
         if row["status"] == "done":
-            for column in kind.columns.values():
-                if column.compute is not None:
-                    columns[column.name] = column.value(row)
+            columns |= kind.computed(row)
         yield {**columns, "command": repeat_command(row["spec"])}
 
 
