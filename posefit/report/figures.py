@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -111,7 +112,9 @@ def board_figure(
         ImportError: matplotlib is not installed.
     """
     rows = [row for row in board if row[score.name] is not None]
-    height = 0.9 + 0.3 * len(rows)
+    height = 0.9 + 0.3 * len(rows) + 0.15 * len(baselines)
+    bottom = len(rows) - 0.5
+    top = -0.6
     figure = empty_figure(height)
     axes = figure.add_subplot(xlabel=score.axis)
     axes.spines[["top", "right", "left"]].set_visible(False)
@@ -122,18 +125,15 @@ def board_figure(
             axes.plot([row["low"], row["high"]], [place, place], color=colour)
         marker = MARKERS[row["method"] % len(MARKERS)]
         axes.plot(row[score.name], place, marker=marker, color=colour)
-    for name, value in baselines:
-        axes.axvline(value, color="0.5", linestyle=":", linewidth=1.0)
-        axes.annotate(
-            _plain(name),
-            (value, -0.6),
-            rotation=25,
-            fontsize=7,
-            color="0.35",
-            annotation_clip=False,
+    # each name is above the one to the left, because baselines may be close together
+    for name, value in sorted(baselines, key=itemgetter(1)):
+        top -= 0.5
+        axes.plot(
+            [value, value], [top, bottom], color="0.5", linestyle=":", lw=1.0, zorder=0
         )
+        axes.text(value, top, f" {_plain(name)}", va="top", fontsize=7, color="0.35")
     axes.set_yticks(range(len(rows)), [_plain(row["name"]) for row in rows])
-    axes.set_ylim(len(rows) - 0.5, -0.6)
+    axes.set_ylim(bottom, top)
     axes.set_xlim(left=0.0)
     return figure
 

@@ -296,10 +296,8 @@ def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
         if name in variant:
             value = variant[name]
             texts[name] = value if isinstance(value, str) else f"{value:.12g}"
-    posefit, *plugins = variant["version"].split(", ")
-    texts["posefit"] = posefit
-    for plugin in plugins:
-        name, _, version = plugin.partition(" ")
+    for part in variant["version"].split(", "):
+        name, _, version = part.partition(" ")
         texts[name] = version
     return texts
 

@@ -228,7 +228,8 @@ def _check_population(offer: Offer, chosen: Mapping[str, Any], most: int) -> Non
     size = settings.population(offer.factory, chosen, most)
     if size > most:
         raise InputError(
-            f"evaluations must hold one population of {size}, got {most} of {offer.name}"
+            f"evaluations must hold one population of {size}, "
+            f"got {most} of {offer.name}"
         )
 
 
