@@ -138,9 +138,9 @@ def track_known(
     """Track a known motion of some seconds, and write every file."""
     import posefit
 
-    posefit.track(
-        "walk", frames=KNOWN_FRAMES, out=folder / "track", **CHEAP, **options(size)
-    )
+    out = folder / "track"
+    method = CHEAP["method"]
+    posefit.track("walk", method, frames=KNOWN_FRAMES, out=out, **options(size))
 
 
 def cameras_around(cameras: int) -> dict[str, Any]:

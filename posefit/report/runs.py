@@ -133,26 +133,30 @@ def runs_of(
     rows = _Rows(ledger)
     kind = rows.kind
     figures = np.array(rows.figures).reshape(-1, len(kind.columns))
-    method_of_row = np.array(rows.method, dtype=int)
-    place_of_row = np.array(rows.place, dtype=int)
     score = figures[:, list(kind.columns).index(kind.score.name)]
-    label_of = _labels(rows, method_of_row, score, latest)
+    label_of = _labels(rows, score, latest)
     chosen = _named(methods, label_of, rows) if methods else list(label_of)
     finished = [m for m in chosen if m < rows.finished_methods]
 
     # the rows of these methods, sorted by instance, method and seed
-    method = _positions(finished, len(rows.methods.values))[method_of_row]
-    retained = np.flatnonzero(method >= 0)
+    method_rank = {m: rank for rank, m in enumerate(finished)}
+    numbers = [k for k, m in enumerate(rows.method) if m in method_rank]
     places = rows.places.values
     place_order = sorted(
-        np.unique(place_of_row[retained]).tolist(),
+        {rows.place[k] for k in numbers},
         key=lambda i: (kind.rank(places[i]), _text(places[i])),
     )
-    instance = _positions(place_order, len(places))[place_of_row]
-    retained_seeds = np.array([rows.seeds[k] for k in retained], dtype=object)
-    seeds, seed = np.unique(retained_seeds, return_inverse=True)
-    order = np.lexsort((seed, method[retained], instance[retained]))
-    numbers = retained[order].tolist()
+    place_rank = {i: rank for rank, i in enumerate(place_order)}
+    seeds = sorted({rows.seeds[k] for k in numbers})
+    seed_rank = {seed: rank for rank, seed in enumerate(seeds)}
+
+    def ranks(k: int) -> tuple[int, int, int]:
+        """Return the ranks of a row's instance, method and seed."""
+        instance = place_rank[rows.place[k]]
+        return instance, method_rank[rows.method[k]], seed_rank[rows.seeds[k]]
+
+    numbers.sort(key=ranks)
+    instance, method, seed = np.array([*map(ranks, numbers)], int).reshape(-1, 3).T
 
     columns = zip(*(rows.data[k] for k in numbers), strict=True)
     data: dict[str, Any] = {}
@@ -176,10 +180,10 @@ def runs_of(
         variants=tuple(rows.methods.values[m] for m in finished),
         instances=_instance_names(kind, [places[i] for i in place_order]),
         places=tuple(places[i] for i in place_order),
-        method=method[numbers],
-        instance=instance[numbers],
-        seed=seed[order],  # type: ignore[arg-type]
-        seeds=tuple(seeds.tolist()),
+        method=method,
+        instance=instance,
+        seed=seed,
+        seeds=tuple(seeds),
         keys=tuple(rows.keys[k] for k in numbers),
         figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
         data=data,
@@ -188,14 +192,13 @@ def runs_of(
     )
 
 
-def _labels(
-    rows: _Rows, method: "Array", score: "Array", latest: bool
-) -> dict[int, str]:
+def _labels(rows: _Rows, score: "Array", latest: bool) -> dict[int, str]:
     """Return the distinct names of methods by their numbers, the best first.
 
     Methods that only failed are last.
     """
     variants = rows.methods.values
+    method = np.array(rows.method)
     badness = np.nan_to_num(-score if rows.kind.score.down else score, nan=np.inf)
     means = [badness[method == m].mean() for m in range(rows.finished_methods)]
     means += [np.inf] * (len(variants) - len(means))
@@ -220,13 +223,6 @@ def _instance_names(kind: Kind, places: Sequence[dict[str, Any]]) -> tuple[str, 
                 unnamed[name] = _text(value).strip('"')
         details.append(unnamed)
     return distinct([kind.place_name(place) for place in places], details)
-
-
-def _positions(order: Sequence[int], count: int) -> "Array":
-    """Return the position (count,) of each number in an order, -1 if it is absent."""
-    positions = np.full(count, -1)
-    positions[list(order)] = np.arange(len(order))
-    return positions
 
 
 def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:

@@ -235,11 +235,11 @@ MISTAKES = [
     ("results --out OUT.txt", "--out must be a file that ends in .html, got "),
     (
         "results --out OTHER.html",
-        "expected a new name or an earlier report, got something else",
+        "expected a new name or an earlier file of this kind, got something else",
     ),
     (
         "results --out DIR.html",
-        "expected a new name or an earlier report, got something else",
+        "expected a new name or an earlier file of this kind, got something else",
     ),
     ("results --out none/OUT.html", "none is not a folder"),
     (
