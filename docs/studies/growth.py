@@ -30,7 +30,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -58,6 +58,7 @@ FLAT = 0.05  # what grows by less than this share is flat
 # a report compares this many methods
 METHODS = 10
 POSES = 400
+PORT = 8786  # of a Dask scheduler
 WIDTHS = (80, 160, 320, 640, 1280)
 VIEWS = (1, 2, 4, 8)
 COMPONENTS = (3, 6, 12, 24, 48)
@@ -645,67 +646,101 @@ def own_megabytes(process: int) -> float:
     return 0.0
 
 
-@dataclass(frozen=True)
-class Nap:
-    """A job that sleeps for a time."""
-
-    number: int
-    seconds: float
-
-    def __call__(self) -> float:
-        """Sleep."""
-        time.sleep(self.seconds)
-        return self.seconds
-
-
 @main.command(cls=Command)
 @click.option("--workers", default="1,2,4,8", help="Numbers of workers.")
 @click.option("--naps", default="0.1,1", help="Seconds of a cell.")
 @click.option("--seconds", default=10.0, help="How long the cells of a worker take.")
-def cluster(workers: str, naps: str, seconds: float) -> None:
+@click.option("--namespaces", default=0, help="Network namespaces; they need root.")
+def cluster(workers: str, naps: str, seconds: float, namespaces: int) -> None:
     """Print the share of the time of Dask's workers in which cells ran."""
-    from operator import methodcaller
-
-    import distributed
-
     from posefit.sweep.cluster import Cluster
+    from posefit.sweep.command import swept
     from posefit.sweep.engine import Limits
 
+    row = row_maker()
     for count in map(int, workers.split(",")):
-        local = distributed.LocalCluster(
-            n_workers=count, threads_per_worker=1, dashboard_address=None
-        )
-        with local:
-            address = local.scheduler_address
-            engine = Cluster(address, Limits(), methodcaller("__call__"), 120.0)
-            try:
-                # starts the workers' own processes
-                drained(engine, [Nap(k, 1.0) for k in range(4 * count)])
-                for nap in map(float, naps.split(",")):
-                    jobs = [
-                        Nap(k, nap) for k in range(max(count * round(seconds / nap), 1))
-                    ]
-                    took = drained(engine, jobs)
-                    share = len(jobs) * nap / (count * took)
-                    click.echo(
-                        f"{count} workers, {len(jobs):,} cells of {nap:g} s: "
-                        f"{took:.2f} s, {share:.2f}"
-                    )
-            finally:
-                engine.close()
+        with ExitStack() as opened:
+            hosts = [("127.0.0.1", [])]
+            if namespaces:
+                hosts = opened.enter_context(networks(namespaces))
+            address, prefix = hosts[0]
+            own = ["--host", address, "--no-dashboard"]
+            program = [*prefix, sys.executable, "-m", "distributed.cli.dask_scheduler"]
+            opened.enter_context(ended([*program, *own, "--port", str(PORT)]))
+            scheduler = f"tcp://{address}:{PORT}"
+            for k in range(count):
+                address, prefix = hosts[k % len(hosts)]
+                program = [*prefix, sys.executable, "-m", "distributed.cli.dask_worker"]
+                own = ["--host", address, "--nthreads", "1", "--no-dashboard"]
+                opened.enter_context(ended([*program, scheduler, *own, "--no-nanny"]))
+            for nap in map(float, naps.split(",")):
+                run = partial(slept, row, nap)
+                engine = Cluster(scheduler, Limits(), run, 300.0)
+                while len(engine._client.nthreads()) < count:
+                    time.sleep(0.1)
+                # a worker's first cell starts the process in which all of them run
+                for k, cell in zip(range(4 * count), plan_of(1000), strict=False):
+                    engine.submit(replace(cell, seed=1000 + k))
+                left = 4 * count
+                while left:
+                    left -= len(engine.wait(0.2))
+                plan = plan_of(METHODS * max(round(count * seconds / nap / METHODS), 1))
+                folder = opened.enter_context(TemporaryDirectory())
+                began = time.perf_counter()
+                swept(plan, Path(folder), engine, print, quiet=True)
+                took = time.perf_counter() - began
+                click.echo(
+                    f"{count} workers, {len(plan):,} cells of {nap:g} s: {took:.2f} s, "
+                    f"{len(plan) * nap / (count * took):.2f}"
+                )
 
 
-def drained(engine: Any, jobs: Sequence[Any]) -> float:
-    """Run jobs on an engine as a sweep does, and return the seconds that they took."""
-    waiting = list(jobs)
-    running = 0
-    start = time.perf_counter()
-    while waiting or running:
-        while waiting and running < engine.window():
-            engine.submit(waiting.pop())
-            running += 1
-        running -= len(engine.wait(0.2))
-    return time.perf_counter() - start
+def slept(
+    row: Callable[[Any, float], dict[str, Any]], seconds: float, cell: Any
+) -> dict[str, Any]:
+    """Sleep for a time, and return a cell's row."""
+    time.sleep(seconds)
+    return row(cell, 1.0)
+
+
+@contextmanager
+def ended(words: Sequence[str]) -> Iterator[None]:
+    """Run a program during the body."""
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(words, stdout=quiet, stderr=quiet) as process:
+        try:
+            yield
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def networks(count: int) -> Iterator[list[tuple[str, list[str]]]]:
+    """Make network namespaces that a bridge connects, as if they were machines.
+
+    Yields the address of each, and the beginning of commands that run there.
+    """
+
+    def ip(words: str) -> None:
+        subprocess.run(["ip", *words.split()], check=True)
+
+    with ExitStack() as made:
+        ip("link add posefit type bridge")
+        made.callback(ip, "link del posefit")
+        ip("addr add 10.77.0.254/24 dev posefit")
+        ip("link set posefit up")
+        hosts = []
+        for k in range(1, count + 1):
+            name = f"posefit{k}"
+            ip(f"netns add {name}")
+            made.callback(ip, f"netns del {name}")
+            ip(f"link add {name} type veth peer name eth0 netns {name}")
+            ip(f"link set {name} master posefit up")
+            ip(f"-n {name} addr add 10.77.0.{k}/24 dev eth0")
+            ip(f"-n {name} link set eth0 up")
+            ip(f"-n {name} link set lo up")
+            hosts.append((f"10.77.0.{k}", ["ip", "netns", "exec", name]))
+        yield hosts
 
 
 @main.command(cls=Command)

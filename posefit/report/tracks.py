@@ -147,7 +147,8 @@ SCORE = Score(
     leaderboard="Each figure is the mean of a method's runs. In the error with losses "
     "a lost frame counts at least as much as the mean training pose. First come the "
     "methods that are not shown to be worse than the method of the lowest error "
-    "(p at least 0.05), in order of lost tracks; then the others by their error. "
+    "(p at least 0.05 before the correction), in order of lost tracks; then the "
+    "others by their error. "
     "Skill is 1 − error with losses / baseline: 0 is no better than the baseline, "
     "which uses the true root and translation. ",
 )

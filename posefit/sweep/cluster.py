@@ -98,12 +98,13 @@ class Cluster:
             ) from None
 
     def window(self) -> int:
-        """Return the number of threads of all workers, but at least one.
+        """Return twice the number of threads of all workers, but at least one.
 
-        Dask keeps a job while there are no workers.
+        A worker that ends a job then has the next one already. Dask keeps a job while
+        there are no workers.
         """
         try:
-            return max(1, int(sum(self._client.nthreads().values())))
+            return max(1, 2 * int(sum(self._client.nthreads().values())))
         # raised by a client whose scheduler went away
         except (OSError, TimeoutError, ValueError, AttributeError):
             raise InputError(
