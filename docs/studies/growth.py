@@ -164,11 +164,11 @@ def cost_of(proposals: int, _: Path) -> None:
     cost(draw_population(cost.space, np.random.default_rng(0), proposals))
 
 
-def step_environments(environments: int, steps: int) -> None:
+def step_environments(environments: int, steps: int, **arguments: Any) -> None:
     """Step environments side by side with random actions."""
     import gymnasium as gym
 
-    env: Any = gym.make_vec(ENVIRONMENT, environments, errors=False)
+    env: Any = gym.make_vec(ENVIRONMENT, environments, errors=False, **arguments)
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(steps):
@@ -177,7 +177,8 @@ def step_environments(environments: int, steps: int) -> None:
 
 
 def environments_side_by_side(environments: int, _: Path) -> None:
-    step_environments(environments, ENVIRONMENT_STEPS)
+    # one instance, as many environments would have met all training instances
+    step_environments(environments, ENVIRONMENT_STEPS, instance=17)
 
 
 def steps_in_a_row(steps: int, _: Path) -> None:

@@ -139,24 +139,25 @@ def runs_of(
     finished = [m for m in chosen if m < rows.finished_methods]
 
     # the rows of these methods, sorted by instance, method and seed
-    method_rank = {m: rank for rank, m in enumerate(finished)}
-    numbers = [k for k, m in enumerate(rows.method) if m in method_rank]
+    retained = set(finished)
+    numbers = [k for k, m in enumerate(rows.method) if m in retained]
     places = rows.places.values
     place_order = sorted(
         {rows.place[k] for k in numbers},
         key=lambda i: (kind.rank(places[i]), _text(places[i])),
     )
-    place_rank = {i: rank for rank, i in enumerate(place_order)}
     seeds = sorted({rows.seeds[k] for k in numbers})
-    seed_rank = {seed: rank for rank, seed in enumerate(seeds)}
 
-    def ranks(k: int) -> tuple[int, int, int]:
-        """Return the ranks of a row's instance, method and seed."""
-        instance = place_rank[rows.place[k]]
-        return instance, method_rank[rows.method[k]], seed_rank[rows.seeds[k]]
+    def ranks(values: Sequence[int], order: Sequence[int]) -> "Array":
+        """Return the places of these rows' values in an order."""
+        rank = {value: place for place, value in enumerate(order)}
+        return np.array([rank[values[k]] for k in numbers], dtype=int)
 
-    numbers.sort(key=ranks)
-    instance, method, seed = np.array([*map(ranks, numbers)], int).reshape(-1, 3).T
+    instance = ranks(rows.place, place_order)
+    method = ranks(rows.method, finished)
+    seed = ranks(rows.seeds, seeds)
+    order = np.lexsort((seed, method, instance))
+    numbers = [numbers[k] for k in order.tolist()]
 
     columns = zip(*(rows.data[k] for k in numbers), strict=True)
     data: dict[str, Any] = {}
@@ -180,9 +181,9 @@ def runs_of(
         variants=tuple(rows.methods.values[m] for m in finished),
         instances=_instance_names(kind, [places[i] for i in place_order]),
         places=tuple(places[i] for i in place_order),
-        method=method,
-        instance=instance,
-        seed=seed,
+        method=method[order],
+        instance=instance[order],
+        seed=seed[order],
         seeds=tuple(seeds),
         keys=tuple(rows.keys[k] for k in numbers),
         figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
