@@ -139,9 +139,8 @@ def track_known(
     """Track a known motion of some seconds, and write every file."""
     import posefit
 
-    out = folder / "track"
-    method = CHEAP["method"]
-    posefit.track("walk", method, frames=KNOWN_FRAMES, out=out, **options(size))
+    how = {"method": CHEAP["method"], "frames": KNOWN_FRAMES, **options(size)}
+    posefit.track("walk", out=folder / "track", **how)
 
 
 def cameras_around(cameras: int) -> dict[str, Any]:

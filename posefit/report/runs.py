@@ -132,7 +132,7 @@ def runs_of(
     """
     rows = _Rows(ledger)
     kind = rows.kind
-    figures = np.array(rows.figures).reshape(-1, len(kind.columns))
+    figures = np.asarray(rows.figures).reshape(-1, len(kind.columns))
     score = figures[:, list(kind.columns).index(kind.score.name)]
     label_of = _labels(rows, score, latest)
     chosen = _named(methods, label_of, rows) if methods else list(label_of)
@@ -160,12 +160,6 @@ def runs_of(
     numbers = [numbers[k] for k in order.tolist()]
 
     columns = zip(*(rows.data[k] for k in numbers), strict=True)
-    data: dict[str, Any] = {}
-    # without rows there are no columns
-    for name, column in zip(kind.data, columns, strict=False):
-        data[name] = column
-        if isinstance(column[0], np.ndarray):
-            data[name] = np.array(column)
     warnings = {}
     for place, k in enumerate(numbers):
         if rows.warnings[k]:
@@ -187,7 +181,8 @@ def runs_of(
         seeds=tuple(seeds),
         keys=tuple(rows.keys[k] for k in numbers),
         figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
-        data=data,
+        # without rows there are no columns
+        data=dict(zip(kind.data, columns, strict=False)),
         warnings=warnings,
         failures=tuple(failures),
     )

@@ -197,10 +197,11 @@ def search_charts(contest: Contest) -> list[Chart]:
     functions = contest.place_field("function")
     dimensions = contest.place_field("dimension")
     instances = contest.place_field("instance")
-    runs = [contest.runs.data["runs"][k] for k in map(int, contest.blocks.ravel())]
+    runs = contest.data("runs", contest.blocks)
     most = max(float(run.evaluations[-1]) / run.dimension for run in runs)
     evaluations = np.unique(np.geomspace(1.0, max(most, 1.0), POINTS))
-    hits_of_runs = contest.runs.data["hits"][contest.blocks]
+    hits_of_runs = np.array(contest.data("hits", contest.blocks))
+    hits_of_runs = hits_of_runs.reshape(*contest.blocks.shape, -1)
     hits_of_runs = hits_of_runs / dimensions.astype(np.float64)[None, :, None]
     # (methods, blocks, points)
     shares = np.array(
@@ -242,11 +243,10 @@ def running_times(contest: Contest) -> list[dict[str, Any]]:
     There is no row for all functions together, because the hardest function would
     decide its mean running time.
     """
-    runs = contest.runs.data["runs"]
     rows = []
     for method in contest.methods:
-        runs_of_method = [runs[k] for k in contest.rows_of(method).tolist()]
-        for score in suite_scores(runs_of_method):
+        runs = contest.data("runs", contest.rows_of(method))
+        for score in suite_scores(runs):
             if score.function == ALL:
                 continue
             row = {
