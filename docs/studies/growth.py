@@ -21,6 +21,7 @@ the workers' time in which cells ran.
 the benchmark's problem with one number changed, in the fastest run on one thread.
 """
 
+import importlib
 import json
 import os
 import resource
@@ -606,9 +607,8 @@ def extrapolated(
 @click.option("--browser", default="/usr/bin/chromium", help="Its program.")
 def look(page: Path, browser: str) -> None:
     """Print how long a page takes to its first picture, and the browser's memory."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
+    library: Any = importlib.import_module("playwright.sync_api")
+    with library.sync_playwright() as driver:
         chromium = driver.chromium.launch(
             executable_path=browser, args=["--no-sandbox"]
         )
@@ -660,7 +660,7 @@ def cluster(workers: str, naps: str, seconds: float, namespaces: int) -> None:
     row = row_maker()
     for count in map(int, workers.split(",")):
         with ExitStack() as opened:
-            hosts = [("127.0.0.1", [])]
+            hosts: list[tuple[str, list[str]]] = [("127.0.0.1", [])]
             if namespaces:
                 hosts = opened.enter_context(networks(namespaces))
             address, prefix = hosts[0]

@@ -181,7 +181,8 @@ def _certainty_of(contest: Contest, rows: Array) -> dict[str, Any] | None:
     figures = contest.runs.figures
     coverage = [mean(figures[f"coverage.{level}"][rows]) for level in LEVEL_NAMES]
     width = [mean(figures[f"interval_mm.{level}"][rows]) for level in LEVEL_NAMES]
-    bins = np.sum(contest.data("modes", rows), axis=0, dtype=np.float64)
+    modes = np.array(contest.data("modes", rows))  # (runs, bins, 3)
+    bins = modes.sum(axis=0, dtype=np.float64)
     bins = bins[bins[:, 0] > 0.0]
     if not len(bins) and None in coverage:
         return None

@@ -190,10 +190,10 @@ class Contest(Shared):
         """The figure (methods, blocks) that orders the methods."""
         return self.of(self.runs.kind.score.name)
 
-    def data(self, name: str, rows: Array) -> list[Any]:
+    def data(self, name: str, rows: Array | NDArray[np.int64]) -> list[Any]:
         """Return the other data of rows, which are indices of any shape, in order."""
         data = self.runs.data[name]
-        return [data[k] for k in rows.ravel().tolist()]
+        return [data[k] for k in map(int, rows.ravel())]
 
     def rows_of(self, method: int) -> NDArray[np.int64]:
         """Return the indices (k,) of the runs on which a method's figures are averaged.
