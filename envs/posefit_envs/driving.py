@@ -17,6 +17,7 @@ from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
+from posefit_envs.corrections import Corrections
 from posefit_envs.rows import AnyEnv, rows_of
 from posefit_envs.track import TrackEnv, committed_infos
 
@@ -79,7 +80,7 @@ def _check_actions_reach(env: AnyEnv) -> None:
     """Raise gymnasium.error.Error unless actions reach FitImage-v1 unchanged."""
     wrapper: Any = env
     while wrapper is not env.unwrapped:
-        if isinstance(wrapper, ActionWrapper | VectorActionWrapper):
+        if isinstance(wrapper, ActionWrapper | VectorActionWrapper | Corrections):
             raise error.Error(
                 f"env must take proposals as they are, got {type(wrapper).__name__}: "
                 "drive the environment that it wraps"
