@@ -184,6 +184,7 @@ def drive_each(
                 proposals[i] = searches[i].send(costs[i])
             except StopIteration:
                 searching.remove(i)
+                # a row must step with the others: any proposal will do
                 proposals[i] = 0.0
     return problems
 
@@ -249,6 +250,7 @@ def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float,
         costs = np.empty(len(proposals))
         for k, proposal in enumerate(proposals):
             costs[k] = yield proposal
+        # counted by hand: the costs came from steps, and the problem was never called
         problem.count(proposals, costs)
         optimiser.tell(proposals, costs)
     if not problem.evaluations:
