@@ -10,6 +10,7 @@ row has every instance once. There is a table for each level.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
@@ -137,8 +138,11 @@ def episodes(policy: Policy, training: Training, count: int) -> tuple[Array, Arr
     return np.array(proposals), np.array(costs)
 
 
-def row_of(training: Training) -> dict[str, Any]:
-    """Return a row: best costs on held-out instances, proposals, CPU seconds."""
+def row_of(training: Training, policies: str | None) -> dict[str, Any]:
+    """Return a row: best costs on held-out instances, proposals, CPU seconds.
+
+    What a learner has learned is saved in the folder `policies`, if any.
+    """
     start_time = process_time()
     row = training._asdict()
     if training.agent in SEARCHES:
@@ -146,7 +150,11 @@ def row_of(training: Training) -> dict[str, Any]:
         return row | {"cpu_seconds": round(process_time() - start_time, 1)}
     learns = training.agent in LEARNERS
     if learns:
-        policy = trained(training)
+        model = trained(training)
+        policy = policy_of(model)
+        if policies is not None:
+            name = f"{training.level}-{training.agent}-{training.seed}.npz"
+            np.savez_compressed(Path(policies) / name, *layers_of(model))
     elif training.agent == LOOK_UP:
         policy = looked_up(training)
     else:
@@ -248,8 +256,8 @@ def ppo(vector: Any, seed: int, rate: float = LEARNING_RATE) -> Any:
     )  # fmt: skip
 
 
-def trained(training: Training) -> Policy:
-    """Return the policy of a learner, the mean of its distribution."""
+def trained(training: Training) -> Any:
+    """Return the model of a learner after its training."""
     import torch
 
     env = Corrections(
@@ -271,9 +279,28 @@ def trained(training: Training) -> Policy:
         know_rewards(model, env)
     if left:
         model.learn(left)
+    return model
+
+
+def policy_of(model: Any) -> Policy:
+    """Return the policy of a model, the mean of its distribution."""
     return lambda observations: np.asarray(
         model.predict(observations, deterministic=True)[0], dtype=np.float64
     )
+
+
+def layers_of(model: Any) -> list[Array]:
+    """Return weights (inputs, outputs) and biases of a policy's layers, in turn.
+
+    They are rounded to 16 bits, as `posefit_envs.trained_policy` reads them.
+    """
+    policy = model.policy
+    arrays = []
+    for layer in (*policy.mlp_extractor.policy_net, policy.action_net):
+        if hasattr(layer, "weight"):
+            arrays.append(layer.weight.detach().numpy().T.astype(np.float16))
+            arrays.append(layer.bias.detach().numpy().astype(np.float16))
+    return arrays
 
 
 def know_rewards(model: Any, env: Any) -> None:
@@ -433,6 +460,12 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     metavar="FILE",
     help="PNG to write: eight proposals of the first pose network.",
 )
+@click.option(
+    "--policies",
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False),
+    help="Folder for what learners have learned: a file for each row.",
+)
 @WORKERS
 def main(
     names: tuple[str, ...],
@@ -440,6 +473,7 @@ def main(
     seeds: int,
     rows: str | None,
     drawn: str | None,
+    policies: str | None,
     workers: int | None,
 ) -> None:
     check_learners()
@@ -459,7 +493,10 @@ def main(
             for name in agents or LEARNERS
         ]
     done = measured(
-        {turn: partial(row_of, turn) for turn in turns}, rows, keyed(Training), workers
+        {turn: partial(row_of, turn, policies) for turn in turns},
+        rows,
+        keyed(Training),
+        workers,
     )
     for level in names or ("default",):
         click.echo(f"\n{level}, {INSTANCES} held-out instances\n")

@@ -320,7 +320,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     def generator(self, i: int) -> np.random.Generator:
         """Return the random generator of environment i."""
-        # a seed of the operating system costs more than a step, and reset may bring one
+        # not in __init__: seeding takes longer than a step, and reset may bring seeds
         if i not in self._generators:
             self._generators[i] = seeding.np_random(None)
         return self._generators[i][0]

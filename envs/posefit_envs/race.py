@@ -113,7 +113,7 @@ class Races:
     def _begin_search(self, row: int, search: int) -> None:
         """Replace one of a race's searches by a new one."""
         space = self.stage.space(row)
-        # a generator of its own: what one search draws changes no other
+        # a separate generator: what one search draws changes no other
         rng = np.random.default_rng(int(self._rngs[row].integers(2**63)))
         self._optimisers[row][search] = checked(
             lambda: self._factory(space, rng, **self._settings)
